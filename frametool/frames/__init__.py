@@ -1,0 +1,1 @@
+"""Frame trees, stamps and lookups: knows geometry, no text and no files."""

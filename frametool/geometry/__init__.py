@@ -1,0 +1,1 @@
+"""The core math: knows numbers only, no names, no text, no files."""
