@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 
-from frametool.errors import FormatError
 from frametool.formats.places import END, LEAF, LIST, MAP, find_marks
 from frametool.formats.source import Source, error_at, place_of
 
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import Any
 
+    from frametool.errors import FormatError
     from frametool.formats.places import Path, PlaceEvent
 
 DEEPEST = 1000
@@ -27,7 +27,7 @@ _ESCAPE = re.compile(r"\\(?:u([0-9a-fA-F]{4})|.)", re.DOTALL)
 _OPENING = {"{": MAP, "[": LIST}
 
 
-class _RepeatedKey(Exception):  # noqa: N818
+class _RepeatedKey(Exception):
     """Carry a key that stands twice in one object."""
 
 
@@ -68,9 +68,7 @@ def _decoded(text: str) -> list[Any]:
     """Decode one value after the other, up to the end."""
     from json import JSONDecoder
 
-    decode = JSONDecoder(
-        object_pairs_hook=_distinct, parse_int=str, parse_float=str, parse_constant=str
-    ).raw_decode
+    decode = JSONDecoder(object_pairs_hook=_distinct, parse_int=str, parse_float=str, parse_constant=str).raw_decode
     values = []
     end = _end_of_blanks(text, 0)
     while end < len(text):

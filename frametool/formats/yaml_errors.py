@@ -48,4 +48,4 @@ def _cannot_start(character: str) -> str:
     """Say why nothing begins with a character, and what to write."""
     if character == "\t":
         return "a tab cannot indent YAML; use blanks"
-    return f"nothing can begin with {character!r} here; quote the name, as in \"{character}name\""
+    return f'nothing can begin with {character!r} here; quote the name, as in "{character}name"'

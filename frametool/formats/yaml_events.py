@@ -107,9 +107,9 @@ def _unshift(place: tuple[int, int], shifts: dict[int, int]) -> tuple[int, int]:
     return line, column - (line in shifts and column > shifts[line])
 
 
-def _place_events(text: str) -> Iterator[PlaceEvent]:
+def _place_events(text: str) -> Iterator[PlaceEvent[tuple[int, int]]]:
     """Reduce the parser's events to what finding places needs."""
-    get = _Loader(text).get_event
+    get: Callable[[], Any] = _Loader(text).get_event
     while type(event := get()) is not StreamEndEvent:
         if isinstance(event, CollectionEndEvent):
             yield END, "", (0, 0)
@@ -144,14 +144,16 @@ class _Builder:
             raise translated(self.source, error) from None
         return self.documents
 
-    def _run(self, get: Callable[[], yaml.Event]) -> None:
+    def _run(self, get: Callable[[], Any]) -> None:
         """Take events until the stream ends.
 
         `current` is the dict or list being filled and `key` the key waiting for its value: None where a key comes
         next, _ITEM in a list.  One function, because two million events pass through it for 100 000 frames.
         """
         stack, nulls, odd_keys, item = self.open, _NULLS, _ODD_KEYS, _ITEM
-        current, key = self.documents, _ITEM
+        current: Any = self.documents
+        key: Any = item
+        value: Value
         while True:
             event = get()
             kind = type(event)
@@ -202,7 +204,7 @@ class _Builder:
         if event.anchor is not None:
             self.anchors[event.anchor] = value
 
-    def _refuse_key(self, event: ScalarEvent, current: dict[str, Value]) -> None:
+    def _refuse_key(self, event: ScalarEvent, current: Any) -> None:
         """Raise for a key that is there already, is empty or asks for a merge; a quoted << is a name."""
         if event.value == "":
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
@@ -252,7 +254,7 @@ class _Builder:
             level = below
         raise self._error(event, f"nested deeper than {DEEPEST} levels")
 
-    def _error(self, event: yaml.Event, message: str) -> FormatError:
+    def _error(self, event: Any, message: str) -> FormatError:
         """Make the error for the place where an event begins."""
         return placed_error(self.source, event.start_mark.line + 1, event.start_mark.column + 1, message)
 
