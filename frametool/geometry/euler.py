@@ -79,11 +79,10 @@ def from_quaternion(
     half_sum, half_difference = xp.atan2(b, a), xp.atan2(d, c)
     limit = LOCK * (squared_sum + squared_difference)
     no_sum, no_difference = squared_sum <= limit, squared_difference <= limit
-    opposite = 0.0 - half_difference
-    half_sum, half_difference = (
-        xp.where(no_sum, opposite if static else half_difference, half_sum),
-        xp.where(no_difference, 0.0 - half_sum if static else half_sum, half_difference),
-    )
+    if xp.some(no_sum | no_difference):
+        third_away = 0.0 - half_sum if static else half_sum
+        half_sum = xp.where(no_sum, 0.0 - half_difference if static else half_difference, half_sum)
+        half_difference = xp.where(no_difference, third_away, half_difference)
     outer, inner = _wrapped(half_sum + half_difference, xp), _wrapped(half_sum - half_difference, xp)
     first, third = (inner, outer) if static else (outer, inner)
     return (xp.degrees(first), xp.degrees(middle), xp.degrees(third)) if degrees else (first, middle, third)
@@ -122,5 +121,4 @@ def _middle(
 
 def _wrapped(angle: Number, xp: Namespace) -> Number:
     """Bring an angle between -2 pi and 2 pi into (-pi, pi]."""
-    turns = xp.where(angle > pi, tau, 0.0) - xp.where(angle <= -pi, tau, 0.0)
-    return angle - turns
+    return xp.minimum(angle - tau * xp.ceil(angle / tau - 0.5), pi)
