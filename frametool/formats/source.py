@@ -99,6 +99,11 @@ def place_of(text: str, offset: int) -> tuple[int, int]:
     return line, offset - begin + 1
 
 
+def within(text: str, line: int, column: int) -> tuple[int, int]:
+    """Draw a place beyond the last character, where parsers find that something is missing, back to just after it."""
+    return min((line, column), place_of(text, len(text.rstrip(" \t\r\n"))))
+
+
 def error_at(source: Source, offset: int, message: str) -> FormatError:
     """Make the error for an offset into the source's text."""
     line, column = place_of(source.text, offset)
@@ -109,6 +114,7 @@ def placed_error(
     source: Source, line: int, column: int, message: str, error: type[FormatError] = FormatError
 ) -> FormatError:
     """Make the error for a place, with the source line and a caret below it."""
+    line, column = within(source.text, line, column)
     snippet = pointer(line_of(source.text, line), column)
     return error(message, source=source.name, line=line, column=column, snippet=snippet)
 
