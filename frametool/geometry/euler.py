@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import pi, tau
 
-from frametool.geometry.quaternion import EPS
+from frametool.geometry.quaternion import EPS, settled
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -60,7 +60,8 @@ def to_quaternion(
         vector[i] = cb * mixed + signed * turned
         vector[j] = sb * cosines - (cb * parity) * sines
         vector[k] = cb * turned + signed * mixed
-    return vector[0], vector[1], vector[2], w
+    x, y, z = vector
+    return settled(x, y, z, w) if degrees else (x, y, z, w)
 
 
 def from_quaternion(

@@ -34,17 +34,26 @@ def product(ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Numb
     )
 
 
-def compose(ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number) -> Quaternion:
-    """Multiply two unit quaternions and take the rounding off the norm.
+def compose(
+    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number
+) -> Quaternion:
+    """Multiply two unit quaternions and take the rounding off the norm: multiples of 90 degrees stay exact."""
+    return settled(
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
 
-    One Newton step for 1/norm, (3 - n^2)/2, needs no root; with it products of multiples of 90 degrees are exact.
+
+def settled(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
+    """Take the last rounding off the norm of a quaternion that is unit to 1e-8.
+
+    (1 + n^2)/2 is the norm to first order, and needs no root.  Divided by it, the products of 0, 1/2, sqrt(1/2)
+    and 1 that right angles consist of become these doubles again.
     """
-    x = aw * bx + ax * bw + ay * bz - az * by
-    y = aw * by - ax * bz + ay * bw + az * bx
-    z = aw * bz + ax * by - ay * bx + az * bw
-    w = aw * bw - ax * bx - ay * by - az * bz
-    scale = 1.5 - 0.5 * (x * x + y * y + z * z + w * w)
-    return x * scale, y * scale, z * scale, w * scale
+    norm = 0.5 + 0.5 * (x * x + y * y + z * z + w * w)
+    return x / norm, y / norm, z / norm, w / norm
 
 
 def conjugate(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
