@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 _UNREADABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
 _ABOUT_TABS = re.compile("cannot start any token|tab character")
+_ABOUT_BEGINNINGS = re.compile("cannot start any token|scanning a directive")
+_NEVER_FIRST = ("@", "`", "%")
 _LONGEST_SHOWN = 40
 _HINTS = {
     "mapping values are not allowed in this context": "; check the indentation, or quote a text that holds ': '",

@@ -22,6 +22,7 @@ from yaml.events import (
 )
 
 from frametool.errors import FormatError
+from frametool.formats.limits import DEEPEST, MOST_CONTAINERS, too_much
 from frametool.formats.places import END, LEAF, LIST, MAP, find_marks
 from frametool.formats.source import Source, error_at, place_of, placed_error
 from frametool.formats.yaml_errors import translated
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
 
-DEEPEST = 1000
 MOST_ALIASES = 1000
 SPARE_COPIES = 10_000  # what aliases may repeat, beside one value for each character of the text
 
@@ -173,6 +173,7 @@ class _Builder:
         stack, nulls, odd_keys, item = self.open, _NULLS, _ODD_KEYS, _ITEM
         current: Any = self.documents
         key: Any = item
+        room = MOST_CONTAINERS
         value: Value
         while True:
             event = get()
@@ -192,8 +193,9 @@ class _Builder:
                 value = {} if kind is MappingStartEvent else []
                 if key is None:
                     raise self._error(event, "a key must be one text, not a list or map")
-                if len(stack) >= DEEPEST:
-                    raise self._error(event, f"nested deeper than {DEEPEST} levels")
+                room -= 1
+                if len(stack) >= DEEPEST or not room:
+                    raise self._error(event, too_much(len(stack)))
             elif kind is MappingEndEvent or kind is SequenceEndEvent:
                 current, key = stack.pop()
                 continue
@@ -272,7 +274,7 @@ class _Builder:
             if not below:
                 return root[0]
             level = below
-        raise self._error(event, f"nested deeper than {DEEPEST} levels")
+        raise self._error(event, too_much(DEEPEST))
 
     def _error(self, event: Any, message: str) -> FormatError:
         """Make the error for the place where an event begins."""

@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as some
 
 from frametool.errors import FileProblem, FormatError
-from frametool.formats import yaml_events
+from frametool.formats import json_text, source, yaml_events
 from frametool.formats.documents import (
     decode,
     explain_scalar,
@@ -130,6 +130,21 @@ def test_what_opencv_writes_is_read() -> None:
 def test_places_in_what_opencv_writes_are_those_of_the_file() -> None:
     assert locate_many(OPENCV, [(0, "T", "data", 1), (0, "T", "rows")]) == [(7, 15), (4, 10)]
     assert locate(OPENCV, (0, "T", "data")) == (7, 9)
+
+
+@pytest.mark.parametrize("text", ["[" + "[]," * 30 + "[]]", "[a," + "[]," * 30 + "[]]", "- []\n" * 30])
+def test_lists_and_maps_are_counted(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (json_text, yaml_events):
+        monkeypatch.setattr(module, "MOST_CONTAINERS", 30)
+    assert "lists and maps in one file; split it" in refusal(text)
+
+
+def test_a_text_too_long_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(source, "MOST_CHARACTERS", 100)
+    assert refusal("a" * 101) == "f: longer than 100 characters, the most in one file; split it"
+    (tmp_path / "long.yaml").write_text("a" * 101)
+    with pytest.raises(FormatError, match="longer than 100 bytes"):
+        read_text(tmp_path / "long.yaml")
 
 
 def laughs(depth: int) -> str:
