@@ -47,9 +47,11 @@ def _message(error: MarkedYAMLError, line: str, column: int) -> str:
     word = line[column - 1 :].split(maxsplit=1)[0] if line[column - 1 :].strip() else ""
     if "\t" in (line[column - 1 : column], *line[: column - 1].split(" ")) and _ABOUT_TABS.search(problem):
         return "a tab cannot indent YAML; use blanks"
-    if "cannot start any token" in problem or "scanning a directive" in context:
-        quotable = (word if "directive" not in context else line.split(maxsplit=1)[0]).rstrip(":,]}")
-        return f'nothing can begin with {quotable[:1]!r} here; quote the name: "{quotable[:_LONGEST_SHOWN]}"'
+    if "scanning a directive" in context:
+        word = line.split(maxsplit=1)[0] if line.strip() else ""
+    if word.startswith(_NEVER_FIRST) and _ABOUT_BEGINNINGS.search(problem + context):
+        name = word.rstrip(":,]}")[:_LONGEST_SHOWN]
+        return f'nothing can begin with {word[0]!r} here; quote the name: "{name}"'
     if word == ":" and problem == "did not find expected key":
         return "an empty key; write a name before the colon"
     begun = f" begun at line {error.context_mark.line + 1}" if error.context_mark else ""

@@ -6,9 +6,7 @@ text grow without bound.  The loop here keeps every scalar as text and counts de
 
 from __future__ import annotations
 
-import gc
 import re
-from contextlib import contextmanager
 
 import yaml
 from yaml.events import (
@@ -22,6 +20,7 @@ from yaml.events import (
 )
 
 from frametool.errors import FormatError
+from frametool.formats.collector import paused_collector
 from frametool.formats.limits import DEEPEST, MOST_CONTAINERS, too_much
 from frametool.formats.places import END, LEAF, LIST, MAP, find_marks
 from frametool.formats.source import Source, error_at, place_of, placed_error
@@ -56,18 +55,6 @@ _PLACE_KINDS: dict[type, int] = {
     MappingEndEvent: END,
 }
 _MOST_DIRECTIVES = 100  # libyaml compares each new %TAG with all before it
-
-
-@contextmanager
-def paused_collector() -> Iterator[None]:
-    """Keep the garbage collector off meanwhile: it would walk the growing result again and again."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 def parse_yaml(source: Source, allowed_tags: frozenset[str]) -> list[Value]:
