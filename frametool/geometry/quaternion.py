@@ -207,22 +207,27 @@ def complaint(x: float, y: float, z: float, w: float, norm: float, *, normalize:
 def between(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:
     """Give the shortest rotation that turns the direction a into the direction b.
 
-    Turning by twice the angle between a and the bisector is exact near opposite directions too: the sum of the
-    two unit vectors has no rounding there.  Opposite to 4 eps: half a turn about an axis at right angles to a.
+    The turn by twice the angle between a and the bisector a + b.  Near opposite directions the bisector is all
+    rounding along a - b, which is taken out of it (a + b itself is exact there); opposite to 1 eps: half a turn
+    about an axis at right angles to a.
     """
     ax, ay, az = unit_vector(ax, ay, az, xp)
     bx, by, bz = unit_vector(bx, by, bz, xp)
     mx, my, mz = ax + bx, ay + by, az + bz
-    opposite = abs(mx) + abs(my) + abs(mz) <= UNIT
+    dx, dy, dz = ax - bx, ay - by, az - bz
+    apart = dx * dx + dy * dy + dz * dz
+    along = xp.where(apart > 2.0, mx * dx + my * dy + mz * dz, 0.0) / xp.maximum(apart, 2.0)
+    mx, my, mz = mx - along * dx, my - along * dy, mz - along * dz
+    opposite = abs(mx) + abs(my) + abs(mz) <= EPS
     sx, sy, sz = _sideways(ax, ay, az, xp)
     mx, my, mz = unit_vector(xp.where(opposite, sx, mx), xp.where(opposite, sy, my), xp.where(opposite, sz, mz), xp)
-    return ay * mz - az * my, az * mx - ax * mz, ax * my - ay * mx, ax * mx + ay * my + az * mz
+    return *cross(ax, ay, az, mx, my, mz), ax * mx + ay * my + az * mz
 
 
 def _sideways(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
     """Give a vector at right angles to a unit vector, from the coordinate axis farthest from it."""
-    first, second = abs(x) <= abs(y), abs(y) <= abs(z)
-    use_x, use_y = first & (abs(x) <= abs(z)), second
+    use_x = (abs(x) <= abs(y)) & (abs(x) <= abs(z))
+    use_y = abs(y) <= abs(z)
     zero = 0.0 * x
     # a x e_x = (0, z, -y);  a x e_y = (-z, 0, x);  a x e_z = (y, -x, 0)
     return (
@@ -245,3 +250,8 @@ def unit_vector(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
     x, y, z = xp.ldexp(x, shift), xp.ldexp(y, shift), xp.ldexp(z, shift)
     length = xp.length(x, y, z)
     return x / length, y / length, z / length
+
+
+def cross(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Vector:
+    """Give the vector product."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

@@ -9,6 +9,7 @@ from math import isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rotvec
+from frametool.geometry.quaternion import cross
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -145,11 +146,6 @@ def log(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: 
     cx, cy, cz = cross(wx, wy, wz, tx, ty, tz)
     dx, dy, dz = cross(wx, wy, wz, cx, cy, cz)
     return tx + (factor * dx - 0.5 * cx), ty + (factor * dy - 0.5 * cy), tz + (factor * dz - 0.5 * cz), wx, wy, wz
-
-
-def cross(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Vector:
-    """Give the vector product."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def _polynomial(x: Number, coefficients: tuple[float, ...]) -> Number:

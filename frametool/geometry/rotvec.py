@@ -44,5 +44,6 @@ def check(
         ValueInvalid: not finite, or so long that its square overflows.
     """
     if not all(abs(value) <= LIMIT for value in (rx, ry, rz)):
-        raise ValueInvalid(f"rotation vector {rx:g} {ry:g} {rz:g} is not finite or too long; give numbers below {LIMIT:g}")
+        shown = f"rotation vector {rx:g} {ry:g} {rz:g}"
+        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below {LIMIT:g}")
     return rx, ry, rz
