@@ -13,7 +13,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any, TypeAlias
 
-    Components: TypeAlias = tuple[float, float, float, float, float, float, float]
+    from frametool.geometry.kinds import Rigid as Components
+
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 
 

@@ -12,9 +12,10 @@ from frametool.geometry.transform import Transform
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    Components = tuple[float, float, float, float, float, float, float]
+    from frametool.geometry.kinds import Rigid
 
-IDENTITY: Components = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+MOST_KEPT = 1 << 14  # answers
+IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class FrameTree:
@@ -30,8 +31,9 @@ class FrameTree:
     def __init__(self, name: str = "") -> None:
         """Begin an empty tree; `name` says in error messages where the frames come from."""
         self.name = name
-        self._edges: dict[str, tuple[str, Components]] = {}
+        self._edges: dict[str, tuple[str, Rigid]] = {}
         self._frames: dict[str, None] = {}
+        self._kept: dict[tuple[str, str], Rigid] = {}  # (target, source) -> the answer, until an edge is added
         self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
 
     def add(self, parent: str, child: str, transform: Transform) -> None:
@@ -42,7 +44,7 @@ class FrameTree:
         """
         self.add_components(parent, child, transform.components)
 
-    def add_components(self, parent: str, child: str, components: Components) -> None:
+    def add_components(self, parent: str, child: str, components: Rigid) -> None:
         """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
         known = self._edges.get(child)
         if known is not None:
@@ -56,6 +58,7 @@ class FrameTree:
         self._frames[parent] = None
         self._frames[child] = None
         self._edges[child] = (parent, components)
+        self._kept.clear()
         self._upward[child] = parent
 
     def add_root(self, frame: str) -> None:
@@ -108,17 +111,26 @@ class FrameTree:
         at_ns: any time, or None; frames that stand still answer all alike.
         Raises UnknownFrame (also for a frame against itself), NotConnected.
         """
-        down, up = self._between(target, source)
-        target_from_top = rigid.inverse(*self._product(down)) if down else IDENTITY
-        if not up:
-            return Transform.of(*target_from_top)
-        top_from_source = self._product(reversed(up))
-        return Transform.of(*(rigid.compose(*target_from_top, *top_from_source) if down else top_from_source))
+        found = self._kept.get((target, source))
+        if found is None:
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
+            found = self._kept[target, source] = self._lookup(target, source)
+        return Transform.of(*found)
 
-    def _product(self, children: Iterable[str]) -> Components:
+    def _lookup(self, target: str, source: str) -> Rigid:
+        """Find the way and compose what lies on it."""
+        down, up = self._between(target, source)
+        target_from_top: Rigid = rigid.inverse(*self._product(down)) if down else IDENTITY
+        if not up:
+            return target_from_top
+        top_from_source = self._product(reversed(up))
+        return rigid.compose(*target_from_top, *top_from_source) if down else top_from_source
+
+    def _product(self, children: Iterable[str]) -> Rigid:
         """Compose the edges of the named children, topmost first."""
         edges = self._edges
-        product: Components | None = None
+        product: Rigid | None = None
         for child in children:
             edge = edges[child][1]
             product = edge if product is None else rigid.compose(*product, *edge)
