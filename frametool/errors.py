@@ -107,6 +107,10 @@ class FrametoolWarning(UserWarning):
     """Mark what was read, used and is nevertheless worth a look."""
 
 
+class Tf2Warning(FrametoolWarning):
+    """Mark what tf2 would have logged, in its words."""
+
+
 def warn(message: str) -> None:
     """Tell of something odd that does not stop the work."""
     warnings.warn(message, FrametoolWarning, stacklevel=3)

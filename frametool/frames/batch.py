@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.plan import Piece, Plan
+    from frametool.frames.tree import FrameTree
 
     Stamps = NDArray[np.int64]
     Floats = NDArray[np.float64]
@@ -34,8 +35,7 @@ SHARED = 4  # times a sample
 
 def lookup_many(buffer: TransformBuffer, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
     """Give target_from_source at each of many times; see TransformBuffer.lookup_many."""
-    if missing not in ("raise", "nan"):
-        raise ValueInvalid(f"missing is 'raise' or 'nan', found {missing!r}")
+    _check_missing(missing)
     times = as_stamps(at_ns)
     flat = times.reshape(-1)
     order = None if bool(np.all(flat[1:] >= flat[:-1])) else np.argsort(flat)
@@ -48,6 +48,18 @@ def lookup_many(buffer: TransformBuffer, target: str, source: str, at_ns: Any, *
     if not times.shape:
         return Transform.of(*out[:, 0].tolist())
     return Transform.of(*out.reshape(7, *times.shape))
+
+
+def lookup_still(tree: FrameTree, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
+    """Give the one answer of a standing tree for each of many times."""
+    _check_missing(missing)
+    times = as_stamps(at_ns)
+    return Transform.of(*(np.full(times.shape, value) for value in tree.lookup(target, source).components))
+
+
+def _check_missing(missing: str) -> None:
+    if missing not in ("raise", "nan"):
+        raise ValueInvalid(f"missing is 'raise' or 'nan', found {missing!r}")
 
 
 def as_stamps(at_ns: Any) -> Stamps:
@@ -137,7 +149,7 @@ class Table:
     def __init__(self, track: Track) -> None:
         """Prepare every way; the last sample leads nowhere, and neither does one before a change of parent."""
         self.stamps = np.array(track.stamps, dtype=np.int64)
-        here = np.array(track.samples).T
+        here: Any = np.array(track.samples).T
         following = np.append(np.arange(1, self.stamps.size), self.stamps.size - 1)
         if track.varies:
             parents = np.array(track.parents, dtype=object)
@@ -148,8 +160,9 @@ class Table:
 
     def at(self, times: Stamps) -> Columns:
         """Give the poses at sorted times, none of them outside of the samples."""
-        stamps, (*poses, per_ns) = self._spread(times)
-        return segment.along(*poses, (times - stamps) * per_ns, arrays)
+        stamps, columns = self._spread(times)
+        arguments: tuple[Any, ...] = (*columns[:15], (times - stamps) * columns[15], arrays)
+        return segment.along(*arguments)
 
     def _spread(self, times: Stamps) -> tuple[Stamps, Floats]:
         """Give for each time the newest sample that is not after it: its stamp and its columns.
