@@ -256,6 +256,7 @@ WRONG = {
     ("convert '{xyz: [1,2,x]}'", 2): "argument:1:12: 'x' is not a number",
     ("convert '{rpy_deg: [0,0,1], rotvec: [0,0,1]}'", 2):
         "argument:1:28: two rotations in one entry disagree by 56.2958 degrees; keep one",
+    ("convert {xyz:[1,2,3]}", 2): "argument:1:5: found unexpected ':'; write a blank after the colon",
     ("convert missing.yaml", 5): "missing.yaml: no such file or directory",
     ("lookup . a b", 2):
         "lookup: TREE is . but FRAMETOOL_TREE is not set; name a file; "

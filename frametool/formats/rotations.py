@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 ALIASES = {"rotation": "quaternion", "orientation": "quaternion"}  # as ROS messages name it
 TURN = 2.0 * math.pi
-NOT_FINITE = re.compile(r"[-+]?\.?(nan|inf|infinity)", re.IGNORECASE)
+NOT_FINITE = r"(?i)[-+]?\.?(nan|inf|infinity)"
 
 
 def _rotation_keys() -> dict[str, Notation]:
@@ -69,27 +69,34 @@ def read_components(
     reading: Reading,
 ) -> tuple[list[float], bool]:
     """Read the components of a rotation; returns them with the unit of the angles among them (True: degrees)."""
-    angles = form.representation.angles
     degrees = reading.degrees if form.degrees is None else form.degrees
+    try:
+        numbers = list(map(parse_number, texts))
+    except (ValueInvalid, TypeError):
+        return _read_one_by_one(form, texts, places, degrees=degrees)
+    if form.degrees is None and not degrees and form.representation.angles:
+        _note_degrees(form, numbers, places, reading)
+    return numbers, degrees
+
+
+def _read_one_by_one(
+    form: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool
+) -> tuple[list[float], bool]:
+    """Read components among which an angle says its own unit, or one is no number: then say where."""
+    angles = form.representation.angles
     numbers, units = [], []
     for index, text in enumerate(texts):
         try:
             if type(text) is not str:
                 raise Misfit(f"expected a number, found {kind(text)}")
+            number, unit = parse_angle(text) if index in angles else (parse_number(text), None)
             if index in angles:
-                number, unit = parse_angle(text)
                 units.append(_unit_for(unit, text, form))
-            else:
-                number = parse_number(text)
         except ValueInvalid as error:
-            misfit = NotARotation if type(text) is str and NOT_FINITE.fullmatch(text) else Misfit
+            misfit = NotARotation if type(text) is str and re.fullmatch(NOT_FINITE, text) else Misfit
             raise misfit(str(error), places[index]) from None
         numbers.append(number)
-    if any(units):
-        degrees = _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
-    elif angles and not degrees and form.degrees is None:
-        _note_degrees(form, numbers, places, reading)
-    return numbers, degrees
+    return numbers, _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
 
 
 def _unit_for(unit: str | None, text: str, form: Notation) -> str | None:
