@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 import subprocess
 import sys
 import tracemalloc
@@ -292,6 +294,35 @@ def test_the_mean_is_the_middle_and_heeds_weights() -> None:
 def test_weights_must_be_weights(weights: list[float]) -> None:
     with pytest.raises(ValueInvalid, match="weights"):
         batch((2,)).mean(weights)
+
+
+def test_nothing_has_no_mean() -> None:
+    with pytest.raises(ValueInvalid, match="mean of no rotations"):
+        batch((0,)).mean()
+
+
+def test_huge_and_flat_matrices_are_refused_or_normalised_never_believed() -> None:
+    turned = batch(())
+    huge = 1e200 * turned.as_matrix()
+    flat = turned.as_matrix() @ np.diag([1.0, 1.0, 1e-9])
+    for entries in (huge, flat):
+        for given in (entries, entries[None]):
+            with pytest.raises(ValueInvalid, match="orthonormal"):
+                Rotation.from_matrix(given)
+            assert np.all(Rotation.from_matrix(given, normalize=True).is_close(turned, angle=1e-6))
+
+
+def test_one_axis_takes_many_angles_and_one_direction_many_others() -> None:
+    turns = Rotation.from_axis_angle([0.0, 0.0, 2.0], [0.1, 0.2])
+    assert np.allclose(turns.as_rpy(), [[0.0, 0.0, 0.1], [0.0, 0.0, 0.2]], rtol=0.0, atol=1e-16)
+    ends = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    assert np.allclose(Rotation.between([1.0, 0.0, 0.0], ends).apply([1.0, 0.0, 0.0]), ends, rtol=0.0, atol=1e-15)
+
+
+def test_values_copy_and_pickle() -> None:
+    for value in (Transform.random(seed=1), Transform.random(3, seed=1)):
+        for again in (copy.copy(value), pickle.loads(pickle.dumps(value))):  # noqa: S301 - our own bytes
+            assert np.all(again.is_close(value, angle=0.0, distance=0.0))
 
 
 def test_axes_of_the_field_take_the_forward_direction_where_it_is() -> None:
