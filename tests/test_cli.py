@@ -344,3 +344,11 @@ def test_a_quaternion_nearly_of_norm_1_is_normalised_with_a_warning(run: Run) ->
     outcome = run("convert", "--from", "quaternion", "0", "0", "0.7071", "0.7071")
     assert outcome.status == 0
     assert "has norm 0.99999 and was normalised" in outcome.err
+
+
+def test_what_a_file_holds_nearly_normalised_is_told_with_its_place(run: Run) -> None:
+    text = "frames:\n  - {name: b, parent: a, xyzw: [0, 0, 0.7071, 0.7071]}\n"
+    outcome = run("lookup", "near.yaml", "a", "b", files={"near.yaml": text})
+    assert outcome.status == 0
+    message = "quaternion 0 0 0.7071 0.7071 has norm 0.99999 and was normalised"
+    assert outcome.err == f"frametool: warning: near.yaml:2:5: {message}\n"

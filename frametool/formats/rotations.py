@@ -6,7 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, overheard
 from frametool.formats.numbers import parse_angle, parse_number
 from frametool.formats.values import INDICES, Misfit, NotARotation, Reading, kind, read_texts
 from frametool.geometry import floats
@@ -56,10 +56,16 @@ def rotation_of(form: Notation, texts: Sequence[Any], places: Sequence[Path], re
 
 
 def _checked(form: Notation, numbers: Sequence[float], reading: Reading, *, degrees: bool = False) -> Quaternion:
+    """Give the quaternion of numbers that make a rotation; what is odd about them is noted."""
     try:
-        return form.checked_quaternion(numbers, floats, degrees=degrees, normalize=reading.normalize)
+        rotation, odd = overheard(
+            form.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
+        )
     except ValueInvalid as error:
         raise NotARotation(str(error)) from None
+    for message in odd:
+        reading.note(message)
+    return rotation
 
 
 def read_components(
