@@ -116,7 +116,7 @@ def warn(message: str) -> None:
 
 
 def overheard(call: Callable[..., Result], *arguments: object, **options: object) -> tuple[Result, list[str]]:
-    """Call a function and give its result with what it would have warned of: a reader adds the place and passes it on."""
+    """Call a function; give its result and what it would have warned of, for a reader to add the place."""
     messages: list[str] = []
     _listeners.append(messages)
     try:
