@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, warn
 from frametool.formats.assembly import Assembly, Rules
+from frametool.formats.collector import paused_collector
 from frametool.formats.documents import Source, format_error, locate_many, parse_documents, read_text
 from frametool.formats.trees import read_edges
 from frametool.formats.values import Misfit, Reading
@@ -55,20 +56,21 @@ def load(
     Raises FormatError and BadTopology with file, line and column; FileProblem.
     """
     sources = [Source("stdin" if str(path) == "-" else str(path), read_text(path)) for path in paths]
-    return load_sources(sources, Rules(moving, policy, keep_ns))
+    return load_sources(sources, Rules(moving=moving, policy=policy, keep_ns=keep_ns))
 
 
 def load_sources(sources: Sequence[Source], rules: Rules | None = None) -> FrameTree | TransformBuffer:
     """Merge the frames of several texts; otherwise as `load`."""
     assembly = Assembly(", ".join(source.name for source in sources), rules)
-    for source in sources:
-        for found in edges_of(source):
-            edge = found.edge
-            if edge.parent is None:
-                assembly.add_root(edge.child)
-            else:
-                assembly.add(edge.parent, edge.child, edge.pose.components, edge.stamp_ns, found)
-    return assembly.finish()
+    with paused_collector():
+        for source in sources:
+            for found in edges_of(source):
+                edge = found.edge
+                if edge.parent is None:
+                    assembly.add_root(edge.child)
+                else:
+                    assembly.add(edge.parent, edge.child, edge.pose.components, edge.stamp_ns, found)
+        return assembly.finish()
 
 
 def edges_of(source: Source) -> Iterator[Found]:
@@ -91,6 +93,8 @@ def edges_of(source: Source) -> Iterator[Found]:
 
 def _without_slashes(edge: Edge, reading: Reading) -> Edge:
     """Take one leading `/` off the names, which tf2 has given up, and say so."""
+    if edge.child[0] != "/" and (edge.parent or "")[:1] != "/":
+        return edge
     for name in (edge.child, edge.parent):
         if name is not None and name.startswith("/") and len(name) > 1:
             reading.here = edge.path
