@@ -210,6 +210,12 @@ class TransformBuffer:
         track = self._tracks.get(frame)
         return None if track is None else track.parent_at(at_ns)
 
+    def parent_exactly(self, frame: str, at_ns: int) -> str | None:
+        """Give a frame's parent only if it has data at a time."""
+        track = self._tracks.get(frame)
+        known = track is not None and (track.standing or track.index(at_ns) is not None)
+        return track.parent_at(at_ns) if track is not None and known else None
+
     def lookup(self, target: str, source: str, at_ns: int | None = None) -> Transform:
         """Give target_from_source: the pose of source in target, which maps points in source to points in target.
 
@@ -326,6 +332,8 @@ class TransformBuffer:
             return edges_between(target, source, lambda frame: self.parent(frame, at_ns))
         except NotConnected as error:
             raise self._unconnected(error, target, source, at_ns) from None
+        except BadTopology as error:
+            return self.policy.looped(self, error, target, source, at_ns)
 
     def _require(self, frame: str, role: str) -> None:
         if frame not in self._frames or self.policy.is_bad_name(frame):
@@ -333,11 +341,19 @@ class TransformBuffer:
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
         """Tell two trees from one whose changing parent is not known at a time."""
-        ends = [to_root(frame, lambda each: self.parent(each, at_ns))[-1] for frame in (target, source)]
-        if at_ns is None or not any(end in self._tracks for end in ends):
-            return self.policy.unconnected(error, target, source)
-        broken = [self._tracks[end] for end in ends if end in self._tracks]
-        return self.policy.missing(self, target, source, at_ns, broken)
+        if at_ns is not None and self._varies:
+            try:
+                down, up = edges_between(target, source, lambda frame: self._parent_near(frame, at_ns))
+            except NotConnected:
+                pass
+            else:
+                way = [self._tracks[child] for child in (*reversed(down), *reversed(up))]
+                return self.policy.missing(self, target, source, at_ns, way)
+        return self.policy.unconnected(error, target, source)
+
+    def _parent_near(self, frame: str, at_ns: int) -> str | None:
+        track = self._tracks.get(frame)
+        return None if track is None else track.parent_near(at_ns)
 
     def __repr__(self) -> str:
         """Say how many frames and samples."""
