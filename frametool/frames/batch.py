@@ -83,10 +83,13 @@ def _put_back(out: Floats, order: NDArray[np.intp]) -> Floats:
 
 def _fill_sorted(out: Floats, buffer: TransformBuffer, target: str, source: str, times: Stamps) -> None:
     """Compute sorted times, in stretches on which no parent changes."""
+    buffer.require(target, source)
+    if times.size:
+        _plan_at(buffer, target, source, int(times[0]))  # finds out whether newest parents form a circle
     edges = buffer.changes()
     cuts = [0, *np.searchsorted(times, edges).tolist(), times.size]
-    if not times.size or not edges:
-        buffer.plan(target, source, None)  # raises for frames that are not there or not connected
+    if not edges:
+        buffer.plan(target, source, None)  # raises for frames that are not connected
     for begin, end in itertools.pairwise(cuts):
         if begin < end:
             _fill(out[:, begin:end], _plan_at(buffer, target, source, int(times[begin])), times[begin:end])
