@@ -13,7 +13,7 @@ import numpy as np
 from frametool.errors import NoDataAt, NotConnected, ValueInvalid
 from frametool.frames.plan import IDENTITY
 from frametool.frames.track import Track
-from frametool.geometry import arrays, rigid, segment
+from frametool.geometry import arrays, quaternion, rigid, segment
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -116,7 +116,8 @@ def _fill(out: Floats, plan: Plan | None, times: Stamps) -> None:
     inside = out[:, begin:end]
     for start, stop in arrays.blocks(max(end - begin, 0)):
         part = times[begin + start : begin + stop]
-        for row, column in zip(inside, _joined(plan, part), strict=True):
+        tx, ty, tz, *rotation = _joined(plan, part)
+        for row, column in zip(inside, (tx, ty, tz, *quaternion.unit(*rotation, arrays)), strict=True):
             row[start:stop] = column
 
 
