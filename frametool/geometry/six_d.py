@@ -24,7 +24,6 @@ def to_quaternion(
     The second is cleared of the first twice: once leaves a residue where they are nearly parallel (Giraud 2005).
     """
     ax, ay, az = unit_vector(ax, ay, az, xp)
-    bx, by, bz = unit_vector(bx, by, bz, xp)
     along = ax * bx + ay * by + az * bz
     bx, by, bz = unit_vector(bx - along * ax, by - along * ay, bz - along * az, xp)
     rest = ax * bx + ay * by + az * bz
