@@ -116,8 +116,8 @@ def _fill(out: Floats, plan: Plan | None, times: Stamps) -> None:
     inside = out[:, begin:end]
     for start, stop in arrays.blocks(max(end - begin, 0)):
         part = times[begin + start : begin + stop]
-        tx, ty, tz, *rotation = _joined(plan, part)
-        for row, column in zip(inside, (tx, ty, tz, *quaternion.unit(*rotation, arrays)), strict=True):
+        tx, ty, tz, x, y, z, w = _joined(plan, part)
+        for row, column in zip(inside, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)), strict=True):
             row[start:stop] = column
 
 

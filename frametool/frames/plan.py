@@ -39,8 +39,8 @@ class Plan:
         top_from_source = _product_at(self.to_source, at_ns)
         if top_from_target is None or top_from_source is None:
             return None
-        tx, ty, tz, *rotation = _joined(top_from_target, top_from_source)
-        return tx, ty, tz, *quaternion.unit(*rotation, floats)
+        tx, ty, tz, x, y, z, w = _joined(top_from_target, top_from_source)
+        return tx, ty, tz, *quaternion.unit(x, y, z, w, floats)
 
     def latest(self, *, zero_counts: bool = True) -> int | None:
         """Give the newest stamp that every moving edge has reached; None when all stand still.
