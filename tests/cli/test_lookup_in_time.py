@@ -5,9 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from frametool.formats.as_received import ODD
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -160,6 +163,32 @@ def test_tf2s_words_and_rules_are_there_for_those_who_compare(ask: Run) -> None:
         "frametool: Lookup would require extrapolation 1.000000000s into the future.  Requested time 3.000000000 but the "
         "latest data is at time 2.000000000, when looking up transform from frame [base] to frame [map]\n"
     )
+
+
+def as_message(call: dict[str, Any]) -> str:
+    """Write a golden call as rostopic echo prints it."""
+    position, rotation = (
+        ", ".join(f"{name}: {value if value in ODD else float(value)!r}" for name, value in zip("xyzw", values, strict=False))
+        for values in (call["t"], call["q"])
+    )
+    seconds, nanoseconds = divmod(call["stamp_ns"], 10**9)
+    return (
+        f"header: \n  stamp: \n    secs: {seconds}\n    nsecs: {nanoseconds}\n  frame_id: {json.dumps(call['parent'])}\n"
+        f"child_frame_id: {json.dumps(call['child'])}\n"
+        f"transform: \n  translation: {{{position}}}\n  rotation: {{{rotation}}}\n---\n"
+    )
+
+
+def test_what_tf2_refuses_in_a_recording_is_told_in_its_words_and_the_run_goes_on(run: Run) -> None:
+    """Numbers and texts: tf2 0.7.6 BufferCore, tests/golden/set_transform_rules.json."""
+    golden = json.loads((Path(__file__).parents[1] / "golden" / "set_transform_rules.json").read_text())
+    # a message does not say whether it was latched: what needs that is left out
+    calls = [call for call in golden["calls"] if not call["static"] and call["child"] != "s"]
+    logged = "".join(call["stderr"] for call in calls).replace('"auth"', '"default_authority"')
+    expected = [line for line in logged.splitlines() if not line.startswith("         at line")]
+    outcome = run("tree", "-", "--tf2", "ros1", "-f", "json", stdin="".join(map(as_message, calls)))
+    assert outcome.status == 0
+    assert outcome.err.replace("authority default_authority", "authority auth").splitlines() == expected
 
 
 def test_a_cache_forgets_what_is_older(ask: Run) -> None:
