@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import math
 from struct import Struct
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid
+
+if TYPE_CHECKING:
+    from typing import Self
 
 TICK_NS = 16_000_000
 DT = 0.016  # seconds; the node takes this constant, not the time that passed
@@ -40,7 +43,7 @@ class Twist(_Components):
 
     __slots__ = ()
 
-    def __new__(cls, linear_x: float, angular_z: float, linear_y: float = 0.0) -> Twist:
+    def __new__(cls, linear_x: float, angular_z: float, linear_y: float = 0.0) -> Self:
         """Check that every component is finite."""
         if not (math.isfinite(linear_x) and math.isfinite(angular_z) and math.isfinite(linear_y)):
             raise ValueInvalid(f"a velocity must be finite, found linear {linear_x} {linear_y}, angular {angular_z}")
@@ -105,8 +108,9 @@ class Turtle:
     """
 
     def __init__(
-        self, x: float = CENTRE, y: float = CENTRE, theta: float = 0.0, *, name: str = "turtle1", holonomic: bool = True,
-    ) -> None:
+        self, x: float = CENTRE, y: float = CENTRE, theta: float = 0.0, *,
+        name: str = "turtle1", holonomic: bool = True,
+    ) -> None:  # fmt: skip
         """Put a turtle into the world; x, y, theta are float32, as in the spawn service."""
         self.name = name
         self.holonomic = holonomic

@@ -49,7 +49,9 @@ class Writer:
     leaders: the commands of leaders too, not only of followers.
     """
 
-    def __init__(self, emit: str, form: str, number: Callable[[float], str] | None = None, *, leaders: bool = False) -> None:
+    def __init__(
+        self, emit: str, form: str, number: Callable[[float], str] | None = None, *, leaders: bool = False,
+    ) -> None:  # fmt: skip
         """Settle what is written and how."""
         self._kind = KINDS["all commands" if leaders and emit == "commands" else emit]
         self._form = form
@@ -79,8 +81,8 @@ class Writer:
 
     def _csv(self, record: Any) -> str:
         number = self._number or repr
-        cells = self._kind.cells(record).values()
-        return ",".join("" if cell is None else number(cell) if isinstance(cell, float) else str(cell) for cell in cells) + "\n"
+        cells = ["" if cell is None else cell for cell in self._kind.cells(record).values()]
+        return ",".join(number(cell) if isinstance(cell, float) else str(cell) for cell in cells) + "\n"
 
     def _text(self, record: Any) -> str:
         return _aligned([self._short(key, cell) for key, cell in self._kind.cells(record).items()])
