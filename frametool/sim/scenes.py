@@ -1,11 +1,11 @@
 """Scenes of turtles in YAML or JSON: who is where, who drives whom, what happens when.
 
-    duration: 20                                                  # seconds, or inf; also turtlesim: ros2, seed: 1
-    turtles:
-      turtle1: {leader: square}                                   # still, circle, square, figure8, random, or a file
-      turtle2: {spawn: [4, 2, 0], follow: turtle1, law: ros1}     # metres, radians (or 90deg)
-    events:
-      - {t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 0}}
+duration: 20                                                  # seconds, or inf; also turtlesim: ros2, seed: 1
+turtles:
+turtle1: {leader: square}                                   # still, circle, square, figure8, random, or a file
+turtle2: {spawn: [4, 2, 0], follow: turtle1, law: ros1}     # metres, radians (or 90deg)
+events:
+- {t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 0}}
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from frametool.errors import ValueInvalid, did_you_mean
 from frametool.formats.documents import format_error, parse_documents
 from frametool.formats.numbers import parse_angle, parse_number
 from frametool.formats.source import Source, read_text
-from frametool.sim.twists import read_entries, read_script
 from frametool.formats.values import Misfit, as_mapping, kind, within
 from frametool.frames.stamps import parse_stamp
 from frametool.sim.controllers import LAWS, FollowController
 from frametool.sim.leaders import LEADERS, built_in, scripted
 from frametool.sim.scene import TARGETS, Actor, Call, Follow, Scene
 from frametool.sim.turtle import CENTRE
+from frametool.sim.twists import read_entries, read_script
 from frametool.sim.world import SERVICES, VARIANTS, complete
 
 if TYPE_CHECKING:
