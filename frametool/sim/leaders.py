@@ -6,7 +6,7 @@ A leader acts at `due_ns`, is shown its turtle's pose, gives a command or None, 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
@@ -24,12 +24,29 @@ CIRCLING = Twist(2.0, 1.8)  # the command of the turtlesim tutorial
 KEYS = {"up": Twist(2.0, 0.0), "down": Twist(-2.0, 0.0), "left": Twist(0.0, 2.0), "right": Twist(0.0, -2.0)}
 
 
+class Curtain(Exception):  # noqa: N818 - it ends the play, it is no error
+    """Raised by a leader to end the play."""
+
+
+class Heading(NamedTuple):
+    """A command to turn to a heading (radians), as the ROS 2 teleop sends to rotate_absolute; None gives that up."""
+
+    theta: float | None
+
+
+# the keys around F of the ROS 2 teleop
+HEADINGS = {
+    **{key: Heading(math.radians(45.0 * count)) for count, key in enumerate("gtredcvb")},
+    "f": Heading(None),
+}  # fmt: skip
+
+
 class Leader(Protocol):
     """Whatever drives a turtle without following another."""
 
     due_ns: int | None
 
-    def command(self, pose: TurtlePose) -> Twist | None:
+    def command(self, pose: TurtlePose) -> Twist | Heading | None:
         """Give the command that is due, if any, and settle when the next one is."""
 
 
@@ -58,6 +75,54 @@ class Script:
         if due_ns is not None and self.due_ns is not None and due_ns < self.due_ns:
             raise ValueInvalid(f"a command at {due_ns} ns comes after one at {self.due_ns} ns; sort them by time")
         self.due_ns = due_ns
+
+
+class Mailbox:
+    """A leader for commands that come in while the turtles already walk; looked into at every tick, the last one wins.
+
+    What fails while it is filled is raised where the next command is asked for.
+    """
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self.due_ns: int | None = 0
+        self._posted: list[tuple[int, Twist | Heading]] = []
+        self._failure: BaseException | None = None
+
+    def post(self, command: Twist | Heading, t_ns: int = 0) -> None:
+        """Put a command in; it acts now, or at a later time."""
+        self._posted.append((t_ns, command))
+
+    def close(self) -> None:
+        """End the play."""
+        self._failure = Curtain()
+
+    def fill_from(self, commands: Iterable[TimedTwist]) -> None:
+        """Post commands from a thread of their own, as they come."""
+        from threading import Thread
+
+        Thread(target=self._fill, args=(commands,), daemon=True).start()
+
+    def _fill(self, commands: Iterable[TimedTwist]) -> None:
+        try:
+            for t_ns, twist in commands:
+                self.post(twist, t_ns)
+        except Exception as error:  # noqa: BLE001 - raised again where it is seen
+            self._failure = error
+
+    def command(self, pose: TurtlePose) -> Twist | Heading | None:  # noqa: ARG002 - whoever posts does the looking
+        """Give the newest command whose time has come.
+
+        Raises Curtain when it was closed.
+        """
+        now_ns = self.due_ns or 0
+        self.due_ns = now_ns + TICK_NS
+        newest = None
+        while self._posted and self._posted[0][0] <= now_ns:
+            newest = self._posted.pop(0)[1]
+        if newest is None and self._failure is not None:
+            raise self._failure
+        return newest
 
 
 class Periodic:

@@ -1,11 +1,11 @@
 """Scenes of turtles in YAML or JSON: who is where, who drives whom, what happens when.
 
-duration: 20                                                  # seconds, or inf; also turtlesim: ros2, seed: 1
-turtles:
-turtle1: {leader: square}                                   # still, circle, square, figure8, random, or a file
-turtle2: {spawn: [4, 2, 0], follow: turtle1, law: ros1}     # metres, radians (or 90deg)
-events:
-- {t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 0}}
+    duration: 20                                                  # seconds, or inf; also turtlesim: ros2, seed: 1
+    turtles: {turtle1: {leader: square},                          # still, circle, square, figure8, random, or a file
+              turtle2: {spawn: [4, 2, 0], follow: turtle1}}       # metres, radians (or 90deg); law: ros1, gains, ..
+    events: [{t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 0}}]
+
+Leader files are looked for beside the scene.
 """
 
 from __future__ import annotations
@@ -42,16 +42,17 @@ DURATION_S = "20"
 RADIANS = 3.141592653589793 / 180.0
 
 
-def read_scene(source: Source) -> Scene:
+def read_scene(source: Source, *, seed: int | None = None) -> Scene:
     """Read the one scene of a text; files that it names are looked for beside it.
 
+    seed: instead of the scene's own.
     Raises FormatError with file, line and column.
     """
     documents = parse_documents(source.text, source.name)
     if len(documents) != 1:
         raise format_error(source, (0,), f"expected one scene, found {len(documents)} documents")
     try:
-        return _Reader(source, documents[0].index).scene(documents[0].value)
+        return _Reader(source, seed).scene(documents[0].value)
     except Misfit as misfit:
         raise format_error(source, (documents[0].index, *misfit.path), str(misfit), key=misfit.key) from None
 
@@ -59,10 +60,9 @@ def read_scene(source: Source) -> Scene:
 class _Reader:
     """What holds while one scene is read: its source, its seed."""
 
-    def __init__(self, source: Source, document: int) -> None:
+    def __init__(self, source: Source, seed: int | None) -> None:
         self.source = source
-        self.document = document
-        self.seed = 0
+        self.seed = seed
         self.names: list[str] = []  # of all turtles that are or will be there
         self.nameless = False  # whether turtles come that the world will name
 
@@ -71,7 +71,8 @@ class _Reader:
         scene = _known(value, SCENE_KEYS, "a scene {turtles: .., events: .., duration: ..}")
         if "turtles" not in scene:
             raise Misfit(f"no turtles; expected {', '.join(SCENE_KEYS)}")
-        self.seed = int(_field(scene, "seed", _whole, "0"))
+        own = int(_field(scene, "seed", _whole, "0"))
+        self.seed = own if self.seed is None else self.seed
         variant = _field(scene, "turtlesim", _one_of(VARIANTS), "ros1")
         calls = within(("events",), self._calls, scene.get("events") or [])
         spawned = [str(call.arguments.get("name", "")) for call in calls if call.service == "spawn"]
@@ -128,7 +129,7 @@ class _Reader:
         if type(value) is not str:
             raise Misfit(f"expected a leader's name, a file or a list of commands, found {kind(value)}")
         if value in LEADERS:
-            return built_in(value, self.seed)
+            return built_in(value, self.seed or 0)
         path = os.path.join(os.path.dirname(self.source.name), value)  # noqa: PTH118, PTH120 - pathlib costs 6 ms
         if not os.path.exists(path):  # noqa: PTH110
             near = did_you_mean(value, LEADERS)

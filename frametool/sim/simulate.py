@@ -14,6 +14,7 @@ from frametool.errors import LookupFailed, UnknownFrame, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
 from frametool.geometry.transform import Transform
+from frametool.sim.leaders import Curtain, Heading
 from frametool.sim.scene import Follow
 from frametool.sim.turtle import TICK_NS, State, TurtlePose
 from frametool.sim.world import ServiceRefused, World
@@ -56,11 +57,12 @@ class Broadcast(NamedTuple):
 class Step:
     """One instant at which something happened; what did not is empty."""
 
-    __slots__ = ("broadcasts", "clears", "commands", "led", "log", "pens", "poses", "states", "t_ns", "walls")
+    __slots__ = ("broadcasts", "clears", "commands", "is_tick", "led", "log", "pens", "poses", "states", "t_ns", "walls")
 
     def __init__(self, t_ns: int) -> None:
         """Begin an instant."""
         self.t_ns = t_ns
+        self.is_tick = False
         self.poses: dict[str, TurtlePose] = {}  # of every turtle, if this is a tick; at time 0 where they were spawned
         self.states: dict[str, State] = {}  # the same before rounding
         self.pens: dict[str, Pen] = {}
@@ -109,6 +111,7 @@ class Ticker:
         """Move the world on by one tick."""
         world = stage.world
         self._serve(stage, step)
+        step.is_tick = True
         if now_ns:
             step.walls = world.tick(now_ns)
         step.clears = world.clears
@@ -179,7 +182,9 @@ class Drive:
         if turtle is not None:
             self._pose = turtle.pose
         twist = self.leader.command(self._pose)
-        if turtle is not None and twist is not None:
+        if turtle is not None and isinstance(twist, Heading):
+            turtle.rotate_absolute(twist.theta)
+        elif turtle is not None and twist is not None:
             turtle.command(twist)
             step.led.append(Command(now_ns, self.turtle, twist, None, None, turtle.state))
         return self.leader.due_ns
@@ -254,7 +259,10 @@ def simulate(scene: Scene) -> Iterator[Step]:
         step = Step(queue[0][0])
         while queue and queue[0][0] == step.t_ns:
             _, rank, order, part = queue[0]
-            due_ns = part.act(step.t_ns, stage, step)
+            try:
+                due_ns = part.act(step.t_ns, stage, step)
+            except Curtain:
+                return
             if due_ns is None:
                 heappop(queue)
             else:

@@ -145,9 +145,11 @@ class Turtle:
         """Turn, then jump ahead, at the next tick."""
         self._teleports.append((True, single(linear), 0.0, single(angular)))
 
-    def rotate_absolute(self, theta: float) -> None:
-        """Turn to a heading at 1 rad/s (ROS 2); a velocity command aborts it."""
-        self._heading = single(theta)
+    def rotate_absolute(self, theta: float | None) -> None:
+        """Turn to a heading at 1 rad/s (ROS 2); a velocity command aborts it, None gives it up."""
+        if theta is None and self._heading is not None:
+            self._velocity = Twist(0.0, 0.0)
+        self._heading = None if theta is None else single(theta)
 
     def update(self, now_ns: int) -> State | None:
         """Live through one tick.

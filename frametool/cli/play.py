@@ -1,0 +1,202 @@
+"""A scene on its way to the user: steps out of the simulation, to stdout, stderr, a drawing, a plot."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import TEXT, Number
+from frametool.errors import FileProblem
+from frametool.frames.stamps import BILLION
+from frametool.sim.progress import Progress
+from frametool.sim.records import EMITS, FORMS, Writer
+from frametool.sim.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import TextIO
+
+    from frametool.sim.scene import Scene
+    from frametool.sim.simulate import Step
+    from frametool.view.drawing import Drawing
+
+    Watch = Callable[[Step], None]
+
+PLOTS = (".svg", ".html", ".png")
+
+
+def play_options(function: Any) -> Any:
+    """Give a command the options that say what is shown of a simulation."""
+    options = [
+        click.option("--emit", type=click.Choice(EMITS), default="commands", show_default=True,
+                     help="followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`"),
+        click.option("-f", "--format", "format_name", type=click.Choice(FORMS),
+                     help="form of the records  [default: text on a terminal, yaml otherwise]"),
+        click.option("--precision", type=click.IntRange(0, 30), metavar="N",
+                     help="digits after the point  [default: the shortest text that reads back to the same bits]"),
+        click.option("-o", "--output", type=TEXT, metavar="FILE", help="write there instead of stdout, whole or not at all"),
+        click.option("--reach", type=Number(), default=0.5, show_default=True, metavar="D",
+                     help="metres that count as having come to the target"),
+        click.option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
+        click.option("--live", is_flag=True, help="draw the turtles in the terminal, in real time"),
+        click.option("--plot", type=TEXT, metavar="FILE", help="draw the run into a .svg, .html or .png"),
+        click.option("--force", is_flag=True, help="let --output and --plot replace existing files"),
+    ]  # fmt: skip
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+class Show:
+    """What is shown of a simulation, and where: what the options of a command say."""
+
+    def __init__(
+        self, *, emit: str = "commands", format_name: str | None = None, precision: int | None = None,
+        output: str | None = None, reach: float = 0.5, realtime: bool = False, live: bool = False,
+        plot: str | None = None, force: bool = False, leaders: bool = False,
+    ) -> None:  # fmt: skip
+        """Check what can be checked before anything runs.
+
+        Raises click.UsageError, FileProblem.
+        """
+        form = format_name or ("text" if output is None and sys.stdout.isatty() else "yaml")
+        number = None if precision is None else f"{{:.{precision}f}}".format
+        self.writer = Writer(emit, form, number, leaders=leaders)
+        self.output = None if output == "-" else output
+        self.reach = reach
+        self.realtime = realtime or live
+        self.live = live
+        self.plot = plot
+        self.force = force
+        self._check()
+
+    def _check(self) -> None:
+        if self.reach < 0.0:
+            raise click.UsageError(f"--reach must be 0 or more, found {self.reach:g}")
+        if self.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
+            raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
+        if self.plot and os.path.splitext(self.plot)[1].lower() not in PLOTS:  # noqa: PTH122 - pathlib costs 6 ms
+            raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {self.plot!r}")
+        for path in (self.plot, self.output):
+            if path and not self.force and os.path.lexists(path):
+                raise FileProblem(f"{path}: exists; give --force to replace it")
+        if self.plot and self.plot.lower().endswith(".png"):
+            from frametool.view.plot_png import require_matplotlib
+
+            require_matplotlib()
+
+    def play(self, scene: Scene) -> None:
+        """Run a scene to its end and sum it up on stderr.
+
+        Raises KeyboardInterrupt after the summary when it was interrupted.
+        """
+        progress = Progress(scene, self.reach)
+        drawing = self._drawing(scene)
+        interrupted = False
+        with ExitStack() as stack:
+            watchers = [progress.watch, *self._watchers(scene, stack), *([drawing.watch] if drawing else [])]
+            try:
+                for step in simulate(scene):
+                    for watch in watchers:
+                        watch(step)
+            except KeyboardInterrupt:
+                interrupted = True
+        sys.stdout.flush()
+        for line in progress.lines():
+            tell(line)
+        if drawing:
+            drawing.save(str(self.plot), force=self.force)
+        if interrupted:
+            raise KeyboardInterrupt
+
+    def _drawing(self, scene: Scene) -> Drawing | None:
+        """Give what remembers the run for the plot, if there is to be one."""
+        if not self.plot:
+            return None
+        from frametool.view.drawing import Drawing
+
+        return Drawing(scene)
+
+    def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
+        """Open what the steps go to; the stack closes it."""
+        if self.realtime:
+            yield Pace().wait
+        if self.live:
+            from frametool.view.live import Screen
+
+            yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
+        else:
+            yield Log().watch
+        if self.output is not None:
+            yield partial(self._write, stack.enter_context(whole_file(self.output)))
+        elif not (self.live and sys.stdout.isatty()):
+            yield partial(self._write, sys.stdout)
+
+    def _write(self, stream: TextIO, step: Step) -> None:
+        """Write a step's records, each at once, so that a reader at the other end of a pipe sees it."""
+        for text in self.writer.write(step):
+            stream.write(text)
+            stream.flush()
+
+
+class Pace:
+    """Keep simulated time from running ahead of the clock."""
+
+    def __init__(self) -> None:
+        """Start the clock."""
+        from time import monotonic, sleep
+
+        self._sleep, self._clock = sleep, monotonic
+        self._start = monotonic()
+
+    def wait(self, step: Step) -> None:
+        """Wait until a step is due."""
+        ahead = step.t_ns / BILLION - (self._clock() - self._start)
+        if ahead > 0.0:
+            self._sleep(ahead)
+
+
+class Log:
+    """Tell on stderr what turtlesim and the followers log; a wall once for each contact, the summary counts the ticks."""
+
+    def __init__(self) -> None:
+        """Begin with no turtle at a wall."""
+        self._at_wall: frozenset[str] = frozenset()
+
+    def watch(self, step: Step) -> None:
+        """Tell of one step."""
+        for line in step.log:
+            tell(f"{step.t_ns / BILLION:.3f} s: {line}")
+        for hit in step.walls:
+            if hit.turtle not in self._at_wall:
+                tell(f"{step.t_ns / BILLION:.3f} s: {hit}")
+        if step.is_tick:
+            self._at_wall = frozenset(hit.turtle for hit in step.walls)
+
+
+def tell(line: str) -> None:
+    """Say something on stderr."""
+    print(f"frametool: {line}", file=sys.stderr)  # noqa: T201 - this is the talk beside the data
+
+
+@contextmanager
+def whole_file(path: str) -> Iterator[TextIO]:
+    """Give a stream into a temporary file that takes its place when all went well, and vanishes otherwise.
+
+    Raises FileProblem.
+    """
+    temporary = f"{path}.{os.getpid()}.part"
+    try:
+        with open(temporary, "x", encoding="utf-8", newline="") as stream:  # noqa: PTH123 - pathlib costs 6 ms
+            yield stream
+        os.replace(temporary, path)  # noqa: PTH105
+    except OSError as error:
+        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+    finally:
+        if os.path.lexists(temporary):
+            os.unlink(temporary)  # noqa: PTH108
