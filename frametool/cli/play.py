@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from codecs import getwriter
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,8 +20,9 @@ from frametool.sim.records import EMITS, FORMS, Writer
 from frametool.sim.simulate import simulate
 
 if TYPE_CHECKING:
+    from codecs import StreamWriter
     from collections.abc import Callable, Iterator
-    from typing import TextIO
+    from typing import BinaryIO, TextIO
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import Step
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
 
     Watch = Callable[[Step], None]
 
-PLOTS = (".svg", ".html", ".png")
+PLOTS = {".svg": "frametool.view.plot_svg", ".html": "frametool.view.plot_html", ".png": "frametool.view.plot_png"}
 
 
 def play_options(function: Any) -> Any:
@@ -39,7 +42,8 @@ def play_options(function: Any) -> Any:
                      help="form of the records  [default: text on a terminal, yaml otherwise]"),
         click.option("--precision", type=click.IntRange(0, 30), metavar="N",
                      help="digits after the point  [default: the shortest text that reads back to the same bits]"),
-        click.option("-o", "--output", type=TEXT, metavar="FILE", help="write there instead of stdout, whole or not at all"),
+        click.option("-o", "--output", type=TEXT, metavar="FILE",
+                     help="write there instead of stdout, whole or not at all"),
         click.option("--reach", type=Number(), default=0.5, show_default=True, metavar="D",
                      help="metres that count as having come to the target"),
         click.option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
@@ -65,8 +69,7 @@ class Show:
         Raises click.UsageError, FileProblem.
         """
         form = format_name or ("text" if output is None and sys.stdout.isatty() else "yaml")
-        number = None if precision is None else f"{{:.{precision}f}}".format
-        self.writer = Writer(emit, form, number, leaders=leaders)
+        self.writer = Writer(emit, form, number_writer(precision), leaders=leaders)
         self.output = None if output == "-" else output
         self.reach = reach
         self.realtime = realtime or live
@@ -80,15 +83,7 @@ class Show:
             raise click.UsageError(f"--reach must be 0 or more, found {self.reach:g}")
         if self.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
             raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        if self.plot and os.path.splitext(self.plot)[1].lower() not in PLOTS:  # noqa: PTH122 - pathlib costs 6 ms
-            raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {self.plot!r}")
-        for path in (self.plot, self.output):
-            if path and not self.force and os.path.lexists(path):
-                raise FileProblem(f"{path}: exists; give --force to replace it")
-        if self.plot and self.plot.lower().endswith(".png"):
-            from frametool.view.plot_png import require_matplotlib
-
-            require_matplotlib()
+        check_files(self.plot, self.output, force=self.force)
 
     def play(self, scene: Scene) -> None:
         """Run a scene to its end and sum it up on stderr.
@@ -110,7 +105,7 @@ class Show:
         for line in progress.lines():
             tell(line)
         if drawing:
-            drawing.save(str(self.plot), force=self.force)
+            self._save(drawing)
         if interrupted:
             raise KeyboardInterrupt
 
@@ -133,11 +128,16 @@ class Show:
         else:
             yield Log().watch
         if self.output is not None:
-            yield partial(self._write, stack.enter_context(whole_file(self.output)))
+            yield partial(self._write, getwriter("utf-8")(stack.enter_context(whole_file(self.output))))
         elif not (self.live and sys.stdout.isatty()):
             yield partial(self._write, sys.stdout)
 
-    def _write(self, stream: TextIO, step: Step) -> None:
+    def _save(self, drawing: Drawing) -> None:
+        """Write the plot in the form that its suffix names."""
+        path = str(self.plot)
+        write_file(path, import_module(PLOTS[suffix_of(path)]).plot(drawing))
+
+    def _write(self, stream: TextIO | StreamWriter, step: Step) -> None:
         """Write a step's records, each at once, so that a reader at the other end of a pipe sees it."""
         for text in self.writer.write(step):
             stream.write(text)
@@ -162,7 +162,7 @@ class Pace:
 
 
 class Log:
-    """Tell on stderr what turtlesim and the followers log; a wall once for each contact, the summary counts the ticks."""
+    """Tell on stderr what turtlesim and the followers log; of a wall once for each contact."""
 
     def __init__(self) -> None:
         """Begin with no turtle at a wall."""
@@ -179,20 +179,52 @@ class Log:
             self._at_wall = frozenset(hit.turtle for hit in step.walls)
 
 
+def number_writer(precision: int | None) -> Callable[[float], str] | None:
+    """Give what writes numbers with so many decimals; None for the form's own way."""
+    return None if precision is None else f"{{:.{precision}f}}".format
+
+
+def suffix_of(path: str) -> str:
+    """Give a file's suffix in small letters."""
+    return os.path.splitext(path)[1].lower()  # noqa: PTH122 - pathlib costs 6 ms at start-up
+
+
+def check_files(plot: str | None, output: str | None, *, force: bool) -> None:
+    """Refuse before any work what could not be written after it.
+
+    Raises click.UsageError, FileProblem, ValueInvalid when matplotlib is missing.
+    """
+    if plot and suffix_of(plot) not in PLOTS:
+        raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {plot!r}")
+    for path in filter(None, (plot, output)):
+        if path != "-" and not force and os.path.lexists(path):
+            raise FileProblem(f"{path}: exists; give --force to replace it")
+    if plot and suffix_of(plot) == ".png":
+        from frametool.view.plot_png import require_matplotlib
+
+        require_matplotlib()
+
+
+def write_file(path: str, content: str | bytes) -> None:
+    """Write a file whole or not at all."""
+    with whole_file(path) as stream:
+        stream.write(content.encode() if isinstance(content, str) else content)
+
+
 def tell(line: str) -> None:
     """Say something on stderr."""
     print(f"frametool: {line}", file=sys.stderr)  # noqa: T201 - this is the talk beside the data
 
 
 @contextmanager
-def whole_file(path: str) -> Iterator[TextIO]:
-    """Give a stream into a temporary file that takes its place when all went well, and vanishes otherwise.
+def whole_file(path: str) -> Iterator[BinaryIO]:
+    """Give a stream of bytes into a temporary file that takes its place when all went well, and vanishes otherwise.
 
     Raises FileProblem.
     """
     temporary = f"{path}.{os.getpid()}.part"
     try:
-        with open(temporary, "x", encoding="utf-8", newline="") as stream:  # noqa: PTH123 - pathlib costs 6 ms
+        with open(temporary, "xb") as stream:  # noqa: PTH123 - pathlib costs 6 ms at start-up
             yield stream
         os.replace(temporary, path)  # noqa: PTH105
     except OSError as error:

@@ -6,6 +6,12 @@ import click
 
 from frametool.cli import Group
 
+SUBCOMMANDS = {
+    "follow": ("frametool.cli.sim_follow", "a leader, and one or more turtles that follow"),
+    "run": ("frametool.cli.sim_run", "a whole scene from one file"),
+    "teleop": ("frametool.cli.sim_teleop", "drive turtle1 with the arrow keys, drawn in the terminal"),
+    "sweep": ("frametool.cli.sim_sweep", "how soon a follower is there, for many gains at once"),
+}
 HELP = """Replay turtlesim and the turtle-follow tutorial, without ROS and without a screen.
 
 \b
@@ -20,12 +26,7 @@ of transforms, as `lookup` does. A summary goes to stderr.
 class SimGroup(Group):
     """The subcommands of the turtles."""
 
-    table = {
-        "follow": ("frametool.cli.sim_follow", "a leader, and one or more turtles that follow"),
-        "run": ("frametool.cli.sim_run", "a whole scene from one file"),
-        "teleop": ("frametool.cli.sim_teleop", "drive turtle1 with the arrow keys, drawn in the terminal"),
-        "sweep": ("frametool.cli.sim_sweep", "how soon a follower is there, for many gains at once"),
-    }
+    table = SUBCOMMANDS
 
 
 @click.command(cls=SimGroup, name="sim", help=HELP, no_args_is_help=True)

@@ -19,7 +19,7 @@ from frametool.sim.world import VARIANTS
 
 if TYPE_CHECKING:
     from frametool.sim.leaders import MakeLeader
-    from frametool.sim.scene import Place, Scene
+    from frametool.sim.scene import Scene
 
 NUMBER = Number()
 
@@ -29,7 +29,7 @@ class Spawn(Text):
 
     name = "x,y,theta"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Place:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read metres and radians; the angle may carry a unit."""
         cells = [cell.strip() for cell in str(super().convert(value, param, ctx)).split(",")]
         if len(cells) not in (2, 3):
@@ -46,7 +46,7 @@ class Duration(Number):
 
     name = "seconds"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read it."""
         if value == "inf":
             return math.inf

@@ -66,7 +66,7 @@ def keyboard(mailbox: Mailbox, *, headings: bool) -> Iterator[None]:
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
 
-def _listen(mailbox: Mailbox, headings: bool) -> None:  # noqa: FBT001 - a thread's target
+def _listen(mailbox: Mailbox, headings: bool) -> None:
     """Post what keys mean until the key that ends it."""
     import os
 

@@ -24,7 +24,7 @@ CIRCLING = Twist(2.0, 1.8)  # the command of the turtlesim tutorial
 KEYS = {"up": Twist(2.0, 0.0), "down": Twist(-2.0, 0.0), "left": Twist(0.0, 2.0), "right": Twist(0.0, -2.0)}
 
 
-class Curtain(Exception):  # noqa: N818 - it ends the play, it is no error
+class Curtain(Exception):
     """Raised by a leader to end the play."""
 
 

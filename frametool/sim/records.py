@@ -16,13 +16,13 @@ from frametool.formats.yaml_text import dump as yaml_dump
 from frametool.frames.stamps import BILLION
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.sim.simulate import Broadcast, Command, Step
     from frametool.sim.turtle import TurtlePose
 
 FORMS = ("text", "yaml", "json", "csv")
-WIDTH = 12  # of a number's column in text
+WIDTH = 10  # least, of a column in text
 DECIMALS = 6
 
 
@@ -70,7 +70,7 @@ class Writer:
     def _header(self, record: Any) -> str:
         columns = list(self._kind.cells(record))
         if self._form == "text":
-            return _aligned(columns)
+            return _aligned(columns, columns)
         return ",".join(columns) + "\n" if self._form == "csv" else ""
 
     def _yaml(self, record: Any) -> str:
@@ -80,20 +80,40 @@ class Writer:
         return f"{json_dump(self._kind.labels(record) | self._kind.message(record), self._number or repr)}\n"
 
     def _csv(self, record: Any) -> str:
-        number = self._number or repr
-        cells = ["" if cell is None else cell for cell in self._kind.cells(record).values()]
-        return ",".join(number(cell) if isinstance(cell, float) else str(cell) for cell in cells) + "\n"
+        return ",".join(_csv_cell(cell, self._number) for cell in self._kind.cells(record).values()) + "\n"
 
     def _text(self, record: Any) -> str:
-        return _aligned([self._short(key, cell) for key, cell in self._kind.cells(record).items()])
+        cells = self._kind.cells(record)
+        texts = [f"{cells['t']:.3f}", *(_text_cell(cell, self._number) for cell in list(cells.values())[1:])]
+        return _aligned(texts, list(cells))
 
-    def _short(self, column: str, cell: Any) -> str:
-        """Round for reading; zero has no sign there."""
-        if not isinstance(cell, float):
-            return "-" if cell is None else str(cell)
-        if column == "t":
-            return f"{cell:.3f}"
-        return self._number(cell) if self._number else f"{round(cell, DECIMALS) + 0.0:.{DECIMALS}f}"
+
+def table(rows: Sequence[dict[str, float | None]], form: str, number: Callable[[float], str] | None = None) -> str:
+    """Write rows of numbers, at least one, in one of FORMS; what is None is -, null or empty.
+
+    number: writes floats; without it text has six decimals, the others the shortest that reads back.
+    """
+    if form == "json":
+        return "".join(f"{json_dump(row, number or repr)}\n" for row in rows)
+    if form == "yaml":
+        return "".join(yaml_dump([row], number or repr) for row in rows)
+    cells = _csv_cell if form == "csv" else _text_cell
+    lines = [[cells(cell, number) for cell in row.values()] for row in rows]
+    columns = list(rows[0])
+    return "".join(_aligned(line, columns) if form == "text" else ",".join(line) + "\n" for line in [columns, *lines])
+
+
+def _csv_cell(cell: Any, number: Callable[[float], str] | None) -> str:
+    if cell is None:
+        return ""
+    return (number or repr)(cell) if isinstance(cell, float) else str(cell)
+
+
+def _text_cell(cell: Any, number: Callable[[float], str] | None) -> str:
+    """Round for reading; zero has no sign there."""
+    if not isinstance(cell, float):
+        return "-" if cell is None else str(cell)
+    return number(cell) if number else f"{round(cell, DECIMALS) + 0.0:.{DECIMALS}f}"
 
 
 def _commands(step: Step) -> Iterator[Command]:
@@ -182,6 +202,6 @@ def _block(message: dict[str, Any], number: Callable[[float], str], indent: str 
             yield f"{indent}{key}: {yaml_dump(value, number)}"
 
 
-def _aligned(cells: list[str]) -> str:
-    """Write a line of right-aligned columns; the time needs less room."""
-    return f"{cells[0]:>9} " + " ".join(f"{cell:>{WIDTH}}" for cell in cells[1:]) + "\n"
+def _aligned(cells: list[str], columns: list[str]) -> str:
+    """Write a line, each cell to the right below its column's name."""
+    return " ".join(f"{cell:>{max(WIDTH, len(name))}}" for cell, name in zip(cells, columns, strict=True)) + "\n"

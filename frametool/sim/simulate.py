@@ -57,7 +57,9 @@ class Broadcast(NamedTuple):
 class Step:
     """One instant at which something happened; what did not is empty."""
 
-    __slots__ = ("broadcasts", "clears", "commands", "is_tick", "led", "log", "pens", "poses", "states", "t_ns", "walls")
+    __slots__ = (
+        "broadcasts", "clears", "commands", "is_tick", "led", "log", "pens", "poses", "states", "t_ns", "walls",
+    )  # fmt: skip
 
     def __init__(self, t_ns: int) -> None:
         """Begin an instant."""
@@ -181,12 +183,14 @@ class Drive:
         turtle = stage.world.turtles.get(self.turtle)
         if turtle is not None:
             self._pose = turtle.pose
-        twist = self.leader.command(self._pose)
-        if turtle is not None and isinstance(twist, Heading):
-            turtle.rotate_absolute(twist.theta)
-        elif turtle is not None and twist is not None:
-            turtle.command(twist)
-            step.led.append(Command(now_ns, self.turtle, twist, None, None, turtle.state))
+        given = self.leader.command(self._pose)
+        if turtle is None or given is None:
+            return self.leader.due_ns
+        if isinstance(given, Heading):
+            turtle.rotate_absolute(given.theta)
+        else:
+            turtle.command(given)
+            step.led.append(Command(now_ns, self.turtle, given, None, None, turtle.state))
         return self.leader.due_ns
 
 
