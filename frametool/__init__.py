@@ -30,7 +30,7 @@ _HOMES = {
     "TransformBuffer": "frametool.frames.buffer",
     "load": "frametool.formats.load",
 }
-__all__ = [  # noqa: F822 - loaded below
+__all__ = [
     "FrameTree",
     "FrametoolError",
     "Rotation",

@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 from importlib import import_module
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import console
 import pytest
@@ -14,6 +14,9 @@ import pytest
 from frametool.cli import COMMANDS
 from frametool.formats import FORMATS
 from frametool.geometry.representations import REPRESENTATIONS
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 README = (console.ROOT / "README.md").read_text()
 EXAMPLES = [pair for block in console.BLOCK.findall(README) for pair in console.commands(block)]
@@ -49,6 +52,7 @@ def test_an_example_in_a_help_runs(name: str, command: str, bin_folder: Path, tm
     robot = console.ROOT / "examples" / "robot.yaml"
     for file in ("robot.yaml", "arm.yaml", "gripper.yaml"):
         (tmp_path / file).write_text(robot.read_text() if file != "gripper.yaml" else "frames: {gripper: {finger: {xyz: [0, 0, 0]}}}")
+    (tmp_path / "drive.yaml").write_text((console.ROOT / "examples" / "drive.yaml").read_text())
     console.printed("true", bin_folder)
     command = re.sub(r"\| dot -Tsvg -o (\S+)", r"> \1", command)
     done = subprocess.run(

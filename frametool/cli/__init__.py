@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool import __version__
-from frametool.errors import FrametoolError, FrametoolWarning, alternatives
+from frametool.cli.help import WithHelp
+from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, alternatives
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,7 +41,7 @@ points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
 """
 
 
-class Group(click.Group):
+class Group(WithHelp, click.Group):
     """The commands of a table, each imported when it is called and not before."""
 
     table = COMMANDS
@@ -79,10 +80,17 @@ class Group(click.Group):
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
-@click.command(cls=Group, help=HELP, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=True)
-@click.version_option(__version__, "--version", prog_name="frametool", message="%(prog)s %(version)s")
+@click.command(cls=Group, help=HELP, no_args_is_help=True)
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, help="Show the version and exit.",
+              callback=lambda ctx, _, wanted: _show_version(ctx) if wanted else None)  # fmt: skip
 def group() -> None:
     """Hold the commands."""
+
+
+def _show_version(ctx: click.Context) -> None:
+    """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
+    click.echo(f"frametool {__version__}")
+    ctx.exit()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -107,7 +115,7 @@ def run(arguments: list[str]) -> int:
     except (click.Abort, KeyboardInterrupt):
         return 130
     except FrametoolError as error:
-        return _complain(_with_snippet(error), error.exit_code)
+        return _report(error, arguments)
     except BrokenPipeError:
         return _die_of_closed_pipe()
     except OSError as error:
@@ -127,6 +135,16 @@ def _usage(error: click.ClickException) -> str:
     return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
 
 
+def _report(error: FrametoolError, arguments: Sequence[str]) -> int:
+    """Say what went wrong: as a sentence, or as an object where JSON was asked for."""
+    from frametool.cli.failures import as_json, wants_json
+
+    if not wants_json(arguments):
+        return _complain(_with_snippet(error), error.exit_code)
+    print(as_json(error), file=sys.stderr)  # noqa: T201
+    return error.exit_code
+
+
 def _with_snippet(error: FrametoolError) -> str:
     snippet = getattr(error, "snippet", "")
     return f"{error}\n{snippet}" if snippet else str(error)
@@ -138,7 +156,8 @@ def _complain(message: str, status: int) -> int:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"frametool: warning: {message}", file=sys.stderr)  # noqa: T201 - this is where warnings become text
+    start = "" if isinstance(message, Tf2Warning) else "frametool: warning: "
+    print(f"{start}{message}", file=sys.stderr)  # noqa: T201 - this is where warnings become text
 
 
 def _die_of_closed_pipe() -> int:

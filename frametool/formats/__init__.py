@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
 
-
-class Row(NamedTuple):
+class Row:
     """A form of text: the module that has its `write_poses`, `write_points`, `write_tree`, and what it is."""
 
-    module: str
-    suffixes: tuple[str, ...]
-    summary: str
-    writes: tuple[str, ...]
+    __slots__ = ("module", "suffixes", "summary", "writes")
+
+    def __init__(self, module: str, suffixes: tuple[str, ...], summary: str, writes: tuple[str, ...]) -> None:
+        """Fill the row."""
+        self.module = module
+        self.suffixes = suffixes
+        self.summary = summary
+        self.writes = writes
 
 
 FORMATS = {
@@ -27,6 +29,7 @@ FORMATS = {
     "csv": Row("frametool.formats.csv_form", (".csv",), "CSV with a header", ("poses", "points")),
     "ros1": Row("frametool.formats.ros", (), "TransformStamped as `rostopic echo` prints it", ("poses", "tree")),
     "ros2": Row("frametool.formats.ros", (), "TransformStamped as `ros2 topic echo` prints it", ("poses", "tree")),
+    "tf2": Row("frametool.formats.tf2_listing", (), "the listing of tf2's all_frames_as_yaml", ("tree",)),
     "dot": Row("frametool.formats.dot", (".dot", ".gv"), "graphviz", ("tree",)),
     "mermaid": Row("frametool.formats.mermaid", (".mmd",), "a mermaid flowchart", ("tree",)),
 }
