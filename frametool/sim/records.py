@@ -2,7 +2,7 @@
 
     linear: {x: ..}, angular: {..}                                  YAML: messages as `ros2 topic echo` prints them
     {"t": 0.1, "turtle": "turtle2", "linear": {"x": ..}, "angular": {"z": ..}}             JSON: one object a line
-    t,turtle,linear_x,angular_z,distance,leader_x,leader_y,leader_theta,x,y,theta          CSV
+    t,turtle,linear_x,angular_z,distance,leader_x,leader_y,leader_theta,x,y,theta          CSV; of transforms, ROS 2's
 
 Metres, radians, seconds; quaternions x, y, z, w; a transform is the pose of the child in its parent.
 """
@@ -35,12 +35,13 @@ class Posed(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """A kind of record: how to find it in a step, its cells by column, its message, the CSV header's presence."""
+    """A kind of record: how to find it in a step, its cells by column, its message."""
 
     records: Callable[[Step], Iterator[Any]]
     cells: Callable[[Any], dict[str, Any]]
     message: Callable[[Any], dict[str, Any]]
     labels: Callable[[Any], dict[str, Any]]  # what JSON says before the message
+    bare_row: Callable[[Any], list[Any]] | None = None  # CSV as ROS 2 writes it, without a header
 
 
 class Writer:
@@ -71,7 +72,7 @@ class Writer:
         columns = list(self._kind.cells(record))
         if self._form == "text":
             return _aligned(columns, columns)
-        return ",".join(columns) + "\n" if self._form == "csv" else ""
+        return ",".join(columns) + "\n" if self._form == "csv" and self._kind.bare_row is None else ""
 
     def _yaml(self, record: Any) -> str:
         return "".join(_block(self._kind.message(record), self._number or repr)) + "---\n"
@@ -80,7 +81,8 @@ class Writer:
         return f"{json_dump(self._kind.labels(record) | self._kind.message(record), self._number or repr)}\n"
 
     def _csv(self, record: Any) -> str:
-        return ",".join(_csv_cell(cell, self._number) for cell in self._kind.cells(record).values()) + "\n"
+        cells = self._kind.bare_row(record) if self._kind.bare_row else self._kind.cells(record).values()
+        return ",".join(_csv_cell(cell, self._number) for cell in cells) + "\n"
 
     def _text(self, record: Any) -> str:
         cells = self._kind.cells(record)
@@ -169,6 +171,12 @@ def _transform_cells(broadcast: Broadcast) -> dict[str, Any]:
     return labels | dict(zip(names, broadcast.transform.components, strict=True))
 
 
+def _transform_row(broadcast: Broadcast) -> list[Any]:
+    """Give what `ros2 topic echo --csv /tf` prints."""
+    seconds, nanoseconds = divmod(broadcast.stamp_ns, BILLION)
+    return [seconds, nanoseconds, broadcast.parent, broadcast.child, *broadcast.transform.components]
+
+
 def _transform_message(broadcast: Broadcast) -> dict[str, Any]:
     """Give a geometry_msgs/TransformStamped."""
     seconds, nanoseconds = divmod(broadcast.stamp_ns, BILLION)
@@ -187,7 +195,7 @@ KINDS = {
     "commands": Kind(_commands, _command_cells, _twist, _labels),
     "all commands": Kind(_all_commands, _command_cells, _twist, _labels),
     "poses": Kind(_poses, _pose_cells, _pose_message, _labels),
-    "tf": Kind(_transforms, _transform_cells, _transform_message, lambda _: {}),
+    "tf": Kind(_transforms, _transform_cells, _transform_message, lambda _: {}, _transform_row),
 }
 EMITS = ("commands", "poses", "tf")
 
