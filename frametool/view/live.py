@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from itertools import groupby
+from operator import itemgetter
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -38,7 +40,8 @@ class Screen:
         self._console = console or Console(stderr=to_stderr)
         beside = TALK + 3 + len(scene.followers)
         self._canvas = Canvas(max(5, min(self._console.height - beside, (self._console.width - 4) // 2, 40)))
-        self._live = Live(console=self._console, auto_refresh=False, transient=False)
+        # what goes to stdout beside the picture is data and must not be caught
+        self._live = Live(console=self._console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
         self._talk: list[str] = []
         self._last: dict[str, Command] = {}
         self._states: dict[str, State] = {}
@@ -91,9 +94,9 @@ class Screen:
         }
         text = Text()
         for line in range(canvas.lines):
-            for column, cell in enumerate(canvas.row(line)):
-                character, colour = turtles.get((line, column), cell)
-                text.append(character, f"{colour} {STYLE}".strip())
+            cells = [turtles.get((line, column), cell) for column, cell in enumerate(canvas.row(line))]
+            for colour, run in groupby(cells, key=itemgetter(1)):
+                text.append("".join(character for character, _ in run), f"{colour} {STYLE}".strip())
             text.append("\n")
         text.append("".join(f"{_sentence(command)}\n" for command in self._last.values()))
         text.append("\n".join(self._talk), "dim")
