@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -41,10 +41,21 @@ points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
 """
 
 
+class ReaderGone(Exception):
+    """Say that nobody reads stdout any more."""
+
+
 class Group(WithHelp, click.Group):
     """The commands of a table, each imported when it is called and not before."""
 
     table = COMMANDS
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; a closed pipe leaves as an error that click does not turn into status 1."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise ReaderGone from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Name the commands, in the table's order."""
@@ -116,7 +127,7 @@ def run(arguments: list[str]) -> int:
         return 130
     except FrametoolError as error:
         return _report(error, arguments)
-    except BrokenPipeError:
+    except (ReaderGone, BrokenPipeError):
         return _die_of_closed_pipe()
     except OSError as error:
         return _complain(f"{error.strerror or error}", 5)

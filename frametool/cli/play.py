@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     Watch = Callable[[Step], None]
 
+SUFFIXES = {".csv": "csv", ".json": "json", ".jsonl": "json", ".txt": "text", ".yaml": "yaml", ".yml": "yaml"}
 PLOTS = {".svg": "frametool.view.plot_svg", ".html": "frametool.view.plot_html", ".png": "frametool.view.plot_png"}
 
 
@@ -68,8 +69,7 @@ class Show:
 
         Raises click.UsageError, FileProblem.
         """
-        form = format_name or ("text" if output is None and sys.stdout.isatty() else "yaml")
-        self.writer = Writer(emit, form, number_writer(precision), leaders=leaders)
+        self.writer = Writer(emit, form_of(format_name, output), number_writer(precision), leaders=leaders)
         self.output = None if output == "-" else output
         self.reach = reach
         self.realtime = realtime or live
@@ -177,6 +177,12 @@ class Log:
                 tell(f"{step.t_ns / BILLION:.3f} s: {hit}")
         if step.is_tick:
             self._at_wall = frozenset(hit.turtle for hit in step.walls)
+
+
+def form_of(format_name: str | None, output: str | None) -> str:
+    """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+    by_suffix = SUFFIXES.get(suffix_of(output or ""))
+    return format_name or by_suffix or ("text" if output is None and sys.stdout.isatty() else "yaml")
 
 
 def number_writer(precision: int | None) -> Callable[[float], str] | None:

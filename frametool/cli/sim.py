@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from frametool.cli import Group
+from frametool.cli.command import EXIT_CODES
 
 SUBCOMMANDS = {
     "follow": ("frametool.cli.sim_follow", "a leader, and one or more turtles that follow"),
@@ -29,6 +30,6 @@ class SimGroup(Group):
     table = SUBCOMMANDS
 
 
-@click.command(cls=SimGroup, name="sim", help=HELP, no_args_is_help=True)
+@click.command(cls=SimGroup, name="sim", help=HELP, epilog=EXIT_CODES, no_args_is_help=True)
 def command() -> None:
     """Hold the subcommands."""

@@ -52,7 +52,7 @@ class Duration(Number):
             return math.inf
         seconds = float(super().convert(value, param, ctx))
         if seconds < 0.0:
-            self.fail(f"expected 0 or more, found {value}", param, ctx)
+            self.fail(f"expected 0 or more, found {seconds:g}", param, ctx)
         return seconds
 
 
@@ -101,7 +101,7 @@ def command(leader: str, followers: int, **options: Any) -> None:
 
     A leader file has t, linear, angular as CSV, JSON or YAML; standard input also takes Twist messages and the words
     up, down, left, right, one a second unless they say their time. A turtle at a wall is told of once, and every tick
-    there is counted in the summary.
+    there is counted in the summary. Below 2 micrometres from its target a follower stands still.
     """
     show, scene = settled(options, leader, followers)
     show.play(scene)

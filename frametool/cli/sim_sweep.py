@@ -9,7 +9,7 @@ import click
 
 from frametool.cli.command import TEXT, Command, Text
 from frametool.cli.leader import leader_of
-from frametool.cli.play import check_files, number_writer, suffix_of, write_file
+from frametool.cli.play import check_files, form_of, number_writer, suffix_of, write_file
 from frametool.cli.sim_follow import NUMBER, Duration, Spawn
 from frametool.errors import ValueInvalid
 from frametool.formats.numbers import parse_number
@@ -89,8 +89,8 @@ def command(
         many = grid(gain_linear, gain_angular, drive, **options)
     except ValueInvalid as error:
         raise error if hasattr(error, "line") else click.UsageError(str(error)) from None
-    form = format_name or ("text" if output is None and sys.stdout.isatty() else "yaml")
-    text = table(list(rows(gain_linear, gain_angular, many)), form, number_writer(precision))
+    records = list(rows(gain_linear, gain_angular, many))
+    text = table(records, form_of(format_name, output), number_writer(precision))
     if output in (None, "-"):
         sys.stdout.write(text)
     else:

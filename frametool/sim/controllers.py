@@ -11,7 +11,7 @@ from frametool.sim.turtle import Twist
 # law -> rate in Hz, linear gain in 1/s, angular gain in 1/s: turtle_tf2_listener of each ROS
 LAWS = {"ros1": (10.0, 0.5, 4.0), "ros2": (1.0, 0.5, 1.0)}
 SLOWEST, FASTEST = 1e-6, 1e6  # Hz; two steps must not fall on one nanosecond
-ARRIVED = 1e-9  # metres: positions are float32, 1e-7 apart; anything nearer is the rounding of the lookup
+ARRIVED = 2e-6  # metres: positions near 11 m are float32, 1e-6 apart; a bearing between neighbours is rounding
 
 
 class FollowController:
@@ -20,7 +20,7 @@ class FollowController:
         FollowController().command(1.0, 1.0)         # Twist(linear_x=0.707.., angular_z=3.14159..)
 
     law: "ros1" or "ros2", for whatever is None.  rate in Hz, gains in 1/s, limits in m/s and rad/s (None: no limit).
-    At distance zero the command is zero: a bearing of rounding noise would make the turtle spin.
+    At distance zero (below ARRIVED) the command is zero: the bearing is rounding noise there and makes turtles spin.
     """
 
     def __init__(

@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, did_you_mean
+from frametool.errors import ValueInvalid, alternatives
 from frametool.formats.documents import format_error, parse_documents
 from frametool.formats.numbers import parse_angle, parse_number
 from frametool.formats.source import Source, read_text
@@ -119,8 +119,7 @@ class _Reader:
         if leader == name:
             raise Misfit(f"{name} cannot follow itself")
         if leader not in self.names and not (self.nameless and leader.startswith("turtle")):
-            near = did_you_mean(leader, self.names)
-            raise Misfit(f"no turtle {leader!r} to follow{near}; turtles: {', '.join(self.names)}")
+            raise Misfit(f"no turtle {leader!r} to follow{alternatives(leader, self.names, 'turtles')}")
 
     def _leader(self, value: Any) -> MakeLeader:
         """Read a leader: a built-in name, a file beside the scene, or the commands themselves."""
@@ -132,8 +131,7 @@ class _Reader:
             return built_in(value, self.seed or 0)
         path = os.path.join(os.path.dirname(self.source.name), value)  # noqa: PTH118, PTH120 - pathlib costs 6 ms
         if not os.path.exists(path):  # noqa: PTH110
-            near = did_you_mean(value, LEADERS)
-            raise Misfit(f"no leader {value!r} and no file {path}{near}; leaders: {', '.join(LEADERS)}")
+            raise Misfit(f"no file {path} and no leader {value!r}{alternatives(value, LEADERS, 'leaders')}")
         return scripted(read_script(Source(path, read_text(path))))
 
     def _calls(self, value: Any) -> list[Call]:
@@ -194,9 +192,7 @@ def _known(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
     """Take a value for a mapping with some of these keys."""
     mapping = as_mapping(value, what)
     if unknown := [key for key in mapping if key not in keys]:
-        near = did_you_mean(unknown[0], keys)
-        expected = ", ".join(keys) or "nothing"
-        raise Misfit(f"unknown key {unknown[0]!r}{near}; expected {expected}", (unknown[0],), key=True)
+        raise Misfit(f"unknown key {unknown[0]!r}{alternatives(unknown[0], keys, 'keys')}", (unknown[0],), key=True)
     return mapping
 
 
@@ -222,9 +218,10 @@ def _one_of(names: Collection[str]) -> Callable[[Any], str]:
     """Give the reader of one of several words."""
 
     def read(value: Any) -> str:
-        if type(value) is not str or value not in names:
-            near = did_you_mean(value, names) if type(value) is str else ""
-            raise Misfit(f"expected {', '.join(names)}, found {kind(value)}{near}")
+        if type(value) is not str:
+            raise Misfit(f"expected one of {', '.join(names)}, found {kind(value)}")
+        if value not in names:
+            raise Misfit(f"unknown {value!r}{alternatives(value, names, 'choices')}")
         return value
 
     return read

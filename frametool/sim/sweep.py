@@ -182,7 +182,7 @@ class _Crowd:
         self._stay_inside()
 
     def _stay_inside(self) -> None:
-        if self.x.min() >= 0.0 and self.x.max() <= SIZE and self.down.min() >= 0.0 and self.down.max() <= SIZE:
+        if all(axis.min(initial=0.0) >= 0.0 and axis.max(initial=SIZE) <= SIZE for axis in (self.x, self.down)):
             return
         self.hits += (self.x < 0.0) | (self.x > SIZE) | (self.down < 0.0) | (self.down > SIZE)
         np.clip(self.x, 0.0, SIZE, out=self.x)

@@ -14,7 +14,7 @@ import re
 import sys
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FormatError, ValueInvalid, did_you_mean
+from frametool.errors import FormatError, ValueInvalid, alternatives
 from frametool.formats.documents import format_error, parse_documents
 from frametool.formats.numbers import parse_number
 from frametool.formats.source import Source, decode, placed_error
@@ -75,7 +75,7 @@ def read_script(source: Source, *, period_ns: int = BILLION) -> list[TimedTwist]
     """
     commands = list(read_twists(source.text.split("\n"), source.name, period_ns=period_ns))
     if not commands:
-        raise FormatError(f"no commands in it; {EXPECTED}", source=source.name)
+        raise FormatError(f"no commands in it; {EXPECTED}", source=source.name, line=1)
     return commands
 
 
@@ -203,7 +203,7 @@ def _cell(parse: Any, cells: list[str], index: int) -> Any:
 def _key(word: str) -> Twist:
     """Give the command of an arrow key."""
     if word.lower() not in KEYS:
-        raise Misfit(f"unknown key {word!r}{did_you_mean(word, KEYS)}; {EXPECTED}")
+        raise Misfit(f"unknown key {word!r}{alternatives(word, KEYS, 'keys')}")
     return KEYS[word.lower()]
 
 
@@ -224,8 +224,8 @@ def _entry(value: Any) -> tuple[int | None, Twist]:
         return t, Twist(linear, angular)
     entry = as_mapping(value, EXPECTED)
     if unknown := [key for key in entry if key not in ENTRY_KEYS]:
-        near = did_you_mean(unknown[0], ENTRY_KEYS)
-        raise Misfit(f"unknown key {unknown[0]!r}{near}; {EXPECTED}", (unknown[0],), key=True)
+        known = alternatives(unknown[0], ENTRY_KEYS, "keys")
+        raise Misfit(f"unknown key {unknown[0]!r}{known}", (unknown[0],), key=True)
     if "linear" not in entry and "angular" not in entry:
         raise Misfit(f"neither linear nor angular; {EXPECTED}")
     ahead, aside = within(("linear",), _axes, entry.get("linear", "0"), 0, 1)
