@@ -127,4 +127,4 @@ def settled(
         drive = leader_of(leader, seed, paced=show.realtime) if isinstance(leader, str) else leader
         return show, tutorial(leader=drive, law=controller, followers=followers, **chosen)
     except ValueInvalid as error:
-        raise error if hasattr(error, "line") else click.UsageError(str(error)) from None
+        raise click.UsageError(str(error)) from None

@@ -88,7 +88,7 @@ def command(
         drive = leader_of(leader, seed, paced=False)
         many = grid(gain_linear, gain_angular, drive, **options)
     except ValueInvalid as error:
-        raise error if hasattr(error, "line") else click.UsageError(str(error)) from None
+        raise click.UsageError(str(error)) from None
     records = list(rows(gain_linear, gain_angular, many))
     text = table(records, form_of(format_name, output), number_writer(precision))
     if output in (None, "-"):

@@ -39,7 +39,7 @@ def test_many_followers_are_each_what_one_alone_is(law: str, leader: str) -> Non
 
 
 def test_shapes_broadcast_and_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    spawn = np.zeros((3, 1, 3)) + [4.0, 2.0, 0.0]
+    spawn = np.broadcast_to([4.0, 2.0, 0.0], (3, 1, 3))
     whole = simulate_many(spawn=spawn, gain_linear=[0.5, 1.0], duration=3.0)
     monkeypatch.setattr(sweep, "BLOCK", 4)
     parts = simulate_many(spawn=spawn, gain_linear=[0.5, 1.0], duration=3.0)

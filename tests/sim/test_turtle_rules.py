@@ -359,7 +359,7 @@ def test_an_endless_play_keeps_ten_seconds_of_transforms() -> None:
 def test_unknown_leaders_targets_and_worlds_are_named() -> None:
     for wrong, message in (({"leader": "circel"}, "leaders: "), ({"target": "x"}, "targets: "), ({"delay": -1.0}, "delay")):
         with pytest.raises(ValueInvalid, match=message):
-            tutorial(**wrong)  # type: ignore[arg-type]
+            tutorial(**wrong)
     with pytest.raises(ValueInvalid, match="ros1, ros2"):
         list(simulate(tutorial(turtlesim="ros3")))
 

@@ -121,7 +121,7 @@ def test_a_scene_is_read() -> None:
 
 def test_a_scene_is_played() -> None:
     steps = [step for step in simulate(read_scene(Source("scene.yaml", SCENE))) if step.is_tick]
-    assert [*steps[0].poses], [*steps[-1].poses] == (["b", "c", "turtle1"], ["b", "d", "turtle1"])
+    assert [[*step.poses] for step in (steps[0], steps[-1])] == [["b", "c", "turtle1"], ["b", "d", "turtle1"]]
     assert steps[-1].pens["b"].off
     assert steps[-1].clears == 1
 
@@ -132,7 +132,7 @@ def test_a_list_of_turtles_and_a_leader_file_beside_the_scene_are_read(tmp_path:
     scene = read_scene(Source(str(tmp_path / "scene.json"), text))
     steps = simulate(scene)
     assert scene.duration_ns is None
-    assert [next(steps).led[0].twist for _ in range(1)] == [Twist(1.0, 0.0)]
+    assert next(steps).led[0].twist == Twist(1.0, 0.0)
 
 
 @pytest.mark.parametrize(
