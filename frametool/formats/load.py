@@ -64,7 +64,7 @@ def load_sources(sources: Sequence[Source], rules: Rules | None = None) -> Frame
     assembly = Assembly(", ".join(source.name for source in sources), rules)
     with paused_collector():
         for source in sources:
-            for found in edges_of(source):
+            for found in edges_of(source, raw=assembly.rules.policy != "frametool"):
                 edge = found.edge
                 if edge.parent is None:
                     assembly.add_root(edge.child)
@@ -73,16 +73,16 @@ def load_sources(sources: Sequence[Source], rules: Rules | None = None) -> Frame
         return assembly.finish()
 
 
-def edges_of(source: Source) -> Iterator[Found]:
-    """Read the edges of one text, then tell what was odd about it."""
+def edges_of(source: Source, *, raw: bool = False) -> Iterator[Found]:
+    """Read the edges of one text, then tell what was odd about it; raw: messages as tf2 receives them."""
     notes = []
     count = 0
     for document in parse_documents(source.text, source.name):
-        reading = Reading(source)
+        reading = Reading(source, raw=raw)
         try:
             for edge in read_edges(document.value, reading):
                 count += 1
-                yield Found(_without_slashes(edge, reading), source, document.index)
+                yield Found(edge if raw else _without_slashes(edge, reading), source, document.index)
         except Misfit as misfit:
             raise format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key) from None
         notes += [((document.index, *path), message) for path, message in reading.notes]
