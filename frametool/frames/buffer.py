@@ -25,7 +25,7 @@ class TransformBuffer(TrackStore):
     """Hold transforms over time; answer where one frame is seen from another, and when.
 
     Stamps are integer nanoseconds, in any order. Between two samples translations are interpolated along the line and
-    rotations by slerp, edge by edge. Nothing is pruned unless `keep_ns` says so.
+    rotations by slerp, edge by edge. Nothing is pruned unless `keep_ns` says so. The latest time is None; 0 is a time.
 
         buffer = TransformBuffer()
         buffer.insert("map", "base", map_from_base, 1_700_000_000_000_000_000)

@@ -90,6 +90,12 @@ def test_standing_and_moving_edges_of_several_files_answer_one_question(tmp_path
     assert x_of(buffer, "map", "lidar", EPOCH + 1) == 12.0
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_an_edge_said_once_with_and_once_without_a_stamp_stands_still(turn: int, tmp_path: Path) -> None:
+    texts = [message(1, EPOCH), "{name: base, parent: map, xyz: [1, 0, 0]}"][::turn]
+    assert isinstance(loaded(tmp_path, *texts), FrameTree)
+
+
 def test_two_poses_at_one_stamp_take_the_last_and_name_both_lines(tmp_path: Path) -> None:
     text = message(1, EPOCH) + message(2, EPOCH + 1) + message(5, EPOCH + 1)
     with pytest.warns(FrametoolWarning, match=r"frame 'base' has two poses at 1700000000\.123456790: line 7 and line 12"):
@@ -106,7 +112,8 @@ def test_two_files_that_disagree_are_both_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        (message(1, EPOCH) + message(2, EPOCH), "frame 'base' has two different poses: line 2 and line 7"),
+        (message(1, EPOCH) + message(2, EPOCH), "frame 'base' has two different poses in 'map': line 2 and line 7"),
+        (message(1, EPOCH) + message(1, EPOCH, "odom"), r"two parents: 'map' \(line 2\) and 'odom' \(line 7\)"),
         (MOVING + "  - {name: base, parent: map, xyz: [9, 0, 0]}\n", "both stands still and moves: line 5 and line 8"),
         ("- {name: b, parent: a, samples: [{xyz: [0, 0, 0]}]}", "missing stamp; a sample is"),
         ("- {name: b, parent: a, samples: [{stamp: x}]}", "'x' is not a time"),
