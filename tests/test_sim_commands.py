@@ -173,6 +173,13 @@ def test_every_subcommand_has_help_with_exit_codes(run: Run, name: str) -> None:
     assert "Exit codes: 0 done" in outcome.out
 
 
+@pytest.mark.parametrize("arguments", [["follow"], ["run", "{turtles: {turtle1: }}"]])
+def test_a_run_loads_no_numpy_and_no_rich(arguments: list[str]) -> None:
+    code = f"import sys; from frametool.cli import run; run({['sim', *arguments]!r}); print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=console.ROOT)
+    assert not {"numpy", "rich", "dataclasses"} & set(done.stderr.split())
+
+
 def test_a_closed_pipe_ends_an_endless_run_quietly() -> None:
     tool = subprocess.Popen(
         [*TOOL, "sim", "follow", "--duration", "inf", "-f", "csv"],

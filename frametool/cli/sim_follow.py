@@ -14,7 +14,8 @@ from frametool.errors import ValueInvalid
 from frametool.formats.numbers import parse_angle, parse_number
 from frametool.frames.stamps import BILLION
 from frametool.sim.controllers import LAWS, FollowController
-from frametool.sim.scene import TARGETS, tutorial
+from frametool.sim.scene import tutorial
+from frametool.sim.targets import TARGETS
 from frametool.sim.world import VARIANTS
 
 if TYPE_CHECKING:

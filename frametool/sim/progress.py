@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from frametool.frames.stamps import BILLION
-from frametool.sim.simulate import offset
+from frametool.sim.targets import offset
 from frametool.sim.turtle import State
 
 if TYPE_CHECKING:
@@ -53,8 +53,10 @@ class Progress:
         target = follow.leader if follow.target == "leader" else f"the {follow.target} of {follow.leader}"
         if name not in self.distances:
             return f"{name}: never in the world together with {follow.leader}"
-        soon = f"after {_seconds(self.reached_ns[name])}" if name in self.reached_ns else "never"
-        return f"{name}: final distance to {target} {self.distances[name]:.4f} m; within {self.reach:g} m {soon}"
+        reached = self.reached_ns.get(name)
+        near = f"within {self.reach:g} m"
+        soon = f"never {near}" if reached is None else f"{near} after {_seconds(reached)}"
+        return f"{name}: final distance to {target} {self.distances[name]:.4f} m; {soon}"
 
 
 def goal(leader: State, follow: Follow, now_ns: int) -> State:

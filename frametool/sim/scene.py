@@ -9,6 +9,7 @@ from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
 from frametool.sim.controllers import FollowController
 from frametool.sim.leaders import built_in
+from frametool.sim.targets import TARGETS
 from frametool.sim.turtle import CENTRE
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     Place = tuple[float, float, float]
 
-TARGETS = ("leader", "carrot", "moving-carrot")
 TUTORIAL_SPAWN: Place = (4.0, 2.0, 0.0)
 
 

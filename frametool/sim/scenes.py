@@ -21,7 +21,8 @@ from frametool.formats.values import Misfit, as_mapping, kind, within
 from frametool.frames.stamps import parse_stamp
 from frametool.sim.controllers import LAWS, FollowController
 from frametool.sim.leaders import LEADERS, built_in, scripted
-from frametool.sim.scene import TARGETS, Actor, Call, Follow, Scene
+from frametool.sim.scene import Actor, Call, Follow, Scene
+from frametool.sim.targets import TARGETS
 from frametool.sim.turtle import CENTRE
 from frametool.sim.twists import read_entries, read_script
 from frametool.sim.world import SERVICES, VARIANTS, complete

@@ -13,15 +13,16 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 from frametool.errors import LookupFailed, UnknownFrame, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
-from frametool.geometry.transform import Transform
 from frametool.sim.leaders import Curtain, Heading
 from frametool.sim.scene import Follow
+from frametool.sim.targets import CARROT_NS, frame_of, offset, planar
 from frametool.sim.turtle import TICK_NS, State, TurtlePose
 from frametool.sim.world import ServiceRefused, World
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from frametool.geometry.transform import Transform
     from frametool.sim.leaders import Leader
     from frametool.sim.scene import Actor, Call, Scene
     from frametool.sim.turtle import Pen, Twist
@@ -29,9 +30,6 @@ if TYPE_CHECKING:
 
 WORLD = "world"
 CACHE_NS = 10 * BILLION  # tf's own default
-CARROT_NS = BILLION // 10
-CARROT_AHEAD = 2.0  # metres
-CARROT_CIRCLE = 10.0  # metres
 
 
 class Command(NamedTuple):
@@ -272,28 +270,6 @@ def simulate(scene: Scene) -> Iterator[Step]:
             else:
                 heapreplace(queue, (due_ns, rank, order, part))
         yield step
-
-
-def frame_of(turtle: str, target: str) -> str:
-    """Name the frame that is looked up: the turtle, or its carrot (turtle1's is carrot1)."""
-    if target == "leader":
-        return turtle
-    return f"carrot{turtle[6:]}" if turtle[:6] == "turtle" and turtle[6:].isdigit() else f"{turtle}_carrot"
-
-
-def offset(target: str, now_ns: int) -> tuple[float, float]:
-    """Give where a target stands in its leader's frame, in metres."""
-    if target == "leader":
-        return 0.0, 0.0
-    if target == "carrot":
-        return 0.0, CARROT_AHEAD
-    angle = now_ns / BILLION * math.pi
-    return CARROT_CIRCLE * math.sin(angle), CARROT_CIRCLE * math.cos(angle)
-
-
-def planar(x: float, y: float, theta: float) -> Transform:
-    """Give a pose in the plane as a transform."""
-    return Transform.of(x, y, 0.0, 0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0))
 
 
 def _parts(scene: Scene) -> Iterator[tuple[int, Part]]:

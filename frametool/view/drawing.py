@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.frames.stamps import BILLION
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 # where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names
 COLOURS = ("#f4d35e", "#ee964b", "#7bdff2", "#b2f7ef", "#f7a1c4", "#c3f584", "#d0bdf4", "#ffffff")
+
+SHORT = 0.05  # metres, two pixels
+FLAT = 1e-6  # metres; small, because the points left out before are not looked at again
 
 
 class Stroke(NamedTuple):
@@ -80,5 +84,22 @@ class Drawing:
             stroke = self._current[name] = Stroke(name, pen, begin)
             if not pen.off:
                 self.strokes.append(stroke)
-        if not stroke.points or stroke.points[-1] != (x, y):
-            stroke.points.append((x, y))
+        _extend(stroke.points, (x, y))
+
+
+def _extend(points: list[Point], place: Point) -> None:
+    """Go on to a place; a point on the straight way there is not kept."""
+    if len(points) > 1 and _is_straight(points[-2], points[-1], place):
+        points[-1] = place
+    elif not points or points[-1] != place:
+        points.append(place)
+
+
+def _is_straight(begin: Point, middle: Point, end: Point) -> bool:
+    """Tell whether the middle lies between both ends, and so near to the line through them that nobody sees it."""
+    ahead_x, ahead_y = middle[0] - begin[0], middle[1] - begin[1]
+    on_x, on_y = end[0] - middle[0], end[1] - middle[1]
+    if ahead_x * on_x + ahead_y * on_y <= 0.0:
+        return False
+    length = math.hypot(ahead_x + on_x, ahead_y + on_y)
+    return length < SHORT or abs(ahead_x * on_y - ahead_y * on_x) < FLAT * length

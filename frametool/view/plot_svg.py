@@ -140,5 +140,5 @@ def _bounds(values: Iterable[float]) -> tuple[float, float]:
 
 
 def _number(value: float) -> str:
-    """Write pixels with a hundredth's precision."""
-    return f"{round(value, 2) + 0.0:g}" if abs(value) < 1e4 else f"{value:.0f}"
+    """Write pixels with a tenth's precision."""
+    return f"{round(value, 1) + 0.0:g}" if abs(value) < 1e4 else f"{value:.0f}"
