@@ -78,8 +78,8 @@ def command(
       frametool sim sweep --gain-linear 0.1:2:20 --gain-angular 1:8:20
       frametool sim sweep --leader circle --format csv --plot gains.svg
 
-    time_to_reach is in seconds; overshoot is the greatest distance after that, less the reach, in metres (0: it
-    stayed). Both are missing (-, null or empty) where the follower never comes within reach.
+    time_to_reach is in seconds; overshoot, in metres, is how much further off than its nearest the follower was again
+    after that. Both are missing (-, null or empty) where it never comes within reach.
     """
     check_files(plot, output, force=force)
     from frametool.sim.sweep import grid, rows

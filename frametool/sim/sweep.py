@@ -37,7 +37,7 @@ class Many(NamedTuple):
 
     x, y (m), theta (rad): where they ended.  distance (m): to the leader, at the end.
     time_to_reach (s): when they first were within reach; nan where never.
-    overshoot (m): how far beyond the reach they were again after that; 0 where they stayed, nan where never.
+    overshoot (m): how much further off than their nearest they were again after that; nan where never within reach.
     wall_hits: ticks at a wall.
     """
 
@@ -156,7 +156,7 @@ class _Crowd:
         self.gain_linear, self.gain_angular, self.max_linear, self.max_angular = columns[3:]
         self.reach = reach
         self.speed, self.turn, self.sine, self.cosine = (np.zeros_like(self.x) for _ in range(4))
-        self.reached, self.furthest = np.full_like(self.x, np.nan), np.full_like(self.x, np.nan)
+        self.reached, self.nearest, self.overshoot = (np.full_like(self.x, np.nan) for _ in range(3))
         self.hits = np.zeros(self.x.shape, np.int64)
         self.unreached = True
         self._one, self._two = np.empty_like(self.x), np.empty_like(self.x)
@@ -189,14 +189,17 @@ class _Crowd:
         np.clip(self.down, 0.0, SIZE, out=self.down)
 
     def measure(self, leader: State, t: float) -> None:
-        """Compare the distances with the reach, and with the greatest since it was reached."""
+        """Compare the distances with the reach, and with the nearest since that was reached."""
         distance = self._distance(leader, self._one, self._two)
         if self.unreached:
             new = np.isnan(self.reached) & (distance <= self.reach)
             self.reached[new] = t
-            self.furthest[new] = self.reach
+            self.nearest[new] = distance[new]
+            self.overshoot[new] = 0.0
             self.unreached = bool(np.isnan(self.reached).any())
-        np.maximum(self.furthest, distance, out=self.furthest)
+        np.minimum(self.nearest, distance, out=self.nearest)
+        distance -= self.nearest
+        np.maximum(self.overshoot, distance, out=self.overshoot)
 
     def _distance(self, leader: State, one: Floats, two: Floats) -> Floats:
         np.subtract(self.x, leader.x, out=one)
@@ -220,4 +223,4 @@ class _Crowd:
     def result(self, leader: State) -> tuple[Any, ...]:
         """Give the fields of Many."""
         distance = self._distance(leader, np.empty_like(self.x), self._two)
-        return self.x, SIZE - self.down, self.theta, distance, self.reached, self.furthest - self.reach, self.hits
+        return self.x, SIZE - self.down, self.theta, distance, self.reached, self.overshoot, self.hits

@@ -14,6 +14,7 @@ from frametool.sim.progress import Progress
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
 from frametool.sim.sweep import grid, rows, simulate_many
+from frametool.sim.turtle import CENTRE
 
 
 @pytest.mark.parametrize("law", ["ros1", "ros2"])
@@ -53,9 +54,20 @@ def test_a_higher_gain_is_there_sooner() -> None:
 
 
 def test_overshoot_is_what_is_lost_again_and_nan_where_never_reached() -> None:
-    many = simulate_many("circle", gain_linear=[0.01, 0.5], gain_angular=4.0, spawn=[4.0, 2.0, 0.0])
+    many = simulate_many("still", law="ros2", spawn=[2.0, CENTRE, 0.0], gain_linear=[0.01, 0.5, 1.5])
     assert math.isnan(many.overshoot[0])
-    assert simulate_many("still").overshoot == pytest.approx(0.0)
+    assert many.overshoot[1] == pytest.approx(0.0, abs=1e-6)
+    assert many.overshoot[2] == pytest.approx((CENTRE - 2.0) / 2.0, abs=0.05)
+
+
+def test_overshoot_is_measured_as_one_follower_shows_it() -> None:
+    law = FollowController(gain_linear=0.5)
+    steps = simulate(tutorial(leader="circle", law=law, duration=10.0))
+    distances = [step.states["turtle2"].distance(step.states["turtle1"]) for step in steps if step.is_tick]
+    after = distances[next(at for at, each in enumerate(distances) if each <= 1.2) :]
+    expected = max(each - min(after[: at + 1]) for at, each in enumerate(after))
+    many = simulate_many("circle", gain_linear=0.5, duration=10.0, reach=1.2)
+    assert many.overshoot == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_grid_has_a_record_for_every_pair() -> None:
