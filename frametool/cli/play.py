@@ -6,7 +6,6 @@ import os
 import sys
 from codecs import getwriter
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -69,7 +68,10 @@ class Show:
 
         Raises click.UsageError, FileProblem.
         """
-        self.writer = Writer(emit, form_of(format_name, output), number_writer(precision), leaders=leaders)
+        self.emit = emit
+        self.form = form_of(format_name, output)
+        self.number = number_writer(precision)
+        self.leaders = leaders
         self.output = None if output == "-" else output
         self.reach = reach
         self.realtime = realtime or live
@@ -128,20 +130,26 @@ class Show:
         else:
             yield Log().watch
         if self.output is not None:
-            yield partial(self._write, getwriter("utf-8")(stack.enter_context(whole_file(self.output))))
+            yield self._writing(getwriter("utf-8")(stack.enter_context(whole_file(self.output))), scene)
         elif not (self.live and sys.stdout.isatty()):
-            yield partial(self._write, sys.stdout)
+            yield self._writing(sys.stdout, scene)
 
     def _save(self, drawing: Drawing) -> None:
         """Write the plot in the form that its suffix names."""
         path = str(self.plot)
         write_file(path, import_module(PLOTS[suffix_of(path)]).plot(drawing))
 
-    def _write(self, stream: TextIO | StreamWriter, step: Step) -> None:
-        """Write a step's records, each at once, so that a reader at the other end of a pipe sees it."""
-        for text in self.writer.write(step):
-            stream.write(text)
-            stream.flush()
+    def _writing(self, stream: TextIO | StreamWriter, scene: Scene) -> Watch:
+        """Give what writes a step's records, each at once, so that a reader at the other end of a pipe sees it."""
+        several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
+        writer = Writer(self.emit, self.form, self.number, leaders=self.leaders, labelled=several)
+
+        def write(step: Step) -> None:
+            for text in writer.write(step):
+                stream.write(text)
+                stream.flush()
+
+        return write
 
 
 class Pace:

@@ -47,17 +47,19 @@ class Kind(NamedTuple):
 class Writer:
     """Write the records of steps: emit is a name of KINDS, form one of FORMS, number writes floats.
 
-    leaders: the commands of leaders too, not only of followers.
+    leaders: the commands of leaders too, not only of followers.  labelled: say in a comment whose a message of YAML is.
     """
 
     def __init__(
-        self, emit: str, form: str, number: Callable[[float], str] | None = None, *, leaders: bool = False,
+        self, emit: str, form: str, number: Callable[[float], str] | None = None, *,
+        leaders: bool = False, labelled: bool = False,
     ) -> None:  # fmt: skip
         """Settle what is written and how."""
         self._kind = KINDS["all commands" if leaders and emit == "commands" else emit]
         self._form = form
         self._number = number
         self._write: Callable[[Any], str] = getattr(self, f"_{form}")
+        self._labelled = labelled
         self._headed = False
 
     def write(self, step: Step) -> Iterator[str]:
@@ -75,7 +77,9 @@ class Writer:
         return ",".join(columns) + "\n" if self._form == "csv" and self._kind.bare_row is None else ""
 
     def _yaml(self, record: Any) -> str:
-        return "".join(_block(self._kind.message(record), self._number or repr)) + "---\n"
+        labels = self._kind.labels(record) if self._labelled else None
+        comment = f"# {labels['turtle']} at {labels['t']} s\n" if labels else ""
+        return comment + "".join(_block(self._kind.message(record), self._number or repr)) + "---\n"
 
     def _json(self, record: Any) -> str:
         return f"{json_dump(self._kind.labels(record) | self._kind.message(record), self._number or repr)}\n"

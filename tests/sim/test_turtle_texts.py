@@ -186,6 +186,13 @@ def test_yaml_and_json_say_the_same(emit: str) -> None:
     assert [{key: each[key] for key in document} for each, document in zip(objects, documents, strict=True)] == documents
 
 
+def test_a_message_of_several_turtles_says_whose_it_is() -> None:
+    writer = Writer("commands", "yaml", labelled=True)
+    texts = [text for step in simulate(tutorial(followers=2, duration=0.0)) for text in writer.write(step)]
+    assert [text.splitlines()[0] for text in filter(None, texts)] == ["# turtle2 at 0.0 s", "# turtle3 at 0.0 s"]
+    assert len(read_script(Source("commands", "".join(texts)))) == 2
+
+
 @pytest.mark.parametrize("emit", ["commands", "poses"])
 def test_text_and_csv_have_the_same_columns_and_rows(emit: str) -> None:
     text, csv = (written(emit, form).splitlines() for form in ("text", "csv"))
