@@ -13,8 +13,9 @@ from frametool.errors import ValueInvalid
 from frametool.geometry.elementary import doubled_arctan, half_sincos, largest
 
 __all__ = [
-    "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
-    "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some", "sqrt", "where",
+    "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos",
+    "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some", "sqrt",
+    "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -23,9 +24,9 @@ if TYPE_CHECKING:
 
     from frametool.geometry.kinds import Array, Components, Kernel, Number, Pair, Quaternion
 
-BLOCK = 16384  # rows: numpy's calls cost little beside their work, and a kernel's temporaries stay in the cache
+BLOCK = 12288  # rows: numpy's calls cost little beside their work, and the temporaries of a kernel stay in the cache
 SQRT_HALF = float(np.sqrt(0.5))
-np.empty(BLOCK * 128)  # 16 MiB given back untouched: from then on glibc reuses a block's memory instead of mapping anew
+np.empty(2**21)  # 16 MiB given back untouched: from then on glibc reuses the memory of blocks instead of mapping anew
 
 
 def length(x: Number, y: Number, z: Number) -> Number:

@@ -6,8 +6,9 @@ from math import atan2, cbrt, copysign, cos, degrees, fmod, frexp, ldexp, radian
 from math import hypot as length
 
 __all__ = [
-    "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
-    "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some", "sqrt", "where",
+    "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos",
+    "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some", "sqrt",
+    "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
