@@ -1,0 +1,81 @@
+"""One record of a recording: where a frame was seen from its parent, at one time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import TypeAlias
+
+    Components: TypeAlias = tuple[float, float, float, float, float, float, float]
+
+
+class Sample(NamedTuple):
+    """The pose of `child` in `parent` as tx, ty, tz (metres), x, y, z, w (unit).
+
+    stamp_ns is None where the source says that the edge stands still; line is that of the record, 0 if there is none.
+    """
+
+    parent: str
+    child: str
+    components: Components
+    stamp_ns: int | None
+    line: int = 0
+
+
+class Names(dict[str, str]):
+    """Frame names by the text they stand in: quotes off, one leading `/` off; each is worked out once."""
+
+    def __init__(self) -> None:
+        """Begin with no name known; `slashed` collects those that began with `/`."""
+        super().__init__()
+        self.slashed: list[str] = []
+
+    def __missing__(self, text: str) -> str:
+        """Work a name out; "" for a text that YAML takes for nothing, which is no name."""
+        name = text[1:-1].replace("''", "'") if text[0] in "\"'" else text
+        self[text] = "" if text in {"null", "Null", "NULL"} else self.bare(name)
+        return self[text]
+
+    def bare(self, name: str) -> str:
+        """Take one leading `/` off, as tf2 does, and remember it."""
+        if not name.startswith("/") or len(name) == 1:
+            return name
+        if name not in self.slashed:
+            self.slashed.append(name)
+        return name[1:]
+
+
+class Tally:
+    """What is worth telling about a recording once it is read: counted here, told at the end."""
+
+    __slots__ = ("names", "noise", "others", "rough", "warnings")
+
+    def __init__(self) -> None:
+        """Begin with nothing to tell; `rough` and `noise` hold line numbers, `others` counts by topic."""
+        self.names = Names()
+        self.noise: list[tuple[int, str]] = []
+        self.rough: list[int] = []
+        self.others: dict[str, int] = {}
+        self.warnings: list[str] = []
+
+    def told(self) -> Iterator[str]:
+        """Give one sentence for each kind of oddity."""
+        if self.rough:
+            yield f"{_times(self.rough, 'quaternion')} off norm 1 by up to 1e-3 and normalised (first in line {self.rough[0]})"
+        if self.names.slashed:
+            names = ", ".join(map(repr, self.names.slashed[:5]))
+            yield f"the leading / is no part of a name and was left out: {names}"
+        if self.noise:
+            line, text = self.noise[0]
+            yield f"{len(self.noise)} lines that a tool printed between messages were skipped (line {line}: {text!r})"
+        if self.others:
+            kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
+            yield f"messages without transforms were left out: {kinds}"
+        yield from self.warnings
+
+
+def _times(lines: list[int], what: str) -> str:
+    return f"a {what} was" if len(lines) == 1 else f"{len(lines)} {what}s were"
