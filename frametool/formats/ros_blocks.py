@@ -70,10 +70,11 @@ ROS1 = """\
 
 
 class Spelling(NamedTuple):
-    """How one of the tools prints a transform: a matcher of it, and how many lines it takes."""
+    """How one of the tools prints a transform: a matcher of it, how many lines it takes, which one names the child."""
 
     match: Callable[[str, int], re.Match[str] | None]
     lines: int
+    child: int
 
 
 def _spelling(layout: str) -> Spelling:
@@ -81,7 +82,8 @@ def _spelling(layout: str) -> Spelling:
     pattern = layout.replace(":\n", ": ?\n").replace("-\n", "- ?\n")
     for mark, group in (("NUMBER", NUMBER), ("WHOLE", WHOLE), ("NAME", NAME)):
         pattern = pattern.replace(mark, group)
-    return Spelling(re.compile(pattern, re.ASCII).match, layout.count("\n"))
+    child = layout[: layout.index("child_frame_id")].count("\n")
+    return Spelling(re.compile(pattern, re.ASCII).match, layout.count("\n"), child)
 
 
 SPELLINGS = (_spelling(ROS2), _spelling(ROS1))
@@ -112,7 +114,7 @@ class Blocks:
             found = []
             at, line = head.end(), self.line + 1
             while entry := spelling.match(text, at):
-                sample = _sample(entry.groups(), self.tally, line)
+                sample = _sample(entry.groups(), self.tally, line + spelling.child)
                 if sample is None:
                     return
                 found.append(sample)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from frametool.formats.ros_parts import slash_note
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,30 +53,27 @@ class Names(dict[str, str]):
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
-    __slots__ = ("names", "noise", "others", "rough", "warnings")
+    __slots__ = ("names", "noise", "notes", "others", "rough")
 
     def __init__(self) -> None:
-        """Begin with nothing to tell; `rough` and `noise` hold line numbers, `others` counts by topic."""
+        """Begin with nothing to tell; `rough` and `noise` hold line numbers, `others` and `notes` count."""
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
         self.rough: list[int] = []
         self.others: dict[str, int] = {}
-        self.warnings: list[str] = []
+        self.notes: dict[str, int] = {}
 
     def told(self) -> Iterator[str]:
         """Give one sentence for each kind of oddity."""
         if self.rough:
             yield f"{_times(self.rough, 'quaternion')} off norm 1 by up to 1e-3 and normalised (first in line {self.rough[0]})"
-        if self.names.slashed:
-            names = ", ".join(map(repr, self.names.slashed[:5]))
-            yield f"the leading / is no part of a name and was left out: {names}"
         if self.noise:
             line, text = self.noise[0]
             yield f"{len(self.noise)} lines that a tool printed between messages were skipped (line {line}: {text!r})"
         if self.others:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
             yield f"messages without transforms were left out: {kinds}"
-        yield from self.warnings
+        yield from dict.fromkeys((*map(slash_note, self.names.slashed), *self.notes))
 
 
 def _times(lines: list[int], what: str) -> str:

@@ -1,0 +1,196 @@
+"""Recordings of transforms: files, bags and standard input, read as a stream of samples in bounded memory."""
+
+from __future__ import annotations
+
+import re
+import sys
+import warnings
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import FileProblem, FormatError, FrametoolWarning, warn
+from frametool.formats import ros
+from frametool.formats.detect import BAGS, FORMS, HEAD, detect
+from frametool.formats.pieces import Piece, documents
+from frametool.formats.ros_stream import Message, document_messages, end_of_document, read_messages
+from frametool.formats.samples import Sample, Tally
+from frametool.formats.source import read_text
+from frametool.formats.values import Misfit, Reading, as_mapping
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from os import PathLike
+    from typing import BinaryIO
+
+    from frametool.formats.values import Path
+
+    Report = Callable[[FormatError], None]
+
+_CHILD = re.compile("child_frame_id")
+
+
+class Recording:
+    """A file that was opened and looked at: its name for messages, its form, its bytes."""
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        """Open a file, a bag's folder, or standard input for `-`, and detect its form.
+
+        Raises FileProblem.
+        """
+        self.path = str(path)
+        self.name = "stdin" if self.path == "-" else self.path
+        self.form = "bag2"
+        self.tally = Tally()
+        self.stream: BinaryIO | None = None
+        if not _is_bag_folder(self.path):
+            self.stream = _opened(self.path)
+            self.form = detect(self.stream.peek(HEAD)[:HEAD])  # type: ignore[attr-defined]
+
+    @property
+    def holds_samples(self) -> bool:
+        """Tell a recording from a tree in YAML or JSON."""
+        return self.form != "tree"
+
+    @property
+    def described(self) -> str:
+        """Say what the file was taken for."""
+        return f"{self.name}: {FORMS[self.form]}"
+
+    def text(self) -> str:
+        """Give the whole text of a tree."""
+        self.close()
+        return read_text(self.path)
+
+    def close(self) -> None:
+        """Let go of a file; standard input stays open."""
+        if self.stream is not None and self.path != "-":
+            self.stream.close()
+
+    def samples(self, report: Report | None = None) -> Iterator[Sample]:
+        """Give the samples in the order they were recorded, then warn of what was odd.
+
+        report: takes the errors, and reading goes on behind them; without it the first one is raised.
+        """
+        try:
+            yield from _samples(self, report or _raise)
+        finally:
+            self.close()
+        for sentence in self.tally.told():
+            warn(f"{self.name}: {sentence}")
+
+
+def _raise(error: FormatError) -> None:
+    raise error
+
+
+def _is_bag_folder(path: str) -> bool:
+    """Tell the folder that ROS 2 records into."""
+    import os
+
+    return os.path.isdir(path) and os.path.exists(os.path.join(path, "metadata.yaml"))  # noqa: PTH110, PTH112, PTH118 - pathlib costs 6 ms at start-up
+
+
+def _opened(path: str) -> BinaryIO:
+    """Open for reading with a buffer that can be looked into."""
+    import io
+
+    if path == "-":
+        stdin = sys.stdin.buffer
+        return stdin if hasattr(stdin, "peek") else io.BufferedReader(stdin)  # type: ignore[arg-type]
+    try:
+        return open(path, "rb", buffering=HEAD)  # noqa: PTH123, SIM115 - pathlib costs 6 ms; read to its end
+    except OSError as error:
+        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+    except ValueError as error:
+        raise FileProblem(f"{path!r} is no file name: {error}") from None
+
+
+def _samples(recording: Recording, report: Report) -> Iterator[Sample]:
+    """Choose the reader."""
+    if recording.form in BAGS:
+        from frametool.formats.bags import read_bag
+
+        yield from read_bag(recording.path, recording.tally)
+        return
+    assert recording.stream is not None
+    if recording.form == "echo":
+        for piece in documents(recording.stream, recording.name):
+            yield from _echo(piece, recording, report)
+        return
+    for message in read_messages(recording.stream, recording.name, recording.form, recording.tally):
+        yield from _message_samples(message, recording.tally, report)
+
+
+def _echo(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample]:
+    """Read plain documents fast and the others in full."""
+    from frametool.formats.ros_blocks import Blocks
+
+    blocks = Blocks(piece.text, piece.line, recording.tally)
+    while True:
+        yield from blocks.samples()
+        if blocks.at >= len(piece.text):
+            return
+        text = piece.text[blocks.at : end_of_document(piece.text, blocks.at)]
+        for message in document_messages(Piece(text, blocks.line), recording.name, recording.tally):
+            yield from _message_samples(message, recording.tally, report)
+        blocks.at += len(text)
+        blocks.line += text.count("\n")
+
+
+def _message_samples(message: Message | FormatError, tally: Tally, report: Report) -> Iterator[Sample]:
+    """Give the samples of one message; what is wrong with one of them does not touch the others."""
+    if isinstance(message, FormatError):
+        report(message)
+        return
+    try:
+        found = list(_transforms(message.value, (), tally))
+    except Misfit as misfit:
+        report(message.error(misfit))
+        return
+    lines = _child_lines(message, len(found))
+    still = ros.topic_of(message.value).endswith("tf_static")
+    for (transform, path), line in zip(found, lines, strict=True):
+        reading = Reading(message.source)
+        try:
+            parent, child, position, rotation, stamp_ns = _read_counting(transform, reading, tally, line)
+        except Misfit as misfit:
+            report(message.error(misfit.below(*path)))
+            continue
+        tally.notes.update((note, line) for _, note in reading.notes)
+        yield Sample(parent, child, (*position, *rotation), None if still else stamp_ns, line)
+
+
+def _read_counting(transform: dict[str, Any], reading: Reading, tally: Tally, line: int) -> Any:
+    """Read one transform; warnings of a rotation that had to be normalised are counted instead of told."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", FrametoolWarning)
+        found = ros.read_transform(transform, reading)
+    tally.rough += [line] * len(caught)
+    return found
+
+
+def _transforms(value: Any, path: Path, tally: Tally) -> Iterator[tuple[dict[str, Any], Path]]:
+    """Give every transform of a message, or of a list of messages; count messages that hold none."""
+    if type(value) is list:
+        for index, item in enumerate(value):
+            yield from _transforms(item, (*path, index), tally)
+        return
+    mapping = as_mapping(value, "a message with transforms")
+    inner = mapping["msg"] if ros.is_envelope(mapping) else mapping
+    if ros.is_message(inner):
+        yield from ros.messages(mapping, path)
+    elif "op" in mapping:
+        topic = str(mapping.get("topic") or f"op {mapping['op']}")
+        tally.others[topic] = tally.others.get(topic, 0) + 1
+    else:
+        keys = ", ".join(map(repr, list(mapping)[:8]))
+        raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
+
+
+def _child_lines(message: Message, count: int) -> list[int]:
+    """Give the lines that name the children of a message's transforms."""
+    if message.source.text.count("\n") > 1:
+        text = message.source.text
+        offsets = [match.start() for match in _CHILD.finditer(text)]
+        if len(offsets) == count:
+            return [message.line + text.count("\n", 0, offset) for offset in offsets]
+    return [message.line] * count
