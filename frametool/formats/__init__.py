@@ -15,11 +15,22 @@ class Row(NamedTuple):
 
 
 FORMATS = {
-    "yaml": Row("frametool.formats.yaml_form", (".yaml", ".yml"), "YAML, as trees and poses are read", ("poses", "points", "tree")),
-    "json": Row("frametool.formats.json_form", (".json", ".jsonl"), "JSON, one object a line", ("poses", "points", "tree")),
+    "yaml": Row(
+        "frametool.formats.yaml_form",
+        (".yaml", ".yml"),
+        "YAML, as trees and poses are read",
+        ("poses", "points", "tree"),
+    ),
+    "json": Row(
+        "frametool.formats.json_form", (".json", ".jsonl"), "JSON, one object a line", ("poses", "points", "tree")
+    ),
     "csv": Row("frametool.formats.csv_form", (".csv",), "CSV with a header", ("poses", "points")),
-    "ros1": Row("frametool.formats.ros_form", (), "messages as `rostopic echo` prints them", ("poses", "points", "tree")),
-    "ros2": Row("frametool.formats.ros_form", (), "messages as `ros2 topic echo` prints them", ("poses", "points", "tree")),
+    "ros1": Row(
+        "frametool.formats.ros_form", (), "messages as `rostopic echo` prints them", ("poses", "points", "tree")
+    ),
+    "ros2": Row(
+        "frametool.formats.ros_form", (), "messages as `ros2 topic echo` prints them", ("poses", "points", "tree")
+    ),
     "foxglove": Row("frametool.formats.foxglove", (), "FrameTransform as JSON, one a line", ("poses", "tree")),
     "dot": Row("frametool.formats.dot", (".dot", ".gv"), "graphviz", ("tree",)),
     "mermaid": Row("frametool.formats.mermaid", (".mmd",), "a mermaid flowchart", ("tree",)),

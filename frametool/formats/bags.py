@@ -59,7 +59,7 @@ def _sample(message: Any, number: int, path: str, tally: Tally, *, still: bool) 
     moved, turned = message.transform.translation, message.transform.rotation
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
     parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(message.child_frame_id)
-    components = unit_components(*numbers, tally, number)
+    components = unit_components(tally, number, *numbers)
     if components is None or not parent or not child:
         raise FormatError(f"message {number}: {_complaint(parent, child, numbers)}", source=path)
     stamp = message.header.stamp

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 HEAD: Final = 1 << 16
 """How many bytes are looked at."""
 
-# what stands between messages because the tools or the shell print it there; `lost` is the only one that ends a document
+# what the tools or the shell print between messages; the note about lost messages is the one that ends a document
 NOISE = re.compile(
     r"""(?x) \ufeff? (?:
       A\ message\ was\ lost!!! | \ttotal\ count\ change:\ ?\d+ | \ttotal\ count:\ ?\d+(?:---)?
@@ -33,7 +33,9 @@ FORMS = {
 }
 BAGS = ("bag1", "bag2", "mcap")
 _MAGIC = ((b"#ROSBAG V2.0", "bag1"), (b"SQLite format 3\0", "bag2"), (b"\x89MCAP0\r\n", "mcap"))
-_ECHO = re.compile(r"(?:transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force): *$")
+_ECHO = re.compile(
+    r"(?:transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force): *$"
+)
 _FLOW_ECHO = re.compile(r"(?:transforms|header): *[\[{]")
 _CSV2 = re.compile(r"-?\d+,\d+,[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$")
 _MESSAGE_KEY = re.compile(r'"(?:child_frame_id|transforms|frame_id|op)"')

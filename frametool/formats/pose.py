@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from frametool.formats.values import Quaternion, Vector
+    from frametool.geometry.kinds import Rigid
 
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001}
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", "stamp_ns", "distance", "angle", "angle_deg"))
@@ -45,7 +46,7 @@ class Pose(NamedTuple):
         return cls((tx, ty, tz), (x, y, z, w), name, parent)
 
     @property
-    def components(self) -> tuple[float, float, float, float, float, float, float]:
+    def components(self) -> Rigid:
         """Give tx, ty, tz, x, y, z, w; what is missing is 0 and the identity."""
         return (*(self.position or (0.0, 0.0, 0.0)), *(self.rotation or (0.0, 0.0, 0.0, 1.0)))
 
@@ -60,6 +61,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
     Raises Misfit with the path of what is wrong below this mapping.
     """
+    if not POSE_KEYS.issuperset(mapping):
+        _refuse_unknown_keys(mapping, also)
     position: Vector | None = None
     rotation: Quaternion | None = None
     outer_degrees = reading.degrees
@@ -75,8 +78,6 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
                 rotation = turned if rotation is None else _agreeing_rotation(rotation, turned)
                 if moved is not None:
                     position = _only_position(position, moved)
-            elif key not in POSE_KEYS and key not in also:
-                raise _unknown_keys(mapping, also)
     except Misfit as error:
         raise error.below(key) from None
     except ValueInvalid as error:
@@ -154,9 +155,11 @@ def _agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
     return first
 
 
-def _unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> Misfit:
+def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:
     """Name every unknown key of an entry, each with its nearest known one."""
     known = POSE_KEYS.union(also)
     unknown = [key for key in mapping if key not in known]
-    named = "; ".join(f"unknown key {key!r}{did_you_mean(key, known).replace('; ', ', ')}" for key in unknown)
-    return Misfit(f"{named}; a pose has xyz and one rotation: {', '.join(REPRESENTATIONS)}", (unknown[0],), key=True)
+    if unknown:
+        named = "; ".join(f"unknown key {key!r}{did_you_mean(key, known).replace('; ', ', ')}" for key in unknown)
+        choices = ", ".join(REPRESENTATIONS)
+        raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)

@@ -95,9 +95,9 @@ def _opened(path: str) -> BinaryIO:
 
     if path == "-":
         stdin = sys.stdin.buffer
-        return stdin if hasattr(stdin, "peek") else io.BufferedReader(stdin)  # type: ignore[arg-type]
+        return stdin if hasattr(stdin, "peek") else io.BufferedReader(stdin)  # type: ignore[type-var]
     try:
-        return open(path, "rb", buffering=HEAD)  # noqa: PTH123, SIM115 - pathlib costs 6 ms; read to its end
+        return open(path, "rb", buffering=HEAD)  # noqa: PTH123 - pathlib costs 6 ms at start-up
     except OSError as error:
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:
@@ -111,13 +111,12 @@ def _samples(recording: Recording, report: Report) -> Iterator[Sample]:
 
         yield from read_bag(recording.path, recording.tally)
         return
-    assert recording.stream is not None
-    if recording.form == "echo":
+    if recording.stream is not None and recording.form == "echo":
         for piece in documents(recording.stream, recording.name):
             yield from _echo(piece, recording, report)
-        return
-    for message in read_messages(recording.stream, recording.name, recording.form, recording.tally):
-        yield from _message_samples(message, recording.tally, report)
+    elif recording.stream is not None:
+        for message in read_messages(recording.stream, recording.name, recording.form, recording.tally):
+            yield from _message_samples(message, recording.tally, report)
 
 
 def _echo(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample]:

@@ -24,6 +24,7 @@ LISTS = ("transforms", "static_transforms")
 STALE = "euler_angles_degree"  # Apollo writes it beside the quaternion and does not keep it up to date
 BESIDE_LIST = ("timestamp",)  # of a FrameTransforms message
 PARTS = "a TransformStamped has header, child_frame_id, transform"
+STALE_DEGREES = 0.1
 
 
 def is_message(value: dict[str, Any]) -> bool:
@@ -77,10 +78,12 @@ def read_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str,
 
 def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) -> None:
     """Compare the angles beside a quaternion with it; the quaternion is what counts."""
+    from math import degrees
+
     from frametool.geometry import floats, quaternion
 
     path = ("transform", STALE)
-    _, angles = within(path, read_rotation, "rpy_deg", value, reading)
-    apart = quaternion.distance(*rotation, *angles, floats)
-    if apart > 0.1 * 3.141592653589793 / 180.0:
-        reading.note(f"{STALE} differs from the quaternion by {apart * 180.0 / 3.141592653589793:.3g} degrees; the quaternion is used", *path)
+    angles: Quaternion = within(path, read_rotation, "rpy_deg", value, reading)[1]
+    apart = degrees(quaternion.distance(*rotation, *angles, floats))
+    if apart > STALE_DEGREES:
+        reading.note(f"{STALE} differs from the quaternion by {apart:.3g} degrees; the quaternion is used", *path)

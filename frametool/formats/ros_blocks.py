@@ -130,7 +130,7 @@ def _sample(texts: tuple[str, ...], tally: Tally, line: int) -> Sample | None:
     """Make the record of one transform's texts; None for one that needs a closer look."""
     parent, child = tally.names[texts[2]], tally.names[texts[3]]
     try:
-        components = unit_components(*map(float, texts[4:]), tally, line)
+        components = unit_components(tally, line, *map(float, texts[4:]))
     except ValueError:
         return None
     if not parent or not child or components is None:
@@ -139,7 +139,7 @@ def _sample(texts: tuple[str, ...], tally: Tally, line: int) -> Sample | None:
 
 
 def unit_components(
-    tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float, tally: Tally, line: int,
+    tally: Tally, line: int, tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float
 ) -> Components | None:
     """Check the numbers of one transform as every door does; None for those that are refused there."""
     squared = x * x + y * y + z * z + w * w

@@ -19,18 +19,18 @@ from frametool.frames.stamps import BILLION
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-TRANSFORM1 = (
-    "header.seq header.stamp header.frame_id child_frame_id transform.translation.x transform.translation.y "
-    "transform.translation.z transform.rotation.x transform.rotation.y transform.rotation.z transform.rotation.w"
-).split()
-_STAMP2 = ["header.stamp.sec", "header.stamp.nanosec"]
-TRANSFORM2 = [*_STAMP2, *TRANSFORM1[2:]]
-_XYZ = ("x", "y", "z")
-_TWIST = [f"{part}.{axis}" for part in ("linear", "angular") for axis in _XYZ]
-_POINT = [*_STAMP2, "header.frame_id", *(f"point.{axis}" for axis in _XYZ)]
-_POSE = [
-    *_STAMP2, "header.frame_id", *(f"pose.position.{axis}" for axis in _XYZ), *(f"pose.orientation.{axis}" for axis in "xyzw"),
-]
+
+def _axes(part: str, axes: str = "xyz") -> list[str]:
+    return [f"{part}.{axis}" for axis in axes]
+
+
+_RIGID = ["child_frame_id", *_axes("transform.translation"), *_axes("transform.rotation", "xyzw")]
+_HEADER2 = ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id"]
+TRANSFORM1 = ["header.seq", "header.stamp", "header.frame_id", *_RIGID]
+TRANSFORM2 = [*_HEADER2, *_RIGID]
+_TWIST = [*_axes("linear"), *_axes("angular")]
+_POINT = [*_HEADER2, *_axes("point")]
+_POSE = [*_HEADER2, *_axes("pose.position"), *_axes("pose.orientation", "xyzw")]
 _MANY = re.compile(r"field\.(\w*?)0\.header\.seq")
 
 
@@ -62,7 +62,9 @@ def _entries(cells: Sequence[str], names: Sequence[str]) -> list[dict[str, Any]]
     """Take the transforms of one row apart."""
     size = len(names)
     if not cells or len(cells) % size:
-        raise Misfit(f"expected {size} cells for each transform, found {len(cells)} (nothing is quoted: a comma in a name?)")
+        raise Misfit(
+            f"expected {size} cells for each transform, found {len(cells)} (nothing is quoted: a comma in a name?)"
+        )
     return [_nested(names, cells[at : at + size]) for at in range(0, len(cells), size)]
 
 

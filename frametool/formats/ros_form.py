@@ -90,10 +90,10 @@ def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
 
 def _position(record: dict[str, Any]) -> dict[str, float] | None:
     """Find the coordinates of a point in any of its spellings."""
-    values = next((value for value in record.values() if isinstance(value, list)), None)
-    if values is None:
-        values = [(next((inner for inner in record.values() if isinstance(inner, dict)), record)).get(axis) for axis in "xyz"]
-    return dict(zip("xyz", values, strict=True)) if len(values) == 3 and all(type(each) is float for each in values) else None
+    inner = next((value for value in record.values() if isinstance(value, (list, dict))), record)
+    values: list[Any] = inner if isinstance(inner, list) else [inner.get(axis) for axis in "xyz"]
+    is_point = len(values) == 3 and all(type(each) is float for each in values)
+    return dict(zip("xyz", values, strict=True)) if is_point else None
 
 
 def _ros2_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[str]:

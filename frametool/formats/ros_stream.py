@@ -32,7 +32,7 @@ class Message(NamedTuple):
     value: Any
     source: Source
     line: int
-    index: int = 0
+    document: int = 0
     cells: bool = False
 
     def error(self, misfit: Misfit) -> FormatError:
@@ -40,7 +40,7 @@ class Message(NamedTuple):
         if self.cells:
             error = FormatError(str(misfit), source=self.source.name, line=1, snippet="")
         else:
-            error = format_error(self.source, (self.index, *misfit.path), str(misfit), key=misfit.key)
+            error = format_error(self.source, (self.document, *misfit.path), str(misfit), key=misfit.key)
         error.line += self.line - 1
         return error
 

@@ -66,7 +66,8 @@ class Tally:
     def told(self) -> Iterator[str]:
         """Give one sentence for each kind of oddity."""
         if self.rough:
-            yield f"{_times(self.rough, 'quaternion')} off norm 1 by up to 1e-3 and normalised (first in line {self.rough[0]})"
+            count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
+            yield f"{count} off norm 1 by up to 1e-3 and normalised (first in line {self.rough[0]})"
         if self.noise:
             line, text = self.noise[0]
             yield f"{len(self.noise)} lines that a tool printed between messages were skipped (line {line}: {text!r})"
@@ -74,7 +75,3 @@ class Tally:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
             yield f"messages without transforms were left out: {kinds}"
         yield from dict.fromkeys((*map(slash_note, self.names.slashed), *self.notes))
-
-
-def _times(lines: list[int], what: str) -> str:
-    return f"a {what} was" if len(lines) == 1 else f"{len(lines)} {what}s were"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from frametool.geometry.kinds import Array, Components, Kernel, Numbers
+    from frametool.geometry.kinds import Array, Components, Kernel, Matrix, Numbers
 
 
 def single(components: Components) -> bool:
@@ -24,14 +24,14 @@ def single(components: Components) -> bool:
     return all(type(part) is float for part in components)
 
 
-def columns(value: Numbers, width: int, name: str) -> Components:
+def columns(value: Any, width: int, name: str) -> Components:
     """Take `(..., width)` numbers apart into columns; those of one item become floats and are checked to be finite.
 
     Raises:
         ValueInvalid: another shape, no numbers, or one item that is not finite.
     """
-    if type(value) in (list, tuple) and len(value) == width and all(type(part) in (float, int) for part in value):  # type: ignore[arg-type, union-attr]
-        return finite(tuple(map(float, value)), name)  # type: ignore[arg-type]
+    if isinstance(value, (list, tuple)) and len(value) == width and all(type(part) in (float, int) for part in value):
+        return finite(tuple(map(float, value)), name)
     array = as_numbers(value, name)
     if array.ndim == 0 or array.shape[-1] != width:
         raise ValueInvalid(f"{name}: expected shape (..., {width}), got {array.shape}")
@@ -57,14 +57,14 @@ def matrices(value: Numbers, size: int, name: str) -> Components:
     return parts(array.reshape(*array.shape[:-2], size * size), name)
 
 
-def scalars(value: Numbers, name: str) -> Any:
+def scalars(value: Any, name: str) -> Any:
     """Take one number as a float, or an array of any shape as it is.
 
     Raises:
         ValueInvalid: no numbers, or not finite.
     """
     if type(value) in (float, int):
-        return finite((float(value),), name)[0]  # type: ignore[arg-type]
+        return finite((float(value),), name)[0]
     array = as_numbers(value, name)
     return finite((float(array),), name)[0] if array.ndim == 0 else _all_finite((array,), name)[0]
 
@@ -95,7 +95,11 @@ def finite(values: tuple[float, ...], name: str) -> tuple[float, ...]:
 
 def complain_of(columns: Components, name: str) -> Callable[[], None]:
     """Make the look for the first row that is not finite, for kernels that ran into one."""
-    return lambda: _all_finite(columns, name) and None
+
+    def complain() -> None:
+        _all_finite(columns, name)
+
+    return complain
 
 
 def _all_finite(columns: Components, name: str) -> Components:
@@ -199,7 +203,8 @@ def refuse_or_warn(off: Any, given: Components, name: str, what: str, check: Cal
     odd = (off > quaternion.SILENT) & ~bad
     if odd.any():
         largest = float(np.max(off, where=odd, initial=0.0))
-        warn(f"{name}: {int(odd.sum())} of {odd.size} {what} are off by up to {largest:.2g} (first: {at_first(name, odd)}) and were normalised")
+        count = f"{int(odd.sum())} of {odd.size} {what}"
+        warn(f"{name}: {count} are off by up to {largest:.2g} (first: {at_first(name, odd)}) and were normalised")
 
 
 def rotation_quaternions(given: Components, name: str, *, normalize: bool) -> Components:
@@ -218,24 +223,26 @@ def rotation_quaternions(given: Components, name: str, *, normalize: bool) -> Co
         return arrays.run(_matrix_sifter(given, name, normalize=normalize), 4, given)
 
 
-def _plainly_rotations(*entries: Any) -> Components:
+def _plainly_rotations(*given: Any) -> Components:
     """Convert a block of matrices that need no word."""
     from frametool.geometry import arrays
 
+    entries: Matrix = given
     off = matrix.defect(*entries, arrays)
     if not arrays.largest(off) <= quaternion.SILENT or not matrix.determinant(*entries).min(initial=1.0) > 0.0:
         raise _Irregular
     return matrix.to_quaternion(*_projected(entries, off > matrix.ORTHONORMAL), arrays)
 
 
-def _projected(entries: Components, rough: Any) -> Components:
+def _projected(entries: Matrix, rough: Any) -> Matrix:
     """Replace the rough rows of a block by their nearest rotations."""
     from frametool.geometry import arrays
 
     if not rough.any():
         return entries
-    nearest = matrix.nearest(*matrix.scaled(*(entry[rough] for entry in entries), arrays), arrays)
-    after = tuple(entry.copy() for entry in entries)
+    chosen_rows: Matrix = tuple(entry[rough] for entry in entries)
+    nearest = matrix.nearest(*matrix.scaled(*chosen_rows, arrays), arrays)
+    after: Matrix = tuple(entry.copy() for entry in entries)
     for column, values in zip(after, nearest, strict=True):
         column[rough] = values
     return after
@@ -247,7 +254,8 @@ def _matrix_sifter(given: Components, name: str, *, normalize: bool) -> Kernel:
 
     from frametool.geometry import arrays
 
-    def grade(*entries: Any) -> Components:
+    def grade(*block: Any) -> Components:
+        entries: Matrix = block
         off = matrix.defect(*entries, arrays)
         volume = matrix.relative_volume(*entries, arrays)
         return (np.where(volume > matrix.SINGULAR, 0.0 if normalize else off, np.inf),)
@@ -255,7 +263,8 @@ def _matrix_sifter(given: Components, name: str, *, normalize: bool) -> Kernel:
     (off,) = arrays.run(grade, 1, given)
     refuse_or_warn(off, given, name, "matrices", lambda row: matrix.check(*row, normalize=normalize))
 
-    def kernel(*entries: Any) -> Components:
+    def kernel(*block: Any) -> Components:
+        entries: Matrix = block
         rough = matrix.defect(*entries, arrays) > matrix.ORTHONORMAL
         return matrix.to_quaternion(*_projected(entries, rough), arrays)
 
@@ -361,17 +370,14 @@ def stacked(components: Components) -> Array:
 
 
 def joined(given: Components, name: str) -> Components:
-    """Bring components to one kind and shape, finite, nothing shared with the caller."""
+    """Bring components to one kind and shape, the first three finite, nothing shared with the caller."""
     if single(given):
         return given
     import numpy as np
 
-    try:
-        shape = np.broadcast_shapes(*(np.shape(part) for part in given))
-    except ValueError:
-        shapes = " and ".join(sorted({str(np.shape(part)) for part in given}))
-        raise ValueInvalid(f"{name}: batch shapes {shapes} do not broadcast") from None
-    out = np.empty((len(given), *shape))
+    from frametool.geometry import arrays
+
+    out = np.empty((len(given), *arrays.batch_shape(given)))
     for target, part in zip(out, given, strict=True):
         target[...] = part
     if not np.isfinite(out[:3].sum()):

@@ -9,6 +9,7 @@ from math import isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rotvec
+from frametool.geometry.quaternion import cross
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def _line(start: Number, end: Number, fraction: Number, xp: Namespace) -> Number
     """Interpolate two numbers from the nearer end, and give the very ends at 0 and 1."""
     step = end - start
     between = xp.where(fraction < 0.5, start + fraction * step, end - (1.0 - fraction) * step)
-    return xp.where(fraction == 0.0, start, xp.where(fraction == 1.0, end, between))
+    return quaternion.ends(start, between, end, fraction, xp)
 
 
 def distance(
@@ -114,11 +115,10 @@ def exp(vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number, 
     v in metres, w in radians, linear part first as in ROS messages.
     Source: Murray, Li & Sastry 1994: t = v + B w x v + C w x (w x v), B = (1 - cos a)/a^2, C = (a - sin a)/a^3.
     """
-    angle = xp.length(wx, wy, wz)
+    angle = xp.maximum(xp.length(wx, wy, wz), quaternion.TINY)
     half_sine, half_cosine = xp.half_sincos(angle)
-    tiny, low = angle < quaternion.TINY, angle < SERIES_EXP
-    safe = xp.where(tiny, 1.0, angle)
-    ratio = xp.where(tiny, 0.5, half_sine / safe)
+    low = angle < SERIES_EXP
+    ratio = half_sine / angle
     low_square, high = xp.where(low, angle, 0.0), xp.where(low, SERIES_EXP, angle)
     series = _polynomial(low_square * low_square, SINE_REST)
     second = xp.where(low, series, (high - 2.0 * half_sine * half_cosine) / (high * high * high))
@@ -127,7 +127,7 @@ def exp(vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number, 
     first = 2.0 * ratio * ratio
     return (
         vx + (first * cx + second * dx), vy + (first * cy + second * dy), vz + (first * cz + second * dz),
-        *rotvec.to_quaternion(wx, wy, wz, xp),
+        wx / angle * half_sine, wy / angle * half_sine, wz / angle * half_sine, half_cosine,
     )  # fmt: skip
 
 
@@ -146,11 +146,6 @@ def log(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: 
     cx, cy, cz = cross(wx, wy, wz, tx, ty, tz)
     dx, dy, dz = cross(wx, wy, wz, cx, cy, cz)
     return tx + (factor * dx - 0.5 * cx), ty + (factor * dy - 0.5 * cy), tz + (factor * dz - 0.5 * cz), wx, wy, wz
-
-
-def cross(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Vector:
-    """Give the vector product."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def _polynomial(x: Number, coefficients: tuple[float, ...]) -> Number:

@@ -215,7 +215,7 @@ class Rotation:
 
     def distance(self, other: Rotation) -> Any:
         """Give the angle in [0, pi] radians of the rotation between two."""
-        return doors.number(quaternion.distance, (*self._components, *other._components))
+        return doors.number(quaternion.distance, (*self._components, *require(other, "other").components))
 
     def is_close(self, other: Rotation, *, angle: float = NEAR) -> Any:
         """Say per element whether two rotations are within an angle in radians; q and -q are one."""
@@ -226,7 +226,7 @@ class Rotation:
 
         fraction: a number, or an array that broadcasts with the rotations.
         """
-        parts = (*self._components, *other._components, doors.scalars(fraction, "fraction"))
+        parts = (*self._components, *require(other, "other").components, doors.scalars(fraction, "fraction"))
         return self._of_columns(doors.run_with_xp(quaternion.slerp, 4, parts))
 
     def mean(self, weights: Numbers | None = None) -> Rotation:

@@ -6,7 +6,7 @@ Knows no names and no time. `a_from_b` takes points seen in b to the same points
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import doors, floats, matrix, quaternion, rigid
+from frametool.geometry import doors, floats, matrix, rigid
 from frametool.geometry.rotation import NEAR, Rotation, require
 
 TYPE_CHECKING = False
@@ -33,7 +33,7 @@ class Transform:
         """Join a rotation and a translation of shape (..., 3) in metres; batch shapes broadcast."""
         shift = doors.columns(translation, 3, "translation")
         parts = (*shift, *require(rotation, "rotation").components)
-        self._components = doors.joined(parts, "translation")  # type: ignore[assignment]
+        self._components = doors.joined(parts, "translation")
 
     @classmethod
     def of(cls, tx: Any, ty: Any, tz: Any, x: Any, y: Any, z: Any, w: Any) -> Transform:
