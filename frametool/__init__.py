@@ -15,6 +15,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.formats.load import load as load
+    from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.tree import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
@@ -26,9 +27,18 @@ _HOMES = {
     "FrametoolError": "frametool.errors",
     "Rotation": "frametool.geometry.rotation",
     "Transform": "frametool.geometry.transform",
+    "TransformBuffer": "frametool.frames.buffer",
     "load": "frametool.formats.load",
 }
-__all__ = ["FrameTree", "FrametoolError", "Rotation", "Transform", "__version__", "load"]  # noqa: F822 - loaded below
+__all__ = [  # noqa: F822 - loaded below
+    "FrameTree",
+    "FrametoolError",
+    "Rotation",
+    "Transform",
+    "TransformBuffer",
+    "__version__",
+    "load",
+]
 
 
 def __getattr__(name: str) -> object:

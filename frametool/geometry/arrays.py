@@ -6,9 +6,9 @@ The only module of the core that needs numpy at import.
 from __future__ import annotations
 
 import numpy as np
+from numpy import any as some
 from numpy import arctan2 as atan2
 from numpy import cbrt, ceil, copysign, degrees, frexp, ldexp, maximum, minimum, radians, sqrt, where
-from numpy import any as some
 
 from frametool.errors import ValueInvalid
 

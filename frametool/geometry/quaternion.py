@@ -16,7 +16,7 @@ EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: what lies within 4 is left alone, bit for bit
 SILENT = 1e-6
 TOLERATED = 1e-3
-TINY = 1e-150  # the least angle or sine divided by: sin(x)/x there is 1, and numbers down to 1e-308 survive the quotient
+TINY = 1e-150  # the least angle divided by: sin(x)/x is 1 there, and parts down to 1e-308 survive the quotient
 
 
 def squared_norm(x: Number, y: Number, z: Number, w: Number) -> Number:
@@ -24,7 +24,9 @@ def squared_norm(x: Number, y: Number, z: Number, w: Number) -> Number:
     return x * x + y * y + z * z + w * w
 
 
-def product(ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number) -> Quaternion:
+def product(
+    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number
+) -> Quaternion:
     """Multiply two quaternions of any norm: the rotation b followed by the rotation a (Hamilton 1843)."""
     return (
         aw * bx + ax * bw + ay * bz - az * by,
@@ -38,12 +40,7 @@ def compose(
     ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number
 ) -> Quaternion:
     """Multiply two unit quaternions and take the rounding off the norm: multiples of 90 degrees stay exact."""
-    return settled(
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
+    return settled(*product(ax, ay, az, aw, bx, by, bz, bw))
 
 
 def settled(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
