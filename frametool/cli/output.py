@@ -82,6 +82,15 @@ class Output:
         """Write points."""
         self.text(self._module("frametool.view.pose_text").write_points(records, self.style))
 
+    def report(self, entries: Sequence[dict[str, Any]]) -> None:
+        """Write flat records that are neither poses nor points."""
+        if self.style.form != "text":
+            self.text(self._module("").write_points(entries, self.style))
+            return
+        from frametool.view.report_text import write_report
+
+        self.text(write_report(entries, self.style))
+
     def _module(self, text_module: str) -> Any:
         return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)
 

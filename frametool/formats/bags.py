@@ -48,13 +48,14 @@ def _transforms(reader: Any, path: str, tally: Tally) -> Iterator[Sample]:
     if not topics:
         known = ", ".join(sorted({connection.topic for connection in reader.connections}))
         raise FormatError(f"no transforms in the bag; its topics: {known or 'none'}", source=path)
-    for number, (topic, _, data) in enumerate(reader.messages(connections=topics), 1):
+    for number, (topic, received_ns, data) in enumerate(reader.messages(connections=topics), 1):
         still = topic.topic.endswith("tf_static")
         for transform in reader.deserialize(data, topic.msgtype).transforms:
-            yield _sample(transform, number, path, tally, still=still)
+            sample = _sample(transform, number, path, tally)
+            yield sample._replace(stamp_ns=None if still else sample.stamp_ns, received_ns=received_ns)
 
 
-def _sample(message: Any, number: int, path: str, tally: Tally, *, still: bool) -> Sample:
+def _sample(message: Any, number: int, path: str, tally: Tally) -> Sample:
     """Give one TransformStamped as a sample."""
     moved, turned = message.transform.translation, message.transform.rotation
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
@@ -63,7 +64,7 @@ def _sample(message: Any, number: int, path: str, tally: Tally, *, still: bool) 
     if components is None or not parent or not child:
         raise FormatError(f"message {number}: {_complaint(parent, child, numbers)}", source=path)
     stamp = message.header.stamp
-    return Sample(parent, child, components, None if still else stamp.sec * BILLION + stamp.nanosec, number)
+    return Sample(parent, child, components, stamp.sec * BILLION + stamp.nanosec, number)
 
 
 def _complaint(parent: str, child: str, numbers: tuple[float, ...]) -> str:

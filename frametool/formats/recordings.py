@@ -13,7 +13,7 @@ from frametool.formats.detect import BAGS, FORMS, HEAD, detect
 from frametool.formats.pieces import Piece, documents
 from frametool.formats.ros_stream import Message, document_messages, end_of_document, read_messages
 from frametool.formats.samples import Sample, Tally
-from frametool.formats.source import read_text
+from frametool.formats.source import Source, read_text
 from frametool.formats.values import Misfit, Reading, as_mapping
 
 if TYPE_CHECKING:
@@ -76,6 +76,19 @@ class Recording:
             self.close()
         for sentence in self.tally.told():
             warn(f"{self.name}: {sentence}")
+
+
+def samples_of(recording: Recording, report: Report | None = None) -> Iterator[Sample]:
+    """Give what a recording or a tree holds as samples; the frames of a tree that stands still have no stamp."""
+    if recording.holds_samples:
+        yield from recording.samples(report)
+        return
+    from frametool.formats.load import edges_of
+
+    for found in edges_of(Source(recording.name, recording.text())):
+        edge = found.edge
+        if edge.parent is not None:
+            yield Sample(edge.parent, edge.child, edge.pose.components, edge.stamp_ns)
 
 
 def _raise(error: FormatError) -> None:
@@ -155,7 +168,7 @@ def _message_samples(message: Message | FormatError, tally: Tally, report: Repor
             report(message.error(misfit.below(*path)))
             continue
         tally.notes.update((note, line) for _, note in reading.notes)
-        yield Sample(parent, child, (*position, *rotation), None if still else stamp_ns, line)
+        yield Sample(parent, child, (*position, *rotation), None if still else stamp_ns, line, message.received_ns)
 
 
 def _read_counting(transform: dict[str, Any], reading: Reading, tally: Tally, line: int) -> Any:

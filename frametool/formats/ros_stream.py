@@ -34,6 +34,7 @@ class Message(NamedTuple):
     line: int
     document: int = 0
     cells: bool = False
+    received_ns: int | None = None
 
     def error(self, misfit: Misfit) -> FormatError:
         """Make the error for what does not fit in this message, placed in the whole file."""
@@ -124,6 +125,7 @@ def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Messa
         except Misfit as misfit:
             yield FormatError(str(misfit), source=name, line=number)
             return
-        yield Message(value, Source(name, line), number, cells=True)
+        received = int(cells[0]) if form == "csv1" and cells[0].isdecimal() else None
+        yield Message(value, Source(name, line), number, cells=True, received_ns=received)
 
     yield from _by_line(stream, name, tally, read)

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 class Sample(NamedTuple):
     """The pose of `child` in `parent` as tx, ty, tz (metres), x, y, z, w (unit).
 
-    stamp_ns is None where the source says that the edge stands still; line is that of the record, 0 if there is none.
+    stamp_ns is None where the source says that the edge stands still; line is that of the record, 0 if there is none;
+    received_ns says when the recorder got it, if that is known.
     """
 
     parent: str
@@ -25,6 +26,7 @@ class Sample(NamedTuple):
     components: Components
     stamp_ns: int | None
     line: int = 0
+    received_ns: int | None = None
 
 
 class Names(dict[str, str]):
