@@ -94,6 +94,14 @@ class Output:
     def _module(self, text_module: str) -> Any:
         return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)
 
+    def pieces(self, pieces: Iterable[str]) -> None:
+        """Write text as it comes; into a file, whole or not at all."""
+        if self.path is None or self.path == "-":
+            for piece in pieces:
+                sys.stdout.write(piece)
+        else:
+            write_whole(self.path, "".join(pieces), force=self.force)
+
     def text(self, text: str) -> None:
         """Write text to stdout, or to the file whole or not at all."""
         if self.path is None or self.path == "-":
