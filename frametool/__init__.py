@@ -30,15 +30,7 @@ _HOMES = {
     "TransformBuffer": "frametool.frames.buffer",
     "load": "frametool.formats.load",
 }
-__all__ = [  # noqa: F822 - loaded below
-    "FrameTree",
-    "FrametoolError",
-    "Rotation",
-    "Transform",
-    "TransformBuffer",
-    "__version__",
-    "load",
-]
+__all__ = ["FrameTree", "FrametoolError", "Rotation", "Transform", "TransformBuffer", "__version__", "load"]
 
 
 def __getattr__(name: str) -> object:

@@ -256,6 +256,7 @@ WRONG = {
     ("convert '{xyz: [1,2,x]}'", 2): "argument:1:12: 'x' is not a number",
     ("convert '{rpy_deg: [0,0,1], rotvec: [0,0,1]}'", 2):
         "argument:1:28: two rotations in one entry disagree by 56.2958 degrees; keep one",
+    ("convert {xyz:[1,2,3]}", 2): "argument:1:5: found unexpected ':'; write a blank after the colon",
     ("convert missing.yaml", 5): "missing.yaml: no such file or directory",
     ("lookup . a b", 2):
         "lookup: TREE is . but FRAMETOOL_TREE is not set; name a file; "
@@ -343,3 +344,11 @@ def test_a_quaternion_nearly_of_norm_1_is_normalised_with_a_warning(run: Run) ->
     outcome = run("convert", "--from", "quaternion", "0", "0", "0.7071", "0.7071")
     assert outcome.status == 0
     assert "has norm 0.99999 and was normalised" in outcome.err
+
+
+def test_what_a_file_holds_nearly_normalised_is_told_with_its_place(run: Run) -> None:
+    text = "frames:\n  - {name: b, parent: a, xyzw: [0, 0, 0.7071, 0.7071]}\n"
+    outcome = run("lookup", "near.yaml", "a", "b", files={"near.yaml": text})
+    assert outcome.status == 0
+    message = "quaternion 0 0 0.7071 0.7071 has norm 0.99999 and was normalised"
+    assert outcome.err == f"frametool: warning: near.yaml:2:5: {message}\n"

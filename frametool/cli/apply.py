@@ -12,8 +12,8 @@ from frametool.cli.poses import is_inline, poses_from, source_of, usage_if_inlin
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.numbers import parse_number
+from frametool.formats.points import Point, read_moveables
 from frametool.formats.pose import Pose
-from frametool.formats.records import Point, read_moveables
 from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:

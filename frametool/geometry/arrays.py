@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy import any as some
-from numpy import arctan2 as atan2
 from numpy import cbrt, ceil, copysign, degrees, frexp, ldexp, maximum, minimum, radians, sqrt, where
 
 from frametool.errors import ValueInvalid
 
 __all__ = [
-    "atan2", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
-    "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
+    "bearing", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
+    "incline", "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -57,6 +56,18 @@ def negated_where(condition: Number, *values: Number) -> Components:
     return tuple(
         where(condition, 0.0 - value, value) if np.any(value == 0.0) else value * sign for value in values
     )  # fmt: skip
+
+
+def incline(rise: Number, run: Number) -> Number:
+    """Give the angle of a direction with run >= 0; arctan of a quotient is twice as fast as arctan2."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle: Array = np.arctan(rise / run)
+    return angle
+
+
+def bearing(y: Number, x: Number) -> Number:
+    """Give the angle of a direction in [-pi, pi], NaN for none; arctan2 by way of the faster arctan."""
+    return incline(y, x + 0.0) + (x < 0.0) * copysign(np.pi, y)
 
 
 def half_sincos(angle: Number) -> Pair:

@@ -35,5 +35,6 @@ def axes_change(target: str, source: str) -> Rotation:
 
 def _named(name: str) -> Rotation:
     if name not in AXES:
-        raise ValueInvalid(f"unknown axes {name!r}{did_you_mean(name, AXES)}; axes: {', '.join(AXES)}")
+        near = did_you_mean(name, AXES) or ";"
+        raise ValueInvalid(f"unknown axes {name!r}{near} axes: {', '.join(AXES)}")
     return AXES[name][0]

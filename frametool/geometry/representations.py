@@ -231,9 +231,9 @@ def checked_axes(axes: str) -> str:
     """Give the name of an Euler convention back if it is one; else raise ValueInvalid with those there are."""
     if axes in euler.AXES:
         return axes
-    near = did_you_mean(axes.lower(), euler.AXES)
+    near = did_you_mean(axes.lower(), euler.AXES) or ";"
     raise ValueInvalid(
-        f"unknown Euler axes {axes!r}{near}; s (static axes) or r (rotating axes) and three letters: "
+        f"unknown Euler axes {axes!r}{near} s (static axes) or r (rotating axes) and three letters: "
         f"{', '.join(sorted(euler.AXES))}"
     )
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 NEAR = 1e-9  # rad: rotations closer than this count as close, three digits above the rounding of long chains
 
+_new = object.__new__
+
 
 class Rotation:
     """One rotation, or an array of them of any shape; frozen.
@@ -37,7 +39,7 @@ class Rotation:
     @classmethod
     def of(cls, x: Any, y: Any, z: Any, w: Any) -> Rotation:
         """Trust components to be unit, all floats or all arrays of one shape: the fast door without checks."""
-        made = cls.__new__(cls)
+        made = _new(cls)
         made._components = (x, y, z, w)  # noqa: SLF001 - its own class
         return made
 
@@ -193,11 +195,13 @@ class Rotation:
 
     def __matmul__(self, other: Rotation) -> Rotation:
         """Compose: a_from_b @ b_from_c is a_from_c."""
-        if not isinstance(other, Rotation):
+        if type(other) is not Rotation:
             return NotImplemented
         ours, theirs = self._components, other._components
-        if type(ours[3]) is float and type(theirs[3]) is float:
-            return Rotation.of(*quaternion.compose(*ours, *theirs))
+        if type(ours[3]) is type(theirs[3]) is float:
+            product = _new(Rotation)
+            product._components = quaternion.compose(*ours, *theirs)
+            return product
         return self._of_columns(batches.run(quaternion.compose, 4, (*ours, *theirs)))
 
     def inverse(self) -> Rotation:

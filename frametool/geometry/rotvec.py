@@ -29,7 +29,7 @@ def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace, *
     Relative accuracy holds down to 1e-300.  Half a turn leaves with the sign the quaternion has.
     """
     sine = xp.maximum(xp.length(x, y, z), TINY)
-    angle = xp.copysign(2.0 * xp.atan2(sine, abs(w)), w)
+    angle = xp.copysign(2.0 * xp.incline(sine, abs(w)), w)
     if degrees:
         angle = xp.degrees(angle)
     return x / sine * angle, y / sine * angle, z / sine * angle

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from frametool.geometry.kinds import Array, Components, Numbers, Rigid
 
 NEAR_BY = 1e-9  # metres: translations closer than this count as close
+_new = object.__new__
 
 
 class Transform:
@@ -38,7 +39,7 @@ class Transform:
     @classmethod
     def of(cls, tx: Any, ty: Any, tz: Any, x: Any, y: Any, z: Any, w: Any) -> Transform:
         """Trust components, all floats or all arrays of one shape, the quaternion unit: the fast door."""
-        made = cls.__new__(cls)
+        made = _new(cls)
         made._components = (tx, ty, tz, x, y, z, w)  # noqa: SLF001 - its own class
         return made
 
@@ -134,11 +135,13 @@ class Transform:
 
     def __matmul__(self, other: Transform) -> Transform:
         """Compose: a_from_b @ b_from_c is a_from_c."""
-        if not isinstance(other, Transform):
+        if type(other) is not Transform:
             return NotImplemented
         ours, theirs = self._components, other._components
-        if type(ours[6]) is float and type(theirs[6]) is float:
-            return Transform.of(*rigid.compose(*ours, *theirs))
+        if type(ours[6]) is type(theirs[6]) is float:
+            product = _new(Transform)
+            product._components = rigid.compose(*ours, *theirs)
+            return product
         return self._of_columns(batches.run(rigid.compose, 7, (*ours, *theirs)))
 
     def inverse(self) -> Transform:
