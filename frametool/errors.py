@@ -110,6 +110,10 @@ class FrametoolWarning(UserWarning):
     """Mark what was read, used and is nevertheless worth a look."""
 
 
+class Tf2Warning(FrametoolWarning):
+    """Mark what tf2 would have logged, in its words."""
+
+
 _listeners: list[list[str]] = []
 
 

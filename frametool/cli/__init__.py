@@ -10,7 +10,7 @@ import click
 
 from frametool import __version__
 from frametool.cli.help import WithHelp
-from frametool.errors import FrametoolError, FrametoolWarning, alternatives
+from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, alternatives
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,7 +116,7 @@ def run(arguments: list[str]) -> int:
     except (click.Abort, KeyboardInterrupt):
         return 130
     except FrametoolError as error:
-        return _complain(_with_snippet(error), error.exit_code)
+        return _report(error, arguments)
     except BrokenPipeError:
         return _die_of_closed_pipe()
     except OSError as error:
@@ -136,6 +136,16 @@ def _usage(error: click.ClickException) -> str:
     return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
 
 
+def _report(error: FrametoolError, arguments: Sequence[str]) -> int:
+    """Say what went wrong: as a sentence, or as an object where JSON was asked for."""
+    from frametool.cli.failures import as_json, wants_json
+
+    if not wants_json(arguments):
+        return _complain(_with_snippet(error), error.exit_code)
+    print(as_json(error), file=sys.stderr)  # noqa: T201
+    return error.exit_code
+
+
 def _with_snippet(error: FrametoolError) -> str:
     snippet = getattr(error, "snippet", "")
     return f"{error}\n{snippet}" if snippet else str(error)
@@ -147,7 +157,8 @@ def _complain(message: str, status: int) -> int:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"frametool: warning: {message}", file=sys.stderr)  # noqa: T201 - this is where warnings become text
+    start = "" if isinstance(message, Tf2Warning) else "frametool: warning: "
+    print(f"{start}{message}", file=sys.stderr)  # noqa: T201 - this is where warnings become text
 
 
 def _die_of_closed_pipe() -> int:

@@ -29,6 +29,7 @@ CHOICES = ("point", "vector", "pose")
 @click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
 @click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
+@verbose_option
 @rotation_options
 @pose_options
 @result_options("points")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.command import TEXT, Command
-from frametool.cli.recordings import opened, verbose_option
+from frametool.cli.recordings import opened
+from frametool.cli.trees import verbose_option
 from frametool.formats.findings import RULES, WRITERS, Finding
 from frametool.formats.lint import lint
 from frametool.formats.lint_reading import read_all
@@ -38,7 +39,7 @@ class CheckCommand(Command):
               help="how findings are written")  # fmt: skip
 @click.option("--strict", is_flag=True, help="let warnings fail too")
 @verbose_option
-def command(files: Sequence[str], form: str, strict: bool, verbose: bool) -> int:
+def command(files: Sequence[str], form: str, strict: bool) -> int:
     """Look for mistakes in FILES, trees and recordings, taken together as one tree.
 
     \b
@@ -50,7 +51,7 @@ def command(files: Sequence[str], form: str, strict: bool, verbose: bool) -> int
     --strict also if there is a warning; notes never fail. - is standard input.
     """
     findings: list[Finding] = []
-    recordings = opened(files, verbose=verbose)
+    recordings = opened(files)
     findings += lint(_everything(recordings, findings))
     order = {recording.name: index for index, recording in enumerate(recordings)}
     findings.sort(key=lambda each: (order.get(each.source, 0), each.line, each.column))

@@ -9,11 +9,12 @@ import click
 
 from frametool.cli.command import TEXT, Command, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
+from frametool.cli.times import Time, rules, rules_options
 from frametool.errors import NoDataAt
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result
-from frametool.frames.stamps import BILLION, parse_stamp
+from frametool.frames.stamps import BILLION
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,20 +25,7 @@ if TYPE_CHECKING:
 SKIPPED = 3
 
 
-class Stamp(click.ParamType):
-    """A time: decimal seconds or nanoseconds."""
-
-    name = "time"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Read it without going through a float."""
-        try:
-            return value if isinstance(value, int) else parse_stamp(str(value).strip())
-        except ValueError as error:
-            self.fail(str(error), param, ctx)
-
-
-STAMP = Stamp()
+STAMP = Time(latest=False)
 
 
 @click.command(cls=Command, name="echo")
@@ -50,11 +38,13 @@ STAMP = Stamp()
 @click.option("--stop", type=STAMP, metavar="T", help="end there  [default: when the first edge has no more]")
 @click.option("-l", "--limit", type=click.IntRange(1), metavar="N", help="at most so many blocks")
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this file too; may be repeated")
+@rules_options
+@verbose_option
 @rotation_options
 @result_options("poses")
 def command(
     tree: str, target: str, source: str, more: Sequence[str], rate: float, start: int | None, stop: int | None,
-    limit: int | None, format_name: str | None, output: str | None, **options: Any,
+    limit: int | None, moving: bool, cache: int | None, tf2: str | None, format_name: str | None, output: str | None, **options: Any,
 ) -> int:  # fmt: skip
     """Tell where SOURCE is seen from TARGET, time after time, as tf2_echo does on a running robot.
 
@@ -69,7 +59,7 @@ def command(
     """
     form = format_name or (None if output else "text")
     out = Output("poses", format_name=form, output=output, **options)
-    frames = load_tree(tree, more)
+    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
     target, source = frame_name(target, frames), frame_name(source, frames)
     times = _times(frames, target, source, rate, start, stop)
     failures: list[NoDataAt] = []

@@ -8,7 +8,8 @@ import click
 
 from frametool.cli.command import TEXT, Command, result_options
 from frametool.cli.output import Output
-from frametool.cli.recordings import opened, verbose_option
+from frametool.cli.recordings import opened
+from frametool.cli.trees import verbose_option
 from frametool.errors import FormatError
 from frametool.formats.monitor_form import chain_entry, edge_entry
 from frametool.formats.recordings import samples_of
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="read this recording too; may be repeated")
 @verbose_option
 @result_options("report")
-def command(recording: str, frames: Sequence[str], more: Sequence[str], verbose: bool, **options: Any) -> None:
+def command(recording: str, frames: Sequence[str], more: Sequence[str], **options: Any) -> None:
     """Tell the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
 
     \b
@@ -42,7 +43,7 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], verbose:
     if len(frames) not in (0, 2):
         raise click.UsageError(f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
     output = Output("report", **options)
-    logs = _logs(opened((recording, *more), verbose=verbose))
+    logs = _logs(opened((recording, *more)))
     children = chain(logs, frames[0], frames[1]) if frames else list(logs)
     entries = [edge_entry(logs[child]) for child in children]
     if frames:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 @click.command(cls=Command, name="tree")
 @click.argument("tree", type=TEXT)
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
+@verbose_option
 @rotation_options
 @result_options("tree")
 def command(tree: str, more: Sequence[str], **options: Any) -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import FormatError, FrametoolWarning
+from frametool.errors import FormatError
 from frametool.formats.documents import locate_many, parse_documents
 from frametool.formats.findings import Finding
 from frametool.formats.source import Source
@@ -74,15 +73,12 @@ def _read_recording(recording: Recording, find: Find) -> Iterator[Seen]:
         rule = rule_of(error.message, "syntax")
         find(Finding(rule, error.message, error.source, error.line, error.column))
 
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", FrametoolWarning)
-        for sample in recording.samples(report):
-            w_first = looks_w_first(sample.components)
-            column = 1 if sample.line else 0
-            yield Seen(*sample[:4], recording.name, sample.line, column, w_first)
-    for warning in caught:
-        message = str(warning.message).removeprefix(f"{recording.name}: ")
-        find(Finding(rule_of(message, "odd"), message, recording.name, 1, 1))
+    for sample in recording.samples(report, tell=False):
+        w_first = looks_w_first(sample.components)
+        column = 1 if sample.line else 0
+        yield Seen(*sample[:4], recording.name, sample.line, column, w_first)
+    for line, message in recording.tally.told():
+        find(Finding(rule_of(message, "odd"), message, recording.name, line, 1))
 
 
 def looks_w_first(components: Rigid) -> bool:
@@ -127,18 +123,14 @@ def _read_entry(
 ) -> None:  # fmt: skip
     """Read one entry; what it gives and what is to be said of it is kept with its path."""
     reading = Reading(source)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", FrametoolWarning)
-        try:
-            for edge in read_edges(entry.value, reading):
-                if edge.parent is not None:
-                    path = (document, *entry.place(edge.path))
-                    edges.append((edge, path, _written_w_first(entry, edge)))
-        except Misfit as misfit:
-            said.append((rule_of(str(misfit), "syntax"), str(misfit), (document, *entry.place(misfit.path))))
-    notes = [(message, path) for path, message in reading.notes]
-    notes += [(str(warning.message), entry.here) for warning in caught]
-    said += [(rule_of(message, "odd"), message, (document, *entry.place(path))) for message, path in notes]
+    try:
+        for edge in read_edges(entry.value, reading):
+            if edge.parent is not None:
+                path = (document, *entry.place(edge.path))
+                edges.append((edge, path, _written_w_first(entry, edge)))
+    except Misfit as misfit:
+        said.append((rule_of(str(misfit), "syntax"), str(misfit), (document, *entry.place(misfit.path))))
+    said += [(rule_of(note, "odd"), note, (document, *entry.place(path))) for path, note in reading.notes]
 
 
 def _written_w_first(entry: _Entry, edge: Any) -> bool:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 import sys
-import warnings
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FileProblem, FormatError, FrametoolWarning, warn
+from frametool.errors import FileProblem, FormatError, warn
 from frametool.formats import ros
 from frametool.formats.detect import BAGS, FORMS, HEAD, detect
 from frametool.formats.pieces import Piece, documents
@@ -65,17 +64,18 @@ class Recording:
         if self.stream is not None and self.path != "-":
             self.stream.close()
 
-    def samples(self, report: Report | None = None) -> Iterator[Sample]:
+    def samples(self, report: Report | None = None, *, tell: bool = True) -> Iterator[Sample]:
         """Give the samples in the order they were recorded, then warn of what was odd.
 
         report: takes the errors, and reading goes on behind them; without it the first one is raised.
+        tell: without it what was odd is only kept, in `tally`.
         """
         try:
             yield from _samples(self, report or _raise)
         finally:
             self.close()
-        for sentence in self.tally.told():
-            warn(f"{self.name}: {sentence}")
+        for line, sentence in self.tally.told() if tell else ():
+            warn(f"{self.name}:{line}: {sentence}")
 
 
 def samples_of(recording: Recording, report: Report | None = None) -> Iterator[Sample]:
@@ -167,16 +167,17 @@ def _message_samples(message: Message | FormatError, tally: Tally, report: Repor
         except Misfit as misfit:
             report(message.error(misfit.below(*path)))
             continue
-        tally.notes.update((note, line) for _, note in reading.notes)
         yield Sample(parent, child, (*position, *rotation), None if still else stamp_ns, line, message.received_ns)
 
 
 def _read_counting(transform: dict[str, Any], reading: Reading, tally: Tally, line: int) -> Any:
-    """Read one transform; warnings of a rotation that had to be normalised are counted instead of told."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", FrametoolWarning)
-        found = ros.read_transform(transform, reading)
-    tally.rough += [line] * len(caught)
+    """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
+    found = ros.read_transform(transform, reading)
+    for _, note in reading.notes:
+        if "normalised" in note:
+            tally.rough.append(line)
+        else:
+            tally.notes.setdefault(note, line)
     return found
 
 

@@ -65,15 +65,18 @@ class Tally:
         self.others: dict[str, int] = {}
         self.notes: dict[str, int] = {}
 
-    def told(self) -> Iterator[str]:
-        """Give one sentence for each kind of oddity."""
+    def told(self) -> Iterator[tuple[int, str]]:
+        """Give one sentence for each kind of oddity, and the first line it is about."""
         if self.rough:
             count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
-            yield f"{count} off norm 1 by up to 1e-3 and normalised (first in line {self.rough[0]})"
+            yield self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised"
         if self.noise:
             line, text = self.noise[0]
-            yield f"{len(self.noise)} lines that a tool printed between messages were skipped (line {line}: {text!r})"
+            count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
+            yield line, f"{count} printed between messages skipped: {text!r}"
         if self.others:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
-            yield f"messages without transforms were left out: {kinds}"
-        yield from dict.fromkeys((*map(slash_note, self.names.slashed), *self.notes))
+            yield 1, f"messages without transforms were left out: {kinds}"
+        for name in self.names.slashed:
+            self.notes.setdefault(slash_note(name), 1)
+        yield from ((line, note) for note, line in self.notes.items())

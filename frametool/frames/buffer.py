@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
 
-    from frametool.frames.track import Components
+    from frametool.geometry.kinds import Rigid
 
 FURTHEST_NS = 1 << 62  # differences of two such stamps fit into 64 bits; the year 2116
 MOST_PLANS = 1 << 14
@@ -80,7 +80,7 @@ class TransformBuffer:
             warn(f"frame {child!r} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
 
     def insert_components(
-        self, parent: str, child: str, components: Components, stamp_ns: int | None = None, *,
+        self, parent: str, child: str, components: Rigid, stamp_ns: int | None = None, *,
         static: bool | None = None, authority: str = "default_authority",
     ) -> bool:  # fmt: skip
         """Add tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `insert`.
@@ -104,7 +104,7 @@ class TransformBuffer:
         return self._admit(parent, child, components, stamp, standing=standing, authority=authority)
 
     def _admit(
-        self, parent: str, child: str, components: Components, stamp_ns: int, *, standing: bool, authority: str,
+        self, parent: str, child: str, components: Rigid, stamp_ns: int, *, standing: bool, authority: str,
     ) -> bool:  # fmt: skip
         """Add what may be the first of its frame, out of order, or against a rule."""
         track = self._tracks.get(child)
@@ -131,14 +131,14 @@ class TransformBuffer:
         self._plans.clear()
         return track
 
-    def _stand(self, track: Track, parent: str, components: Components) -> None:
+    def _stand(self, track: Track, parent: str, components: Rigid) -> None:
         if track.parents:
             self.policy.stand(track, parent, components)
         else:
             track.stand(parent, components)
         self._plans.clear()
 
-    def _move(self, track: Track, parent: str, components: Components, stamp_ns: int, authority: str) -> bool:
+    def _move(self, track: Track, parent: str, components: Rigid, stamp_ns: int, authority: str) -> bool:
         stamps = track.stamps
         if stamps and self.keep_ns is not None:
             self.policy.refuse_old(track, stamp_ns, self.keep_ns, authority)
@@ -155,7 +155,7 @@ class TransformBuffer:
             self.policy.prune_after(track, self.keep_ns)
         return False
 
-    def _repeat(self, track: Track, at: int, parent: str, components: Components, authority: str) -> bool:
+    def _repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:
         self._varies = self._varies or parent != track.parents[at]
         self._plans.clear()
         return self.policy.repeat(track, at, parent, components, authority)
@@ -171,11 +171,15 @@ class TransformBuffer:
             if line[-1] == child:
                 raise BadTopology(cycle_message([*line, parent]))
 
-    def add_frame(self, frame: str) -> None:
+    def add_root(self, frame: str) -> None:
         """Make a frame known that has no parent (yet)."""
         self._frames[frame] = None
 
-    add_root = add_frame
+    def make_stand(self, frame: str) -> None:
+        """Take the newest sample of a moving frame for its pose at all times."""
+        moved = self._tracks[frame]
+        track = self._begin(moved.parent, frame, standing=True)
+        track.stand(moved.parent, moved.samples[-1])
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -208,7 +212,7 @@ class TransformBuffer:
         """
         return Transform.of(*self.lookup_components(target, source, at_ns))
 
-    def lookup_components(self, target: str, source: str, at_ns: int | None = None) -> Components:
+    def lookup_components(self, target: str, source: str, at_ns: int | None = None) -> Rigid:
         """Give tx, ty, tz, x, y, z, w of target_from_source; otherwise as `lookup`."""
         plan = self._plans.get((target, source))
         if plan is None:

@@ -12,11 +12,11 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from frametool.frames.track import Components
+    from frametool.geometry.kinds import Rigid
 
-    Piece = Track | Components
+    Piece = Track | Rigid
 
-IDENTITY: Components = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Plan:
@@ -31,7 +31,7 @@ class Plan:
         self.moving = [piece for piece in (*self.to_target, *self.to_source) if isinstance(piece, Track)]
         self.fixed = None if self.moving else _joined(_product(self.to_target), _product(self.to_source))
 
-    def at(self, at_ns: int) -> Components | None:
+    def at(self, at_ns: int) -> Rigid | None:
         """Give target_from_source at a time; None if an edge has no data then."""
         if self.fixed is not None:
             return self.fixed
@@ -63,14 +63,14 @@ def _folded(tracks: Iterable[Track]) -> list[Piece]:
     return pieces
 
 
-def _product(pieces: Iterable[Piece]) -> Components:
+def _product(pieces: Iterable[Piece]) -> Rigid:
     """Give the product of at most one folded piece."""
     return next((piece for piece in pieces if not isinstance(piece, Track)), IDENTITY)
 
 
-def _product_at(pieces: Iterable[Piece], at_ns: int) -> Components | None:
+def _product_at(pieces: Iterable[Piece], at_ns: int) -> Rigid | None:
     """Compose the pieces at a time."""
-    product: Components | None = None
+    product: Rigid | None = None
     for piece in pieces:
         here = piece.at(at_ns) if isinstance(piece, Track) else piece
         if here is None:
@@ -79,7 +79,7 @@ def _product_at(pieces: Iterable[Piece], at_ns: int) -> Components | None:
     return IDENTITY if product is None else product
 
 
-def _joined(top_from_target: Components, top_from_source: Components) -> Components:
+def _joined(top_from_target: Rigid, top_from_source: Rigid) -> Rigid:
     """Give target_from_source; a branch without edges costs nothing and leaves the other's bits alone."""
     if top_from_target is IDENTITY:
         return top_from_source

@@ -12,7 +12,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.errors import LookupFailed
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.track import Components, Track
+    from frametool.frames.track import Track
+    from frametool.geometry.kinds import Rigid
 
 
 class Policy:
@@ -23,8 +24,8 @@ class Policy:
     default_keep_ns: int | None = None
 
     def admit(
-        self, parent: str, child: str, components: Components, authority: str,  # noqa: ARG002 - tf2's words name it
-    ) -> tuple[str, str, Components]:
+        self, parent: str, child: str, components: Rigid, authority: str,  # noqa: ARG002 - tf2's words name it
+    ) -> tuple[str, str, Rigid]:
         """Give names and numbers as they are kept.
 
         Raises ValueInvalid, BadTopology.
@@ -43,7 +44,7 @@ class Policy:
             raise BadTopology(f"frame {track.child!r} both stands still and moves")
         return standing
 
-    def stand(self, track: Track, parent: str, components: Components) -> None:
+    def stand(self, track: Track, parent: str, components: Rigid) -> None:
         """Take a further value of a standing frame: only the same."""
         if parent != track.parent:
             raise BadTopology(f"frame {track.child!r} has two parents: {track.parent!r} and {parent!r}")
@@ -59,7 +60,7 @@ class Policy:
                 f"{format_stamp(keep_ns)} s before its newest at {format_stamp(newest)}",
             )
 
-    def repeat(self, track: Track, at: int, parent: str, components: Components, authority: str) -> bool:  # noqa: ARG002
+    def repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:  # noqa: ARG002
         """Take a sample at the stamp of sample `at`: the last one holds.  Returns whether other data were replaced."""
         if track.parents[at] == parent and track.samples[at] == components:
             return False

@@ -15,7 +15,8 @@ from frametool.geometry import quaternion
 
 if TYPE_CHECKING:
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.track import Components, Track
+    from frametool.frames.track import Track
+    from frametool.geometry.kinds import Rigid
 
 TEN_SECONDS = 10 * BILLION
 LENGTH_TOLERANCE = 0.01  # of the squared norm
@@ -40,7 +41,7 @@ class Ros1(Policy):
     default_keep_ns = TEN_SECONDS
     between = 'with frame_id and child_frame_id  "'
 
-    def admit(self, parent: str, child: str, components: Components, authority: str) -> tuple[str, str, Components]:
+    def admit(self, parent: str, child: str, components: Rigid, authority: str) -> tuple[str, str, Rigid]:
         """Strip one slash of each name; refuse with every complaint at once."""
         parent, child = parent.removeprefix("/"), child.removeprefix("/")
         components = self.received(components)
@@ -49,11 +50,11 @@ class Ros1(Policy):
             raise Refused("Error:", *lines)
         return parent, child, _unit(components)
 
-    def received(self, components: Components) -> Components:
+    def received(self, components: Rigid) -> Rigid:
         """Give the numbers as they come out of the message."""
         return components
 
-    def _complaints(self, parent: str, child: str, components: Components, authority: str) -> list[str]:
+    def _complaints(self, parent: str, child: str, components: Rigid, authority: str) -> list[str]:
         """Give what tf2 logs of names and numbers, in its order."""
         start = f'Ignoring transform for child_frame_id "{child}" from authority "{authority}" because of'
         position, rotation = (" ".join(map(_number, part)) for part in (components[:3], components[3:]))
@@ -80,7 +81,7 @@ class Ros1(Policy):
         """Keep the kind of the first."""
         return track.standing
 
-    def stand(self, track: Track, parent: str, components: Components) -> None:
+    def stand(self, track: Track, parent: str, components: Rigid) -> None:
         """Overwrite the value."""
         track.stand(parent, components)
 
@@ -93,7 +94,7 @@ class Ros1(Policy):
         """Give the words for data from the past."""
         return (f"TF_OLD_DATA ignoring data from the past (Possible reasons are {EXPLAINED}) {what}",)
 
-    def repeat(self, track: Track, at: int, parent: str, components: Components, authority: str) -> bool:  # noqa: ARG002
+    def repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:  # noqa: ARG002
         """Refuse a second sample of a stamp."""
         what = _received(track.child, track.stamps[at], authority)
         raise Refused("Warning:", f"TF_REPEATED_DATA ignoring data with redundant timestamp {what}")
@@ -161,7 +162,7 @@ class Ros2(Ros1):
 
     between = 'with frame_id and  child_frame_id "'
 
-    def received(self, components: Components) -> Components:
+    def received(self, components: Rigid) -> Rigid:
         """Normalise the quaternion, as the way through a matrix does; of zero only nan is left."""
         tx, ty, tz, x, y, z, w = components
         norm = sqrt(x * x + y * y + z * z + w * w)
@@ -177,7 +178,7 @@ class Ros2(Ros1):
         """Give the words for data from the past."""
         return f"TF_OLD_DATA ignoring data from the past {what}", f"Possible reasons are {EXPLAINED}"
 
-    def repeat(self, track: Track, at: int, parent: str, components: Components, authority: str) -> bool:  # noqa: ARG002
+    def repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:  # noqa: ARG002
         """Drop an exact duplicate; keep other data too, the later insert as the lower bound."""
         stamp = track.stamps[at]
         while at >= 0 and track.stamps[at] == stamp:
@@ -234,7 +235,7 @@ def _walk(buffer: TransformBuffer, frame: str, stop: str, at_ns: int) -> tuple[s
     return frame, None
 
 
-def _unit(components: Components) -> Components:
+def _unit(components: Rigid) -> Rigid:
     """Give the pose with its quaternion unit: tf2 keeps it as given, half a percent off at most."""
     squared = sum(value * value for value in components[3:])
     if abs(squared - 1.0) <= quaternion.UNIT:

@@ -13,7 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any, TypeAlias
 
-    from frametool.geometry.kinds import Rigid as Components
+    from frametool.geometry.kinds import Rigid
 
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 
@@ -29,7 +29,7 @@ class Track:
         self.standing = standing
         self.stamps: list[int] = []
         self.parents: list[str] = []
-        self.samples: list[Components] = []
+        self.samples: list[Rigid] = []
         self.varies = False  # whether the parent changes
         self.segments: dict[int, Way] = {}  # sample -> what `segment.prepare` gave for it and the next
         self.table: Any = None  # the same for many lookups at once, as arrays
@@ -44,11 +44,11 @@ class Track:
         """Give the first and the last stamp of a moving frame."""
         return self.stamps[0], self.stamps[-1]
 
-    def stand(self, parent: str, components: Components) -> None:
+    def stand(self, parent: str, components: Rigid) -> None:
         """Set the one pose of a standing frame."""
         self.parents, self.samples = [parent], [components]
 
-    def add(self, stamp_ns: int, parent: str, components: Components) -> None:
+    def add(self, stamp_ns: int, parent: str, components: Rigid) -> None:
         """Sort a sample in, after those of the same stamp."""
         at = bisect_right(self.stamps, stamp_ns)
         self.varies = self.varies or (bool(self.parents) and parent != self.parents[0])
@@ -57,7 +57,7 @@ class Track:
         self.samples.insert(at, components)
         self.forget()
 
-    def replace(self, at: int, parent: str, components: Components) -> None:
+    def replace(self, at: int, parent: str, components: Rigid) -> None:
         """Put another sample in the place of one."""
         self.parents[at] = parent
         self.samples[at] = components
@@ -91,7 +91,7 @@ class Track:
         at = self.index(at_ns)
         return None if at is None else self.parents[at]
 
-    def at(self, at_ns: int) -> Components | None:
+    def at(self, at_ns: int) -> Rigid | None:
         """Give parent_from_child at a time, interpolated between two samples; None outside of them.
 
         Between samples under different parents the older one holds, as in tf2.

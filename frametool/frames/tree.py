@@ -11,6 +11,7 @@ from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+    from typing import Any
 
     from frametool.geometry.kinds import Rigid
 
@@ -126,6 +127,22 @@ class FrameTree:
             return target_from_top
         top_from_source = self._product(reversed(up))
         return rigid.compose(*target_from_top, *top_from_source) if down else top_from_source
+
+    def latest(self, target: str, source: str) -> None:
+        """Give no stamp, as nothing moves; raises UnknownFrame, NotConnected."""
+        self._between(target, source)
+
+    def lookup_across(
+        self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str
+    ) -> Transform:
+        """Give target_from_source by way of a fixed frame, as TransformBuffer does; any times are alike."""
+        return self.lookup(target, fixed, target_at_ns) @ self.lookup(fixed, source, source_at_ns)
+
+    def lookup_many(self, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
+        """Give target_from_source for each of many times, all alike; see TransformBuffer.lookup_many."""
+        from frametool.frames.batch import lookup_still
+
+        return lookup_still(self, target, source, at_ns, missing=missing)
 
     def _product(self, children: Iterable[str]) -> Rigid:
         """Compose the edges of the named children, topmost first."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from frametool.formats.results import rotation_numbers
 from frametool.frames.stamps import format_stamp
-from frametool.geometry import rigid
+from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def write_block(result: Result, style: Style) -> str:
 
 def _matrix(result: Result, decimals: int) -> Iterable[str]:
     """Give the four rows of the homogeneous matrix."""
-    numbers = rigid.to_homogeneous(*result.pose.components)
+    numbers = rigid.to_homogeneous(*result.pose.components, floats)
     for row in range(4):
         cells = (_fixed(value, decimals) for value in numbers[4 * row : 4 * row + 4])
         yield "".join(f" {cell:>{decimals + 3}}" for cell in cells)
