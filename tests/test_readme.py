@@ -52,6 +52,7 @@ def test_an_example_in_a_help_runs(name: str, command: str, bin_folder: Path, tm
     robot = console.ROOT / "examples" / "robot.yaml"
     for file in ("robot.yaml", "arm.yaml", "gripper.yaml"):
         (tmp_path / file).write_text(robot.read_text() if file != "gripper.yaml" else "frames: {gripper: {finger: {xyz: [0, 0, 0]}}}")
+    (tmp_path / "drive.yaml").write_text((console.ROOT / "examples" / "drive.yaml").read_text())
     console.printed("true", bin_folder)
     command = re.sub(r"\| dot -Tsvg -o (\S+)", r"> \1", command)
     done = subprocess.run(

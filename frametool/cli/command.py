@@ -147,6 +147,7 @@ def pose_options(function: Function) -> Function:
 
 
 def decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
+    """Give a command several options, in this order in its help."""
     for option in reversed(options):
         function = option(function)
     return function

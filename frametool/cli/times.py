@@ -67,7 +67,7 @@ def rules(*, moving: bool, cache: int | None, tf2: str | None) -> Rules:
     """Settle how moving frames are taken."""
     if cache is not None and cache < 0:
         raise click.UsageError("--cache takes seconds, not less than 0")
-    return Rules(moving, tf2 or "frametool", cache)
+    return Rules(moving=moving, policy=tf2 or "frametool", keep_ns=cache)
 
 
 def read_times(text: str) -> list[int] | range:

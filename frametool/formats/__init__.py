@@ -39,6 +39,7 @@ FORMATS = {
     "foxglove": Row("frametool.formats.foxglove", (), "FrameTransform as JSON, one a line", ("poses", "tree")),
     "static1": Row("frametool.formats.publisher", (), "static_transform_publisher of ROS 1", ("poses", "tree")),
     "static2": Row("frametool.formats.publisher", (), "static_transform_publisher of ROS 2", ("poses", "tree")),
+    "tf2": Row("frametool.formats.tf2_listing", (), "the listing of tf2's all_frames_as_yaml", ("tree",)),
     "dot": Row("frametool.formats.dot", (".dot", ".gv"), "graphviz", ("tree",)),
     "mermaid": Row("frametool.formats.mermaid", (".mmd",), "a mermaid flowchart", ("tree",)),
 }

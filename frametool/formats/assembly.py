@@ -5,37 +5,41 @@ Knows nothing of text: whoever reads says where each edge stood.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
-
 from frametool.errors import BadTopology, FormatError, ValueInvalid, warn
 from frametool.frames.tree import FrameTree
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Protocol
+
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.track import Track
     from frametool.geometry.kinds import Rigid
 
+    class Place(Protocol):
+        """Where an edge was read."""
 
-class Place(Protocol):
-    """Where an edge was read."""
+        def error(self, message: str, kind: type[FormatError]) -> FormatError:
+            """Make the error for this place."""
 
-    def error(self, message: str, kind: type[FormatError]) -> FormatError:
-        """Make the error for this place."""
-
-    def seen_from(self, other: Place) -> str:
-        """Name this place beside another one: `line 7`, or `other.yaml:7` in another source."""
+        def seen_from(self, other: Place) -> str:
+            """Name this place beside another one: `line 7`, or `other.yaml:7` in another source."""
 
 
-class Rules(NamedTuple):
-    """How moving frames are taken.
+class Rules:
+    """How moving frames are taken."""
 
-    moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still.
-    policy, keep_ns: as TransformBuffer has them.
-    """
+    __slots__ = ("keep_ns", "moving", "policy")
 
-    moving: bool = False
-    policy: str = "frametool"
-    keep_ns: int | None = None
+    def __init__(self, *, moving: bool = False, policy: str = "frametool", keep_ns: int | None = None) -> None:
+        """Keep the rules.
+
+        moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still.
+        policy, keep_ns: as TransformBuffer has them.
+        """
+        self.moving = moving
+        self.policy = policy
+        self.keep_ns = keep_ns
 
 
 class Assembly:

@@ -57,7 +57,7 @@ def load(
     policy, keep_ns: as TransformBuffer has them.
     Raises FormatError and BadTopology with file, line and column; FileProblem.
     """
-    return load_sources([open_source(path) for path in paths], Rules(moving, policy, keep_ns))
+    return load_sources([open_source(path) for path in paths], Rules(moving=moving, policy=policy, keep_ns=keep_ns))
 
 
 def open_source(path: str | PathLike[str]) -> Source | Recording:
@@ -80,7 +80,7 @@ def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = No
                 _add_tree(assembly, source)
             else:
                 _add_recording(assembly, source)
-    return assembly.finish()
+        return assembly.finish()
 
 
 def _add_tree(assembly: Assembly, source: Source) -> None:

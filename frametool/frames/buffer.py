@@ -121,6 +121,7 @@ class TransformBuffer:
         else:
             replaced = self._move(track, parent, components, stamp_ns, authority)
         self._frames[parent] = None
+        track.authority = authority
         return replaced
 
     def _begin(self, parent: str, child: str, *, standing: bool) -> Track:
@@ -190,6 +191,11 @@ class TransformBuffer:
     def roots(self) -> tuple[str, ...]:
         """Give the frames without a parent."""
         return tuple(frame for frame in self._frames if frame not in self._tracks)
+
+    def edges(self) -> Iterator[tuple[str, str, Transform]]:
+        """Walk the edges as (parent, child, parent_from_child), each as it was last, in the order of first mention."""
+        for track in self._tracks.values():
+            yield track.parents[-1], track.child, Transform.of(*track.samples[-1])
 
     def track(self, frame: str) -> Track | None:
         """Give what is known about a frame over time; None for a root."""

@@ -32,8 +32,8 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
         f"{_way(target, source, path)}{_whole(moving, begin, end)}{_clocks(short)}"
     )
     return (TooEarly if early else TooLate)(
-        message, parent=parent, child=worst.child, at_ns=at_ns, first_ns=first, last_ns=last, short_ns=short, short_s=short / BILLION,
-        target=target, source=source, path=frames_on(target, source, path),
+        message, parent=parent, child=worst.child, at_ns=at_ns, first_ns=first, last_ns=last, short_ns=short,
+        short_s=short / BILLION, target=target, source=source, path=frames_on(target, source, path),
         available_from_ns=begin if begin <= end else None, available_until_ns=end if begin <= end else None,
     )  # fmt: skip
 

@@ -21,6 +21,7 @@ class Policy:
 
     zero_counts = True  # whether a newest stamp of 0 is a time like any other
     refuses_cycles = True
+    listing_decimals = 3  # of stamps, where frames are listed
     default_keep_ns: int | None = None
 
     def admit(

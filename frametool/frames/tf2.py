@@ -161,6 +161,7 @@ class Ros2(Ros1):
     """tf2 of ROS 2: any quaternion is normalised, the last insert decides the kind, differing repeats are kept."""
 
     between = 'with frame_id and  child_frame_id "'
+    listing_decimals = 6
 
     def received(self, components: Rigid) -> Rigid:
         """Normalise the quaternion, as the way through a matrix does; of zero only nan is left."""

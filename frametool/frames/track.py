@@ -21,12 +21,13 @@ if TYPE_CHECKING:
 class Track:
     """The samples of one child frame: three parallel lists; a standing frame has one sample and no stamp."""
 
-    __slots__ = ("child", "parents", "samples", "segments", "stamps", "standing", "table", "varies")
+    __slots__ = ("authority", "child", "parents", "samples", "segments", "stamps", "standing", "table", "varies")
 
     def __init__(self, child: str, *, standing: bool) -> None:
         """Begin without samples."""
         self.child = child
         self.standing = standing
+        self.authority = "default_authority"  # who said so last
         self.stamps: list[int] = []
         self.parents: list[str] = []
         self.samples: list[Rigid] = []
