@@ -9,8 +9,8 @@ import click
 
 from frametool.cli.command import TEXT, Command, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
 from frametool.cli.times import Time, rules, rules_options
+from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
 from frametool.errors import NoDataAt
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result
@@ -44,7 +44,8 @@ STAMP = Time(latest=False)
 @result_options("poses")
 def command(
     tree: str, target: str, source: str, more: Sequence[str], rate: float, start: int | None, stop: int | None,
-    limit: int | None, moving: bool, cache: int | None, tf2: str | None, format_name: str | None, output: str | None, **options: Any,
+    limit: int | None, moving: bool, cache: int | None, tf2: str | None,
+    format_name: str | None, output: str | None, **options: Any,
 ) -> int:  # fmt: skip
     """Tell where SOURCE is seen from TARGET, time after time, as tf2_echo does on a running robot.
 

@@ -25,7 +25,8 @@ def _flag_options(function: Callable[..., None]) -> Callable[..., None]:
     """Add the flags of static_transform_publisher."""
     for name in reversed(FLAGS):
         metavar = "FRAME" if name.endswith("id") else "N"
-        function = click.option(f"--{name}", type=TEXT, metavar=metavar, help="as static_transform_publisher has it")(function)
+        option = click.option(f"--{name}", type=TEXT, metavar=metavar, help="as static_transform_publisher has it")
+        function = option(function)
     return function
 
 
@@ -52,7 +53,11 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
     form = options.pop("format_name")
     if not flags and len(arguments) == 1:
         output = Output("tree", format_name=form or "static2", deg=deg, **options)
-        output.tree(load_tree(arguments[0]))
+        tree = load_tree(arguments[0])
+        if not isinstance(tree, FrameTree):
+            moving = ", ".join(track.child for track in tree.tracks() if not track.standing)
+            raise ValueInvalid(f"frames move and cannot be published as static: {moving}")
+        output.tree(tree)
         return
     output = Output("tree", format_name=form, deg=deg, **options)
     tree = FrameTree("arguments")
@@ -63,9 +68,9 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
 
 def _pose(arguments: Sequence[str], flags: dict[str, str], reading: Reading) -> Pose:
     """Read the arguments of one call."""
+    if flags and arguments:
+        raise click.UsageError(f"extra arguments {' '.join(arguments)!r} beside the flags")
     try:
-        if flags and arguments:
-            raise ValueInvalid(f"extra arguments {' '.join(arguments)!r} beside the flags")
         pose = read_flags(flags, reading) if flags else read_positional(arguments, reading)
     except NotARotation:
         raise

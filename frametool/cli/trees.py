@@ -51,7 +51,7 @@ def announce(source: Source | Recording) -> None:
         click.echo(f"frametool: {described}", err=True)
 
 
-def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:  # noqa: FBT001 - click's signature
+def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:
     context.meta[VERBOSE] = chosen
 
 

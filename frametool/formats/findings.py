@@ -1,5 +1,6 @@
 """What `check` finds: one finding, the rules there are, and how findings are written.
 
+Example:
     robot.yaml:9:17: error: quaternion 0 0 0 0.9 has norm 0.9; .. [denormalized]
 """
 

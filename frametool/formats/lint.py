@@ -78,7 +78,8 @@ def lint(everything: Iterable[Seen]) -> Iterator[Finding]:
         if child is None:
             child = children[seen.child] = Child(seen)
         if seen.looks_w_first and (child.first is seen or not child.first.looks_w_first):
-            yield seen.finding("w-first", f"frame {seen.child!r} is turned by exactly 180 degrees about x; did you mean w first?")
+            message = f"frame {seen.child!r} is turned by exactly 180 degrees about x; did you mean w first?"
+            yield seen.finding("w-first", message)
         child.add(seen)
     for child in children.values():
         yield from _child(child)
@@ -105,7 +106,8 @@ def _standing(child: Child, name: str) -> Iterator[Finding]:
         parents = f"{first.parent!r} ({_at(first)}) and {other.parent!r} ({_at(other)})"
         yield other.finding("two-parents", f"frame {name!r} has two parents: {parents}")
     elif other := child.other_pose:
-        yield other.finding("two-poses", f"frame {name!r} has two different poses in {first.parent!r}; the first is {_at(first)}")
+        message = f"frame {name!r} has two different poses in {first.parent!r}: {_at(first)} and {_at(other)}"
+        yield other.finding("two-poses", message)
 
 
 def _moving(child: Child, name: str) -> Iterator[Finding]:
@@ -119,7 +121,8 @@ def _moving(child: Child, name: str) -> Iterator[Finding]:
         stamp = format_stamp(first.stamp_ns or 0)
         line = child.stamps[first.stamp_ns or 0][1]
         places = f"lines {line} and {first.line}"
-        yield first.finding("repeated-stamp", f"frame {name!r} has two poses at {stamp}: {places}{_more(child.clashes)}")
+        message = f"frame {name!r} has two poses at {stamp}: {places}{_more(child.clashes)}"
+        yield first.finding("repeated-stamp", message)
     if child.backward:
         first = child.backward[0]
         message = f"frame {name!r}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
@@ -171,7 +174,11 @@ def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
 
 def _roots(children: dict[str, Child]) -> Iterator[Finding]:
     """Tell of more than one root, at the first edge of the second."""
-    roots = {child.newest.parent: child.first for child in reversed(children.values()) if child.newest.parent not in children}
+    roots = {
+        child.newest.parent: child.first
+        for child in reversed(children.values())
+        if child.newest.parent not in children
+    }
     if len(roots) > 1:
         names = sorted(roots)
         seen = roots[names[1]]

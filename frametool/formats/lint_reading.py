@@ -83,7 +83,8 @@ def _read_recording(recording: Recording, find: Find) -> Iterator[Seen]:
 
 def looks_w_first(components: Rigid) -> bool:
     """Tell the rotation that the identity becomes when w is written first and read last."""
-    return abs(components[3]) == 1.0 and components[4] == components[5] == components[6] == 0.0
+    x, y, z, w = components[3:]
+    return bool(abs(x) == 1.0 and y == z == w == 0.0)
 
 
 class _Entry(NamedTuple):
@@ -162,7 +163,8 @@ def _entries(value: Any) -> Iterator[_Entry]:
 def _nested(value: dict[str, Any]) -> Iterator[_Entry]:
     """Walk a nested tree: each frame with its parent, without its children."""
     about = {key: each for key, each in value.items() if key != "frames"}
-    pending = [(root, children, ("frames", root)) for root, children in value["frames"].items()]
+    roots = value["frames"].items()
+    pending: list[tuple[str, Any, Path]] = [(root, children, ("frames", root)) for root, children in roots]
     for parent, children, path in pending:
         if type(children) is not dict:
             if children is not None:

@@ -94,7 +94,7 @@ def _add_tree(assembly: Assembly, source: Source) -> None:
 
 def _add_recording(assembly: Assembly, recording: Recording) -> None:
     sample = None
-    for sample in recording.samples():  # noqa: B007 - asked below whether there was one
+    for sample in recording.samples():
         spot = Spot(recording.name, sample.line)
         assembly.add(sample.parent, sample.child, sample.components, sample.stamp_ns, spot)
     if sample is None:

@@ -116,11 +116,12 @@ def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
     if not angles and "qw" not in flags:
         rotation[3] = "1"  # the tool's default, also beside other components: refused below unless they are 0
     numbers = [flags.get(name, "0") for name in XYZ]
-    return _pose(numbers, "rpy" if angles else "quaternion", rotation, flags["frame-id"], flags["child-frame-id"], reading)
+    key = "rpy" if angles else "quaternion"
+    return _pose(numbers, key, rotation, flags["frame-id"], flags["child-frame-id"], reading)
 
 
 def read_positional(words: Sequence[str], reading: Reading) -> Pose:
-    """Read the old spelling: 8 or 9 words, and maybe a period in ms after them; a numeric seventh means a quaternion."""
+    """Read the old spelling: 8 or 9 words, maybe a period in ms after them; a numeric seventh means a quaternion."""
     angles = len(words) >= 7 and not _NUMBER.match(words[6])
     size = 6 if angles else 7
     if len(words) not in (size + 2, size + 3):

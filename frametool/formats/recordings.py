@@ -12,7 +12,7 @@ from frametool.formats.detect import BAGS, FORMS, HEAD, detect
 from frametool.formats.pieces import Piece, documents
 from frametool.formats.ros_stream import Message, document_messages, end_of_document, read_messages
 from frametool.formats.samples import Sample, Tally
-from frametool.formats.source import Source, read_text
+from frametool.formats.source import MOST_CHARACTERS, Source, decode, read_text
 from frametool.formats.values import Misfit, Reading, as_mapping
 
 if TYPE_CHECKING:
@@ -56,8 +56,10 @@ class Recording:
 
     def text(self) -> str:
         """Give the whole text of a tree."""
-        self.close()
-        return read_text(self.path)
+        if self.stream is None or self.path != "-":
+            self.close()
+            return read_text(self.path)
+        return decode(self.stream.read(4 * MOST_CHARACTERS + 1), self.name)
 
     def close(self) -> None:
         """Let go of a file; standard input stays open."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.formats.json_form import dump as json_dump
+from frametool.formats.points import MESSAGE_KEYS
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result, rotation_numbers
 from frametool.formats.ros_parts import STAMPS
@@ -49,8 +50,25 @@ def write_messages(messages: Iterable[dict[str, Any]], style: Style) -> str:
 
 def message_text(message: dict[str, Any], style: Style) -> str:
     """Give one message and the line that ends it."""
+    message = _respelled(message, style.form)
     lines = _ros1_lines(message, style, "") if style.form == "ros1" else _ros2_lines(message, style, "")
     return "".join(f"{line}\n" for line in lines) + "---\n"
+
+
+def _respelled(value: Any, form: str) -> Any:
+    """Give a message with the headers and stamps of the other ROS, where it has those."""
+    if isinstance(value, list):
+        return [_respelled(each, form) for each in value]
+    if not isinstance(value, dict):
+        return value
+    for seconds, nanoseconds in STAMPS:
+        if value.keys() == {seconds, nanoseconds}:
+            return dict(zip(STAMPS[form == "ros1"], (value[seconds], value[nanoseconds]), strict=True))
+    made = {key: _respelled(each, form) for key, each in value.items()}
+    if "frame_id" in made and "stamp" in made:
+        seq = {"seq": made.pop("seq", 0)}
+        return seq | made if form == "ros1" else made
+    return made
 
 
 def transform_stamped(result: Result, style: Style) -> dict[str, Any]:
@@ -82,7 +100,7 @@ def stamp(stamp_ns: int, form: str) -> dict[str, int]:
 
 def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
     """Put a point or vector into its message; leave alone what has a header or is another message."""
-    if "header" in record or not (position := _position(record)):
+    if not MESSAGE_KEYS.isdisjoint(record) or not (position := _position(record)):
         return record
     key = "vector" if "vector" in record else "point"
     return {"header": header(record.get("frame"), record.get("stamp_ns"), style), key: position}

@@ -68,6 +68,7 @@ class Stamped(NamedTuple):
     covariance: Sequence[float] | None = None
     frame: str | None = None
     stamp_ns: int | None = None
+    form: str = ""  # how it was written: ros1, ros2, json; "" for the grammar of poses and points
 
     def moved(self, target_from_source: Rigid, target: str | None) -> Stamped:
         """Give the message as seen from the target, at its own stamp."""
@@ -150,7 +151,8 @@ def _numbers(key: str, inner: dict[str, Any], reading: Reading) -> Sequence[floa
 def _covariance(inner: dict[str, Any]) -> list[float]:
     """Read 36 numbers, row-major."""
     values = within(("covariance",), whole_list, inner["covariance"], "36 numbers")
-    numbers: tuple[float, ...] = within(("covariance",), read_numbers, values, [f"c{i}{j}" for i in range(6) for j in range(6)])
+    names = [f"c{row}{column}" for row in range(6) for column in range(6)]
+    numbers: tuple[float, ...] = within(("covariance",), read_numbers, values, names)
     return list(numbers)
 
 
@@ -193,7 +195,7 @@ def _each(value: Any, path: Path) -> Iterator[tuple[Any, Path]]:
         yield value, path
 
 
-def spelled_ros1(message: dict[str, Any]) -> bool:
-    """Tell whether a message is in ROS 1's spelling: by its stamp, else by nothing."""
-    header = message.get("header")
-    return type(header) is dict and ("seq" in header or "secs" in (header.get("stamp") or ()))
+def spelling(message: dict[str, Any]) -> str:
+    """Name the ROS that a message looks like: by its header, else the newer one."""
+    header = message.get("header") or {}
+    return "ros1" if "seq" in header or "secs" in (header.get("stamp") or ()) else "ros2"

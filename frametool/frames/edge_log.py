@@ -45,7 +45,9 @@ class EdgeLog:
         self.delays_ns: list[int] = []
         self._newest: Rigid | None = None
 
-    def add(self, parent: str, components: Rigid, stamp_ns: int | None, line: int = 0, received_ns: int | None = None) -> None:
+    def add(
+        self, parent: str, components: Rigid, stamp_ns: int | None, line: int = 0, received_ns: int | None = None
+    ) -> None:
         """Take one sample in; without a stamp the frame stands still."""
         self.count += 1
         if not self.parents or self.parents[-1] != parent:

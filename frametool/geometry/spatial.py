@@ -6,7 +6,6 @@ A transform is target_from_source as tx, ty, tz, x, y, z, w; vectors are three c
 from __future__ import annotations
 
 from frametool.geometry import quaternion
-from frametool.geometry.rigid import cross
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ def move_wrench(
     """
     force = quaternion.rotate(x, y, z, w, fx, fy, fz)
     torque = quaternion.rotate(x, y, z, w, mx, my, mz)
-    lever = cross(tx, ty, tz, *force)
+    lever = quaternion.cross(tx, ty, tz, *force)
     return (*force, torque[0] + lever[0], torque[1] + lever[1], torque[2] + lever[2])
 
 
@@ -43,7 +42,7 @@ def move_twist(
     """
     linear = quaternion.rotate(x, y, z, w, vx, vy, vz)
     angular = quaternion.rotate(x, y, z, w, wx, wy, wz)
-    arm = cross(tx, ty, tz, *angular)
+    arm = quaternion.cross(tx, ty, tz, *angular)
     return (linear[0] + arm[0], linear[1] + arm[1], linear[2] + arm[2], *angular)
 
 
@@ -67,7 +66,7 @@ def move_twist_covariance(
     tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float, covariance: Sequence[float]
 ) -> list[float]:
     """Move the 6 x 6 covariance of a twist: A C A^T, where A is what `move_twist` does."""
-    columns = [move_twist(tx, ty, tz, x, y, z, w, *[float(i == j) for j in range(6)]) for i in range(6)]  # type: ignore[arg-type]
+    columns = [move_twist(tx, ty, tz, x, y, z, w, *[float(i == j) for j in range(6)]) for i in range(6)]
     adjoint = _transposed(columns)
     rows = [covariance[6 * i : 6 * i + 6] for i in range(6)]
     return [value for row in _product(_product(adjoint, rows), columns) for value in row]

@@ -42,12 +42,9 @@ def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noq
     shown = [key for key in COLUMNS if any(entry[key] is not None for entry in edges)]
     rows = [[COLUMNS[key][0] for key in shown], *([COLUMNS[key][1](entry[key]) for key in shown] for entry in edges)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    table = "".join(
-        "  ".join(
-            f"{cell:<{width}}" if key in LEFT else f"{cell:>{width}}" for key, cell, width in zip(shown, row, widths, strict=True)
-        ).rstrip() + "\n"
-        for row in rows
-    )
+    sides = ["<" if key in LEFT else ">" for key in shown]
+    aligned = (zip(row, sides, widths, strict=True) for row in rows)
+    table = "".join("  ".join(f"{cell:{side}{width}}" for cell, side, width in row).rstrip() + "\n" for row in aligned)
     return table + "".join(map(_chain, (entry for entry in entries if entry["kind"] == "chain")))
 
 
@@ -57,7 +54,7 @@ def _chain(entry: dict[str, Any]) -> str:
     if first is None:
         said = "stands still: any time will do"
     elif first > last:
-        said = f"its edges have no time in common: one begins at {format_stamp(first)}, one ends at {format_stamp(last)}"
+        said = f"its edges share no time: one begins at {format_stamp(first)}, one ends at {format_stamp(last)}"
     else:
         said = f"all edges have data from {format_stamp(first)} to {format_stamp(last)} ({(last - first) / 1e9:.3f} s)"
     return f"{entry['parents']}: {said}\n"
