@@ -44,8 +44,9 @@ def command(files: Sequence[str], form: str, strict: bool) -> int:
 
     \b
       frametool check robot.yaml
-      frametool check tf.txt tf_static.txt --strict
-      frametool check *.yaml --format github
+      frametool check drive.yaml --strict
+      frametool check robot.yaml --format github
+      ros2 topic echo /tf > tf.txt; frametool check tf.txt tf_static.txt
 
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
     --strict also if there is a warning; notes never fail. - is standard input.
@@ -69,5 +70,6 @@ def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:
     """Count on stderr, and tell whether the files pass."""
     counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
     said = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
-    click.echo(f"frametool: {said or 'nothing found'}", err=True)
+    if said:
+        click.echo(f"frametool: {said}", err=True)
     return bool(counts["error"] or (strict and counts["warning"]))

@@ -31,9 +31,9 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], **option
     """Tell the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
 
     \b
+      frametool monitor drive.yaml
+      frametool monitor drive.yaml map box --format json
       ros2 topic echo /tf | frametool monitor -
-      frametool monitor tf.txt --with tf_static.txt map camera
-      frametool monitor drive.mcap --format json
 
     With TARGET and SOURCE only the edges between them are told, and the interval in which all of them have data.
     Rates are in stamp time: what the recorder's clock did is the delay, known from bags and `rostopic echo -p` only.

@@ -68,6 +68,7 @@ class Stamped(NamedTuple):
     covariance: Sequence[float] | None = None
     frame: str | None = None
     stamp_ns: int | None = None
+    listed: str = ""  # the list that a TFMessage holds it in
     form: str = ""  # how it was written: ros1, ros2, json; "" for the grammar of poses and points
 
     def moved(self, target_from_source: Rigid, target: str | None) -> Stamped:
@@ -81,7 +82,11 @@ class Stamped(NamedTuple):
         return self._replace(numbers=numbers, covariance=covariance, frame=target or self.frame)
 
     def mapping(self) -> dict[str, Any]:
-        """Give the message with the numbers and the frame it has now."""
+        """Give the message with the numbers and the frame it has now; each transform in a TFMessage of its own."""
+        message = self._message()
+        return {self.listed: [message]} if self.listed else message
+
+    def _message(self) -> dict[str, Any]:
         message = dict(self.message)
         if "header" in message and self.frame is not None:
             message["header"] = message["header"] | {"frame_id": self.frame}
@@ -180,7 +185,8 @@ def moveables(value: Any, reading: Reading) -> Iterator[Stamped]:
         if key is None:
             found = ", ".join(map(repr, list(message)[:8])) if type(message) is dict else repr(message)
             raise Misfit(f"expected a header and one of {', '.join(KINDS)}; found {found}", path)
-        yield within(path, read_stamped, message, key, reading)
+        stamped = within(path, read_stamped, message, key, reading)
+        yield stamped._replace(listed=str(path[-2]) if path[-2:-1] and path[-2] in ros.LISTS else "")
 
 
 def _each(value: Any, path: Path) -> Iterator[tuple[Any, Path]]:
