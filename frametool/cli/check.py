@@ -63,13 +63,18 @@ def command(files: Sequence[str], form: str, strict: bool) -> int:
 def _everything(recordings: Sequence[Recording], findings: list[Finding]) -> Iterator[Seen]:
     """Read all files; what cannot be read is found at once."""
     for recording in recordings:
-        yield from read_all(recording, findings.append)
+        before = len(findings)
+        seen = None
+        for seen in read_all(recording, findings.append):
+            yield seen
+        if seen is None and len(findings) == before:
+            findings.append(Finding("empty", "no transforms in it", recording.name, 1, 1))
 
 
 def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:
     """Count on stderr, and tell whether the files pass."""
     counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
     said = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
-    if said:
+    if counts["error"] or counts["warning"]:
         click.echo(f"frametool: {said}", err=True)
     return bool(counts["error"] or (strict and counts["warning"]))

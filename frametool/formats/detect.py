@@ -29,6 +29,7 @@ FORMS = {
     "csv1": "CSV of `rostopic echo -p`",
     "csv2": "CSV of `ros2 topic echo --csv`",
     "jsonl": "messages as JSON, one a line (rosbridge, Foxglove)",
+    "calls": "static_transform_publisher calls",
     "tree": "a tree or poses in YAML or JSON",
 }
 BAGS = ("bag1", "bag2", "mcap")
@@ -38,6 +39,10 @@ _ECHO = re.compile(
 )
 _FLOW_ECHO = re.compile(r"(?:transforms|header): *[\[{]")
 _CSV2 = re.compile(r"-?\d+,\d+,[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$")
+# the command's name, flags, or numbers and two names: poses of a trajectory are numbers only
+_CALL = re.compile(
+    r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]|[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*$"
+)
 _MESSAGE_KEY = re.compile(r'"(?:child_frame_id|transforms|frame_id|op)"')
 
 
@@ -55,6 +60,8 @@ def detect(head: bytes) -> str:
         return "jsonl" if _is_json_line(first) else "tree"
     if _CSV2.match(first):
         return "csv2"
+    if _CALL.match(first):
+        return "calls"
     return "echo" if _ECHO.match(first) or _FLOW_ECHO.match(first) else "tree"
 
 

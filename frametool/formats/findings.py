@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 # rule -> (level, what it is about); an error fails, a warning fails under --strict, a note never
 RULES = {
     "syntax": ("error", "text that is not YAML, JSON or what a tool prints, or lacks a part"),
+    "empty": ("warning", "a file without any transform"),
     "denormalized": ("error", "a quaternion or matrix that is no rotation"),
     "rounded": ("warning", "a quaternion or matrix off by 1e-6 to 1e-3: normalised"),
     "mirrored": ("error", "a left-handed matrix"),

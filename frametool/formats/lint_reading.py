@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import FormatError
 from frametool.formats.documents import locate_many, parse_documents
 from frametool.formats.findings import Finding
+from frametool.formats.load import without_slashes
 from frametool.formats.source import Source
 from frametool.formats.trees import read_edges
 from frametool.formats.values import Misfit, Reading
@@ -125,7 +126,8 @@ def _read_entry(
     """Read one entry; what it gives and what is to be said of it is kept with its path."""
     reading = Reading(source)
     try:
-        for edge in read_edges(entry.value, reading):
+        for found in read_edges(entry.value, reading):
+            edge = without_slashes(found, reading)
             if edge.parent is not None:
                 path = (document, *entry.place(edge.path))
                 edges.append((edge, path, _written_w_first(entry, edge)))

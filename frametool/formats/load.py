@@ -126,7 +126,7 @@ def edges_of(source: Source) -> Iterator[Found]:
         try:
             for edge in read_edges(document.value, reading):
                 count += 1
-                yield Found(_without_slashes(edge, reading), source, document.index)
+                yield Found(without_slashes(edge, reading), source, document.index)
         except Misfit as misfit:
             raise format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key) from None
         notes += [((document.index, *path), message) for path, message in reading.notes]
@@ -135,7 +135,7 @@ def edges_of(source: Source) -> Iterator[Found]:
     tell(source, notes)
 
 
-def _without_slashes(edge: Edge, reading: Reading) -> Edge:
+def without_slashes(edge: Edge, reading: Reading) -> Edge:
     """Take one leading `/` off the names, which tf2 has given up, and say so."""
     if edge.child[0] != "/" and (edge.parent or "")[:1] != "/":
         return edge

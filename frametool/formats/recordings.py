@@ -6,10 +6,10 @@ import re
 import sys
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FileProblem, FormatError, warn
+from frametool.errors import FileProblem, FormatError, ValueInvalid, warn
 from frametool.formats import ros
 from frametool.formats.detect import BAGS, FORMS, HEAD, detect
-from frametool.formats.pieces import Piece, documents
+from frametool.formats.pieces import Piece, documents, lines
 from frametool.formats.ros_stream import Message, document_messages, end_of_document, read_messages
 from frametool.formats.samples import Sample, Tally
 from frametool.formats.source import MOST_CHARACTERS, Source, decode, read_text
@@ -129,6 +129,9 @@ def _samples(recording: Recording, report: Report) -> Iterator[Sample]:
     if recording.stream is not None and recording.form == "echo":
         for piece in documents(recording.stream, recording.name):
             yield from _echo(piece, recording, report)
+    elif recording.stream is not None and recording.form == "calls":
+        for piece in lines(recording.stream, recording.name):
+            yield from _calls(piece, recording, report)
     elif recording.stream is not None:
         for message in read_messages(recording.stream, recording.name, recording.form, recording.tally):
             yield from _message_samples(message, recording.tally, report)
@@ -150,6 +153,23 @@ def _echo(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample
         blocks.line += text.count("\n")
 
 
+def _calls(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample]:
+    """Read one call of static_transform_publisher from each line."""
+    from frametool.formats.publisher import read_call
+
+    for number, line in enumerate(piece.text.split("\n"), piece.line):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        reading = Reading(Source(recording.name, line))
+        try:
+            pose = read_call(line, reading)
+        except ValueInvalid as error:
+            report(FormatError(str(error), source=recording.name, line=number))
+            continue
+        recording.tally.notes.update((note, number) for _, note in reading.notes)
+        yield Sample(pose.parent or "", pose.name or "", pose.components, None, number)
+
+
 def _message_samples(message: Message | FormatError, tally: Tally, report: Report) -> Iterator[Sample]:
     """Give the samples of one message; what is wrong with one of them does not touch the others."""
     if isinstance(message, FormatError):
@@ -160,9 +180,9 @@ def _message_samples(message: Message | FormatError, tally: Tally, report: Repor
     except Misfit as misfit:
         report(message.error(misfit))
         return
-    lines = _child_lines(message, len(found))
+    numbers = _child_lines(message, len(found))
     still = ros.topic_of(message.value).endswith("tf_static")
-    for (transform, path), line in zip(found, lines, strict=True):
+    for (transform, path), line in zip(found, numbers, strict=True):
         reading = Reading(message.source)
         try:
             parent, child, position, rotation, stamp_ns = _read_counting(transform, reading, tally, line)

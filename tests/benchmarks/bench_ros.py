@@ -98,6 +98,8 @@ def load(path: str) -> int:
     import frametool
 
     buffer = frametool.load(path)
+    if not isinstance(buffer, frametool.TransformBuffer):
+        raise TypeError("nothing moves in the dump")
     return sum(len(track.stamps) for track in buffer.tracks())
 
 

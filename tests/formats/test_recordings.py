@@ -13,10 +13,11 @@ from frametool.formats import pieces
 from frametool.formats.recordings import Recording
 from frametool.formats.results import Style
 from frametool.formats.ros_form import message_text
-from frametool.formats.samples import Sample
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from frametool.formats.samples import Sample
 
 EPOCH = 1_700_000_000_123_456_789
 EXPECTED = [

@@ -74,7 +74,7 @@ def test_the_power_of_a_wrench_on_a_twist_is_the_same_in_every_frame() -> None:
         twist = read(twist={"linear": second, "angular": first})
         moved = [each.moved(transform(case), "map").numbers for each in (wrench, twist)]
         power = np.dot(wrench.numbers, twist.numbers)
-        assert np.dot(*moved) == pytest.approx(power, rel=1e-9, abs=1e-9 * np.abs(moved).max() ** 2)
+        assert np.dot(moved[0], moved[1]) == pytest.approx(power, rel=1e-9, abs=1e-9 * np.abs(moved).max() ** 2)
 
 
 def covariance(seed: int) -> Any:
@@ -96,7 +96,7 @@ def test_each_block_of_a_pose_covariance_turns_on_its_own() -> None:
 def test_the_covariance_of_a_twist_is_that_of_moved_samples() -> None:
     case = CASES[3]
     basis = np.eye(6)
-    moved = [read(twist={"linear": mapping("xyz", row[:3]), "angular": mapping("xyz", row[3:])}) for row in basis]
+    moved = [read(twist={"linear": mapping("xyz", row[:3]), "angular": mapping("xyz", row[3:])}) for row in basis.tolist()]
     adjoint = np.array([each.moved(transform(case), None).numbers for each in moved]).T
     zero = mapping("xyz", (0.0, 0.0, 0.0))
     inner = {"twist": {"linear": zero, "angular": zero}, "covariance": list(map(repr, covariance(2).ravel().tolist()))}
