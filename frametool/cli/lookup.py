@@ -107,12 +107,13 @@ def _many(
     results = [Result(Pose.of(row, source, target), {"stamp_ns": at}) for at, row in zip(times, rows, strict=True)]
     there = [result if isfinite(result.pose.components[6]) else None for result in results]
     if skip:
-        _tell_skipped(frames, target, source, [at for at, each in zip(times, there, strict=True) if each is None])
+        skipped = [at for at, each in zip(times, there, strict=True) if each is None]
+        _tell_skipped(frames, target, source, skipped, len(times))
     return there
 
 
 def _tell_skipped(
-    frames: FrameTree | TransformBuffer, target: str, source: str, skipped: Sequence[int], most: int = 10
+    frames: FrameTree | TransformBuffer, target: str, source: str, skipped: Sequence[int], asked: int, most: int = 10
 ) -> None:
     """Say why times were skipped: the reasons of the first, then how many."""
     for at in skipped[:most]:
@@ -121,4 +122,4 @@ def _tell_skipped(
         except LookupFailed as error:
             click.echo(f"frametool: {error} (skipped)", err=True)
     if skipped:
-        click.echo(f"frametool: {len(skipped)} times skipped", err=True)
+        click.echo(f"frametool: {len(skipped)} of {asked} times skipped", err=True)

@@ -39,7 +39,7 @@ class Time(Text):
         try:
             return parse_stamp(text)
         except ValueInvalid as error:
-            self.fail(str(error) + (", or latest" if self.latest else ""), param, ctx)
+            self.fail(f"{error}{', or latest' if self.latest and 'write' in str(error) else ''}", param, ctx)
 
 
 TIME = Time()

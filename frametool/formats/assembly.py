@@ -42,6 +42,25 @@ class Rules:
         self.keep_ns = keep_ns
 
 
+class Replaced:
+    """A sample that took the place of another one at the same stamp."""
+
+    __slots__ = ("child", "earlier", "later", "parent", "stamp_ns")
+
+    def __init__(self, parent: str, child: str, stamp_ns: int, earlier: Place, later: Place) -> None:
+        """Keep what was said last, and where the two stood."""
+        self.parent = parent
+        self.child = child
+        self.stamp_ns = stamp_ns
+        self.earlier = earlier
+        self.later = later
+
+    @property
+    def places(self) -> str:
+        """Name both places."""
+        return f"{self.earlier.seen_from(self.later)} and {self.later.seen_from(self.later)}"
+
+
 class Assembly:
     """What has been read so far, and where the first word on each frame stood."""
 
@@ -52,8 +71,8 @@ class Assembly:
         self.tree = FrameTree(name)
         self.buffer: TransformBuffer | None = None
         self._first: dict[str, tuple[str, Rigid, Place]] = {}  # child -> what was said first
-        self._places: dict[tuple[str, int], Place] = {}  # (child, stamp) -> where that sample stood
-        self._replaced: list[tuple[str, int, Place, Place]] = []
+        self._places: dict[str, dict[int, Place]] = {}  # child -> stamp -> where that sample stood
+        self._replaced: list[Replaced] = []
         self._stamps: dict[str, int] = {}  # child -> its one stamp, while it has no other
         self._moves: set[str] = set()
 
@@ -115,8 +134,9 @@ class Assembly:
     ) -> None:
         """Add a sample, or a standing edge beside samples."""
         track = buffer.track(child)
-        if track is not None and track.standing and (track.parent, track.samples[0]) == (parent, components):
-            return  # said again, with or without a stamp
+        settled = track is not None and child not in self._moves and (track.standing or stamp_ns is None)
+        if track is not None and settled and (track.parent, track.samples[-1]) == (parent, components):
+            return  # said again, once with and once without a stamp
         self._first.setdefault(child, (parent, components, place))
         if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
             self._moves.add(child)
@@ -124,10 +144,10 @@ class Assembly:
             self._moves.add(child)  # tf2 takes no stamp twice: what comes twice was not latched
         replaced = buffer.insert_components(parent, child, components, stamp_ns)
         if stamp_ns is not None:
-            earlier = self._places.get((child, stamp_ns), place)
-            self._places[child, stamp_ns] = place
+            places = self._places.setdefault(child, {})
             if replaced:
-                self._replaced.append((child, stamp_ns, earlier, place))
+                self._replaced.append(Replaced(parent, child, stamp_ns, places.get(stamp_ns, place), place))
+            places[stamp_ns] = place
 
     def _stands(self, track: Track) -> bool:
         """Say whether a track whose samples carry one stamp is that of a standing frame."""
@@ -137,14 +157,13 @@ class Assembly:
         """Refuse standing frames with two values; warn of moving ones with two poses at one stamp."""
         from frametool.frames.stamps import format_stamp
 
-        for child, _, earlier, place in self._replaced:
-            if child in standing:
-                places = f"{earlier.seen_from(place)} and {place.seen_from(place)}"
-                raise place.error(f"frame {child!r} has two different poses: {places}", BadTopology)
-        for child, stamp_ns, earlier, place in self._replaced[:most]:
-            places = f"{earlier.seen_from(place)} and {place.seen_from(place)}"
-            at = format_stamp(stamp_ns)
-            warn(f"{self.name}: frame {child!r} has two poses at {at}: {places}; the last one holds")
+        for each in self._replaced:
+            if each.child in standing:
+                message = self._explained(BadTopology(""), each.parent, each.child, each.later)
+                raise each.later.error(message, BadTopology)
+        for each in self._replaced[:most]:
+            what = f"frame {each.child!r} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
+            warn(f"{self.name}: {what}; the last one holds")
         if len(self._replaced) > most:
             warn(f"{self.name}: {len(self._replaced) - most} more frames with two poses at one stamp")
 

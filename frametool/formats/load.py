@@ -86,17 +86,18 @@ def _is_plainly_tree(path: str) -> bool:
 def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = None) -> FrameTree | TransformBuffer:
     """Merge the frames of several texts and recordings; otherwise as `load`."""
     assembly = Assembly(", ".join(source.name for source in sources), rules)
+    raw = assembly.rules.policy != "frametool"
     with paused_collector():
         for source in sources:
             if isinstance(source, Source):
-                _add_tree(assembly, source)
+                _add_tree(assembly, source, raw=raw)
             else:
-                _add_recording(assembly, source)
+                _add_recording(assembly, source, raw=raw)
         return assembly.finish()
 
 
-def _add_tree(assembly: Assembly, source: Source) -> None:
-    for found in edges_of(source):
+def _add_tree(assembly: Assembly, source: Source, *, raw: bool) -> None:
+    for found in edges_of(source, raw=raw):
         edge = found.edge
         if edge.parent is None:
             assembly.add_root(edge.child)
@@ -104,9 +105,9 @@ def _add_tree(assembly: Assembly, source: Source) -> None:
             assembly.add(edge.parent, edge.child, edge.pose.components, edge.stamp_ns, found)
 
 
-def _add_recording(assembly: Assembly, recording: Recording) -> None:
+def _add_recording(assembly: Assembly, recording: Recording, *, raw: bool) -> None:
     sample = None
-    for sample in recording.samples():
+    for sample in recording.samples(raw=raw):
         spot = Spot(recording.name, sample.line)
         assembly.add(sample.parent, sample.child, sample.components, sample.stamp_ns, spot)
     if sample is None:
@@ -129,16 +130,16 @@ class Spot(NamedTuple):
         return f"line {self.line}" if same else f"{self.source}:{self.line}"
 
 
-def edges_of(source: Source) -> Iterator[Found]:
-    """Read the edges of one text, then tell what was odd about it."""
+def edges_of(source: Source, *, raw: bool = False) -> Iterator[Found]:
+    """Read the edges of one text, then tell what was odd about it; raw: messages as tf2 receives them."""
     notes = []
     count = 0
     for document in parse_documents(source.text, source.name):
-        reading = Reading(source)
+        reading = Reading(source, raw=raw)
         try:
             for edge in read_edges(document.value, reading):
                 count += 1
-                yield Found(without_slashes(edge, reading), source, document.index)
+                yield Found(edge if raw else without_slashes(edge, reading), source, document.index)
         except Misfit as misfit:
             raise format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key) from None
         notes += [((document.index, *path), message) for path, message in reading.notes]

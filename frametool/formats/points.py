@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.formats.pose import POSITION_KEYS, read_name, read_position
 from frametool.formats.records import read_all, read_one_pose
-from frametool.formats.rotations import ROTATION_KEYS
+from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS
 from frametool.formats.values import Misfit, Reading, read_numbers, within
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _moveable(value: Any, reading: Reading) -> Any:
             return read_stamped(value, key, reading)
     if type(value) is list and len(value) == 3 and not any(type(item) is list for item in value):
         return Point(read_position(value, 1.0))
-    if type(value) is not dict or any(key in ROTATION_KEYS or key == "child_frame_id" for key in value):
+    if type(value) is not dict or any(key in ROTATION_KEYS or key in ("child_frame_id", AXES_KEY) for key in value):
         return read_one_pose(value, reading)
     keys = [key for key in POINT_KEYS if key in value]
     if not keys and "x" in value:

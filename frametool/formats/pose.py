@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean
-from frametool.formats.rotations import ROTATION_KEYS, read_rotation
+from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS, read_rotation
 from frametool.formats.values import Misfit, Reading, kind, read_numbers
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import REPRESENTATIONS
@@ -28,7 +28,7 @@ POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.00
 TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg"))
 NAMES = frozenset(("name", "parent"))
-POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles"))
+POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", AXES_KEY))
 AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie apart
 
 
@@ -76,7 +76,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
         for key, value in mapping.items():
             if key in POSITION_KEYS:
                 position = _agreeing_position(position, read_position(value, POSITION_KEYS[key]))
-            elif key in ROTATION_KEYS:
+            elif key in ROTATION_KEYS or key == AXES_KEY:
                 moved, turned = read_rotation(key, value, reading)
                 rotation = turned if rotation is None else _agreeing_rotation(rotation, turned)
                 if moved is not None:

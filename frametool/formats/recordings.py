@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from os import PathLike
     from typing import BinaryIO
 
+    from frametool.formats.samples import Components
     from frametool.formats.values import Path
 
     Report = Callable[[FormatError], None]
@@ -39,6 +40,7 @@ class Recording:
         self.name = "stdin" if self.path == "-" else self.path
         self.form = "bag2"
         self.tally = Tally()
+        self.raw = False
         self.stream: BinaryIO | None = None
         if not _is_bag_folder(self.path):
             self.stream = _opened(self.path)
@@ -66,12 +68,13 @@ class Recording:
         if self.stream is not None and self.path != "-":
             self.stream.close()
 
-    def samples(self, report: Report | None = None, *, tell: bool = True) -> Iterator[Sample]:
+    def samples(self, report: Report | None = None, *, tell: bool = True, raw: bool = False) -> Iterator[Sample]:
         """Give the samples in the order they were recorded, then warn of what was odd.
 
         report: takes the errors, and reading goes on behind them; without it the first one is raised.
-        tell: without it what was odd is only kept, in `tally`.
+        tell: without it what was odd is only kept, in `tally`.  raw: messages in text as tf2 receives them, unchecked.
         """
+        self.raw = raw
         try:
             yield from _samples(self, report or _raise)
         finally:
@@ -134,7 +137,7 @@ def _samples(recording: Recording, report: Report) -> Iterator[Sample]:
             yield from _calls(piece, recording, report)
     elif recording.stream is not None:
         for message in read_messages(recording.stream, recording.name, recording.form, recording.tally):
-            yield from _message_samples(message, recording.tally, report)
+            yield from _message_samples(message, recording, report)
 
 
 def _echo(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample]:
@@ -143,12 +146,13 @@ def _echo(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample
 
     blocks = Blocks(piece.text, piece.line, recording.tally)
     while True:
-        yield from blocks.samples()
+        if not recording.raw:
+            yield from blocks.samples()
         if blocks.at >= len(piece.text):
             return
         text = piece.text[blocks.at : end_of_document(piece.text, blocks.at)]
         for message in document_messages(Piece(text, blocks.line), recording.name, recording.tally):
-            yield from _message_samples(message, recording.tally, report)
+            yield from _message_samples(message, recording, report)
         blocks.at += len(text)
         blocks.line += text.count("\n")
 
@@ -170,13 +174,13 @@ def _calls(piece: Piece, recording: Recording, report: Report) -> Iterator[Sampl
         yield Sample(pose.parent or "", pose.name or "", pose.components, None, number)
 
 
-def _message_samples(message: Message | FormatError, tally: Tally, report: Report) -> Iterator[Sample]:
+def _message_samples(message: Message | FormatError, recording: Recording, report: Report) -> Iterator[Sample]:
     """Give the samples of one message; what is wrong with one of them does not touch the others."""
     if isinstance(message, FormatError):
         report(message)
         return
     try:
-        found = list(_transforms(message.value, (), tally))
+        found = list(_transforms(message.value, (), recording.tally))
     except Misfit as misfit:
         report(message.error(misfit))
         return
@@ -185,22 +189,28 @@ def _message_samples(message: Message | FormatError, tally: Tally, report: Repor
     for (transform, path), line in zip(found, numbers, strict=True):
         reading = Reading(message.source)
         try:
-            parent, child, position, rotation, stamp_ns = _read_counting(transform, reading, tally, line)
+            parent, child, components, stamp_ns = _read(transform, reading, recording, line)
         except Misfit as misfit:
             report(message.error(misfit.below(*path)))
             continue
-        yield Sample(parent, child, (*position, *rotation), None if still else stamp_ns, line, message.received_ns)
+        yield Sample(parent, child, components, None if still else stamp_ns, line, message.received_ns)
 
 
-def _read_counting(transform: dict[str, Any], reading: Reading, tally: Tally, line: int) -> Any:
+def _read(
+    transform: dict[str, Any], reading: Reading, recording: Recording, line: int
+) -> tuple[str, str, Components, int | None]:
     """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
-    found = ros.read_transform(transform, reading)
+    if recording.raw and "header" in transform:
+        from frametool.formats.as_received import read_transform
+
+        return read_transform(transform)
+    parent, child, position, rotation, stamp_ns = ros.read_transform(transform, reading)
     for _, note in reading.notes:
         if "normalised" in note:
-            tally.rough.append(line)
+            recording.tally.rough.append(line)
         else:
-            tally.notes.setdefault(note, line)
-    return found
+            recording.tally.notes.setdefault(note, line)
+    return parent, child, (*position, *rotation), stamp_ns
 
 
 def _transforms(value: Any, path: Path, tally: Tally) -> Iterator[tuple[dict[str, Any], Path]]:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Shape = tuple[Notation, Sequence[Any], Sequence[Path]]  # what it is, one text a component, and where each stands
 
 ALIASES = {"rotation": "quaternion", "orientation": "quaternion"}  # as ROS messages name it
+AXES_KEY = "axes"  # a constant rotation by name instead of numbers
 TURN = 2.0 * math.pi
 NOT_FINITE = r"(?i)[-+]?\.?(nan|inf|infinity)"
 
@@ -41,6 +42,8 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
 
     Raises Misfit or ValueInvalid: wrong shape, no number, no rotation.
     """
+    if key == AXES_KEY:
+        return None, _read_axes(value)
     form = ROTATION_KEYS[key]
     shape = SHAPES.get(form.representation.name, _list_or_map)
     form, texts, places = shape(form, value)
@@ -49,9 +52,21 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
     return None, rotation_of(form, texts, places, reading)
 
 
+def _read_axes(value: Any) -> Quaternion:
+    """Read the name of a change of axes: `optical`, `ned_from_enu`."""
+    from frametool.geometry.axes import named_rotation
+
+    if type(value) is not str:
+        raise Misfit(f"expected the name of axes like optical or ned_from_enu, found {kind(value)}")
+    rotation: Quaternion = named_rotation(value).components
+    return rotation
+
+
 def rotation_of(form: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
     """Turn one text a component into x, y, z, w, in the unit that applies, checked to be a rotation."""
     numbers, degrees = read_components(form, texts, places, reading)
+    if not form.representation.can_fail:
+        return form.to_quaternion(numbers, floats, degrees=degrees)
     return _checked(form, numbers, reading, degrees=degrees)
 
 

@@ -161,10 +161,20 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
     for message, here in ros.messages(value, path):
         reading.here = here
         try:
-            parent, child, position, rotation, stamp_ns = ros.read_transform(message, reading)
+            yield _message(message, here, reading)
         except Misfit as misfit:
             raise misfit.below(*here) from None
-        yield Edge(parent, child, Pose(position, rotation), here, stamp_ns)
+
+
+def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
+    """Read one TransformStamped, checked, or as tf2 receives it."""
+    if reading.raw:
+        from frametool.formats.as_received import read_transform
+
+        parent, child, components, stamp_ns = read_transform(message)
+        return Edge(parent, child, Pose.of(components), path, stamp_ns)
+    parent, child, position, rotation, stamp_ns = ros.read_transform(message, reading)
+    return Edge(parent, child, Pose(position, rotation), path, stamp_ns)
 
 
 def read_samples(

@@ -13,7 +13,7 @@ import numpy as np
 from frametool.errors import NoDataAt, NotConnected, ValueInvalid
 from frametool.frames.plan import IDENTITY
 from frametool.frames.track import Track
-from frametool.geometry import arrays, rigid, segment
+from frametool.geometry import arrays, quaternion, rigid, segment
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -83,10 +83,13 @@ def _put_back(out: Floats, order: NDArray[np.intp]) -> Floats:
 
 def _fill_sorted(out: Floats, buffer: TransformBuffer, target: str, source: str, times: Stamps) -> None:
     """Compute sorted times, in stretches on which no parent changes."""
+    buffer.require(target, source)
+    if times.size:
+        _plan_at(buffer, target, source, int(times[0]))  # finds out whether newest parents form a circle
     edges = buffer.changes()
     cuts = [0, *np.searchsorted(times, edges).tolist(), times.size]
-    if not times.size or not edges:
-        buffer.plan(target, source, None)  # raises for frames that are not there or not connected
+    if not edges:
+        buffer.plan(target, source, None)  # raises for frames that are not connected
     for begin, end in itertools.pairwise(cuts):
         if begin < end:
             _fill(out[:, begin:end], _plan_at(buffer, target, source, int(times[begin])), times[begin:end])
@@ -113,7 +116,8 @@ def _fill(out: Floats, plan: Plan | None, times: Stamps) -> None:
     inside = out[:, begin:end]
     for start, stop in arrays.blocks(max(end - begin, 0)):
         part = times[begin + start : begin + stop]
-        for row, column in zip(inside, _joined(plan, part), strict=True):
+        tx, ty, tz, x, y, z, w = _joined(plan, part)
+        for row, column in zip(inside, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)), strict=True):
             row[start:stop] = column
 
 

@@ -2,44 +2,30 @@
 
 from __future__ import annotations
 
-from operator import index
 from typing import TYPE_CHECKING
 
 from frametool.errors import BadTopology, LookupFailed, NotConnected, ValueInvalid, warn
-from frametool.frames.path import cycle_message, edges_between, to_root
+from frametool.frames.path import edges_between, to_root
 from frametool.frames.plan import Plan
-from frametool.frames.policy import FRAMETOOL, Policy
 from frametool.frames.stamps import format_stamp
-from frametool.frames.track import Track
+from frametool.frames.store import TrackStore, policy_named, whole_stamp
 from frametool.geometry import rigid
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from typing import Any
 
+    from frametool.frames.track import Track
     from frametool.geometry.kinds import Rigid
 
-FURTHEST_NS = 1 << 62  # differences of two such stamps fit into 64 bits; the year 2116
 MOST_PLANS = 1 << 14
 
 
-def policy_named(name: str) -> Policy:
-    """Give the rules of `frametool`, `ros1` or `ros2`."""
-    if name == "frametool":
-        return FRAMETOOL
-    from frametool.frames.tf2 import TF2
-
-    if name not in TF2:
-        raise ValueInvalid(f"unknown policy {name!r}; expected frametool, {', '.join(TF2)}")
-    return TF2[name]
-
-
-class TransformBuffer:
+class TransformBuffer(TrackStore):
     """Hold transforms over time; answer where one frame is seen from another, and when.
 
     Stamps are integer nanoseconds, in any order. Between two samples translations are interpolated along the line and
-    rotations by slerp, edge by edge. Nothing is pruned unless `keep_ns` says so.
+    rotations by slerp, edge by edge. Nothing is pruned unless `keep_ns` says so. The latest time is None; 0 is a time.
 
         buffer = TransformBuffer()
         buffer.insert("map", "base", map_from_base, 1_700_000_000_000_000_000)
@@ -54,14 +40,9 @@ class TransformBuffer:
         policy: "ros1" and "ros2" accept, refuse and complain as tf2 does, and keep 10 s unless told.
         name: says in error messages where the frames come from.
         """
-        self.name = name
-        self.policy = policy_named(policy)
-        self.keep_ns = self.policy.default_keep_ns if keep_ns is None else keep_ns
-        self._tracks: dict[str, Track] = {}
-        self._frames: dict[str, None] = {}
+        super().__init__(policy=policy_named(policy), keep_ns=keep_ns, name=name)
         self._plans: dict[tuple[str, str], Plan] = {}
-        self._varies = False  # whether any frame has ever changed its parent
-        self._plain = self.policy is FRAMETOOL and self.keep_ns is None
+        self._loops = False  # whether newest parents were found to form a circle
 
     def insert(
         self, parent: str, child: str, transform: Transform, stamp_ns: int | None = None, *,
@@ -79,136 +60,14 @@ class TransformBuffer:
         if self.insert_components(parent, child, components, stamp_ns, static=static, authority=authority):
             warn(f"frame {child!r} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
 
-    def insert_components(
-        self, parent: str, child: str, components: Rigid, stamp_ns: int | None = None, *,
-        static: bool | None = None, authority: str = "default_authority",
-    ) -> bool:  # fmt: skip
-        """Add tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `insert`.
-
-        Returns whether other data at the same stamp were replaced; the caller may know where both were written.
-        """
-        track = self._tracks.get(child)
-        if (
-            self._plain and track is not None and type(stamp_ns) is int and not static and track.stamps
-            and track.stamps[-1] < stamp_ns < FURTHEST_NS and track.parents[-1] == parent
-            and -1e300 < sum(components) < 1e300  # finite
-        ):  # fmt: skip
-            track.stamps.append(stamp_ns)
-            track.parents.append(parent)
-            track.samples.append(components)
-            track.table = None
-            return False
-        parent, child, components = self.policy.admit(parent, child, components, authority)
-        standing = stamp_ns is None if static is None else static
-        stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
-        return self._admit(parent, child, components, stamp, standing=standing, authority=authority)
-
-    def _admit(
-        self, parent: str, child: str, components: Rigid, stamp_ns: int, *, standing: bool, authority: str,
-    ) -> bool:  # fmt: skip
-        """Add what may be the first of its frame, out of order, or against a rule."""
-        track = self._tracks.get(child)
-        if track is None or not track.parents:
-            self._refuse_cycle(parent, child, stamp_ns, standing=standing)
-            track = self._begin(parent, child, standing=standing)
-        elif track.standing != standing:
-            standing = self.policy.settle_kind(track, standing=standing)
-            if track.standing != standing:
-                track = self._begin(parent, child, standing=standing)
-        replaced = False
-        if standing:
-            self._stand(track, parent, components)
-        else:
-            replaced = self._move(track, parent, components, stamp_ns, authority)
-        self._frames[parent] = None
-        track.authority = authority
-        return replaced
-
-    def _begin(self, parent: str, child: str, *, standing: bool) -> Track:
-        """Make the track of a frame."""
-        self._frames[child] = None
-        self._frames[parent] = None
-        track = self._tracks[child] = Track(child, standing=standing)
-        self._plans.clear()
-        return track
-
-    def _stand(self, track: Track, parent: str, components: Rigid) -> None:
-        if track.parents:
-            self.policy.stand(track, parent, components)
-        else:
-            track.stand(parent, components)
+    def _changed(self) -> None:
         self._plans.clear()
 
-    def _move(self, track: Track, parent: str, components: Rigid, stamp_ns: int, authority: str) -> bool:
-        stamps = track.stamps
-        if stamps and self.keep_ns is not None:
-            self.policy.refuse_old(track, stamp_ns, self.keep_ns, authority)
-            self.policy.prune_before(track, self.keep_ns)
-        at = track.index(stamp_ns) if stamps else None
-        if at is not None and stamps[at] == stamp_ns:
-            return self._repeat(track, at, parent, components, authority)
-        if stamps and parent != track.parents[-1]:
-            self._refuse_cycle(parent, track.child, stamp_ns, standing=False)
-            self._varies = True
-            self._plans.clear()
-        track.add(stamp_ns, parent, components)
-        if self.keep_ns is not None:
-            self.policy.prune_after(track, self.keep_ns)
-        return False
-
-    def _repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:
-        self._varies = self._varies or parent != track.parents[at]
-        self._plans.clear()
-        return self.policy.repeat(track, at, parent, components, authority)
-
-    def _refuse_cycle(self, parent: str, child: str, stamp_ns: int, *, standing: bool) -> None:
-        """Raise BadTopology if the child is its parent's ancestor at the same time."""
-        if not self.policy.refuses_cycles or child not in self._frames:
-            return
-        line = [parent]
-        at_ns = None if standing else stamp_ns
-        while (track := self._tracks.get(line[-1])) is not None and _holds(track, at_ns):
-            line.append(track.parents[-1])
-            if line[-1] == child:
-                raise BadTopology(cycle_message([*line, parent]))
-
-    def add_root(self, frame: str) -> None:
-        """Make a frame known that has no parent (yet)."""
-        self._frames[frame] = None
-
-    def make_stand(self, frame: str) -> None:
-        """Take the newest sample of a moving frame for its pose at all times."""
-        moved = self._tracks[frame]
-        track = self._begin(moved.parent, frame, standing=True)
-        track.stand(moved.parent, moved.samples[-1])
-
-    @property
-    def frames(self) -> tuple[str, ...]:
-        """Give every frame, in the order of first mention, children before their parents."""
-        return tuple(self._frames)
-
-    @property
-    def roots(self) -> tuple[str, ...]:
-        """Give the frames without a parent."""
-        return tuple(frame for frame in self._frames if frame not in self._tracks)
-
-    def edges(self) -> Iterator[tuple[str, str, Transform]]:
-        """Walk the edges as (parent, child, parent_from_child), each as it was last, in the order of first mention."""
-        for track in self._tracks.values():
-            yield track.parents[-1], track.child, Transform.of(*track.samples[-1])
-
-    def track(self, frame: str) -> Track | None:
-        """Give what is known about a frame over time; None for a root."""
-        return self._tracks.get(frame)
-
-    def tracks(self) -> Iterator[Track]:
-        """Walk what is known about each frame that has a parent, in the order of first mention."""
-        return iter(self._tracks.values())
-
-    def parent(self, frame: str, at_ns: int | None = None) -> str | None:
-        """Give a frame's parent at a time, or the newest; None for a root, and where a changing parent is not known."""
+    def parent_exactly(self, frame: str, at_ns: int) -> str | None:
+        """Give a frame's parent only if it has data at a time."""
         track = self._tracks.get(frame)
-        return None if track is None else track.parent_at(at_ns)
+        known = track is not None and (track.standing or track.index(at_ns) is not None)
+        return track.parent_at(at_ns) if track is not None and known else None
 
     def lookup(self, target: str, source: str, at_ns: int | None = None) -> Transform:
         """Give target_from_source: the pose of source in target, which maps points in source to points in target.
@@ -292,7 +151,7 @@ class TransformBuffer:
         """List the stamps, sorted, at which a frame whose parent changes gets another one, or begins, or has ended."""
         stamps: set[int] = set()
         for track in self._tracks.values() if self._varies else ():
-            if track.varies:
+            if track.varies or (self._loops and not track.standing):
                 pairs = zip(track.parents, track.parents[1:], track.stamps[1:], strict=False)
                 stamps.update(stamp for before, after, stamp in pairs if before != after)
                 stamps.update((track.stamps[0], track.stamps[-1] + 1))
@@ -315,17 +174,26 @@ class TransformBuffer:
 
     def _changes_above(self, frame: str) -> bool:
         """Say whether a frame or an ancestor of it ever changes its parent."""
+        if self._loops:
+            return True
         return any(frame in self._tracks and self._tracks[frame].varies for frame in to_root(frame, self.parent))
 
     def _between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
         """Name the edges between two frames that both exist, as `edges_between` does."""
-        self._require(target, "target_frame")
-        self._require(source, "source_frame")
+        self.require(target, source)
 
         try:
             return edges_between(target, source, lambda frame: self.parent(frame, at_ns))
         except NotConnected as error:
             raise self._unconnected(error, target, source, at_ns) from None
+        except BadTopology as error:
+            self._loops = self._varies = True
+            return self.policy.looped(self, error, target, source, at_ns)
+
+    def require(self, target: str, source: str) -> None:
+        """Raise UnknownFrame unless both frames are there."""
+        self._require(target, "target_frame")
+        self._require(source, "source_frame")
 
     def _require(self, frame: str, role: str) -> None:
         if frame not in self._frames or self.policy.is_bad_name(frame):
@@ -333,34 +201,21 @@ class TransformBuffer:
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
         """Tell two trees from one whose changing parent is not known at a time."""
-        ends = [to_root(frame, lambda each: self.parent(each, at_ns))[-1] for frame in (target, source)]
-        if at_ns is None or not any(end in self._tracks for end in ends):
-            return self.policy.unconnected(error, target, source)
-        broken = [self._tracks[end] for end in ends if end in self._tracks]
-        return self.policy.missing(self, target, source, at_ns, broken)
+        if at_ns is not None and self._varies:
+            try:
+                down, up = edges_between(target, source, lambda frame: self._parent_near(frame, at_ns))
+            except NotConnected:
+                pass
+            else:
+                way = [self._tracks[child] for child in (*reversed(down), *reversed(up))]
+                return self.policy.missing(self, target, source, at_ns, way)
+        return self.policy.unconnected(error, target, source)
+
+    def _parent_near(self, frame: str, at_ns: int) -> str | None:
+        track = self._tracks.get(frame)
+        return None if track is None else track.parent_near(at_ns)
 
     def __repr__(self) -> str:
         """Say how many frames and samples."""
         samples = sum(len(track.samples) for track in self._tracks.values())
         return f"TransformBuffer({len(self._frames)} frames, {samples} samples)"
-
-
-def whole_stamp(stamp_ns: Any) -> int:
-    """Check a stamp at the door: an integer, never a float.
-
-    Raises ValueInvalid.
-    """
-    try:
-        stamp = index(stamp_ns)
-    except TypeError:
-        raise ValueInvalid(f"a stamp is integer nanoseconds, found {stamp_ns!r}") from None
-    if not -FURTHEST_NS < stamp < FURTHEST_NS:
-        raise ValueInvalid(f"stamp {stamp} ns is beyond the year 2116; are these nanoseconds?")
-    return stamp
-
-
-def _holds(track: Track, at_ns: int | None) -> bool:
-    """Say whether an edge under its newest parent has data at a time; standing ones always, and None asks for these."""
-    if track.standing:
-        return True
-    return at_ns is not None and track.parent_at(at_ns) == track.parent and track.index(at_ns) is not None

@@ -34,7 +34,7 @@ def motion(track: Track) -> str:
     if often is None:
         return f"1 sample  {format_stamp(first)}" if len(track.stamps) == 1 else f"{len(track.stamps)} samples at once"
     changes = sum(before != after for before, after in zip(track.parents, track.parents[1:], strict=False))
-    other = f"  parent changes {changes} times" if changes else ""
+    other = f"  {changes} change{'s' if changes > 1 else ''} of parent" if changes else ""
     return f"{len(track.stamps)} samples  {often:.4g} Hz  {format_stamp(first)} .. {format_stamp(last)}{other}"
 
 

@@ -6,7 +6,7 @@ Knows tracks and geometry; the buffer finds the way and keeps the plans.
 from __future__ import annotations
 
 from frametool.frames.track import Track
-from frametool.geometry import rigid
+from frametool.geometry import floats, quaternion, rigid
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -39,7 +39,8 @@ class Plan:
         top_from_source = _product_at(self.to_source, at_ns)
         if top_from_target is None or top_from_source is None:
             return None
-        return _joined(top_from_target, top_from_source)
+        tx, ty, tz, x, y, z, w = _joined(top_from_target, top_from_source)
+        return tx, ty, tz, *quaternion.unit(x, y, z, w, floats)
 
     def latest(self, *, zero_counts: bool = True) -> int | None:
         """Give the newest stamp that every moving edge has reached; None when all stand still.

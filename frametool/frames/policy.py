@@ -6,6 +6,7 @@ from math import isfinite
 
 from frametool.errors import BadTopology, NotConnected, UnknownFrame, ValueInvalid
 from frametool.frames.missing import no_data
+from frametool.frames.path import edges_between
 from frametool.frames.stamps import format_stamp
 
 TYPE_CHECKING = False
@@ -86,6 +87,14 @@ class Policy:
     def prune_after(self, track: Track, keep_ns: int) -> None:
         """Prune after a new sample."""
         track.drop_before(track.stamps[-1] - keep_ns)
+
+    def looped(
+        self, buffer: TransformBuffer, error: BadTopology, target: str, source: str, at_ns: int | None,
+    ) -> tuple[list[str], list[str]]:  # fmt: skip
+        """Find the way where the newest parents form a circle: only by parents known at the very time."""
+        if at_ns is None:
+            raise error
+        return edges_between(target, source, lambda frame: buffer.parent_exactly(frame, at_ns))
 
     def missing(
         self, buffer: TransformBuffer, target: str, source: str, at_ns: int, way: list[Track],  # noqa: ARG002

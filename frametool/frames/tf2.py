@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import isnan, nan, sqrt
 from typing import TYPE_CHECKING
 
-from frametool.errors import LookupFailed, NotConnected, UnknownFrame, ValueInvalid
+from frametool.errors import BadTopology, LookupFailed, NotConnected, UnknownFrame, ValueInvalid
 from frametool.frames.policy import Policy
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
@@ -125,6 +125,17 @@ class Ros1(Policy):
             **error.fields,
         )
 
+    def looped(
+        self, buffer: TransformBuffer, error: BadTopology, target: str, source: str, at_ns: int | None
+    ) -> tuple[list[str], list[str]]:
+        """Find the way as far as tf2 does, which stops once it meets the other end; else say that there is a loop."""
+        up, down = (_climb(buffer, *ends, at_ns) for ends in ((source, target), (target, source)))
+        if up is None and down is None:
+            known = (f"Frame {track.child} exists with parent {track.parent}." for track in buffer.tracks())
+            text = "\n".join(("The tf tree is invalid because it contains a loop.", *known, ""))
+            raise LookupFailed(text) from error
+        return ([], up) if up is not None else ((down or [])[::-1], [])
+
     def missing(self, buffer: TransformBuffer, target: str, source: str, at_ns: int, way: list[Track]) -> LookupFailed:
         """Blame the edge that tf2 blames."""
         error = super().missing(buffer, target, source, at_ns, way)
@@ -234,6 +245,18 @@ def _walk(buffer: TransformBuffer, frame: str, stop: str, at_ns: int) -> tuple[s
         parent = track.parent_at(None if track.standing else at_ns)
         frame = frame if parent is None else parent
     return frame, None
+
+
+def _climb(buffer: TransformBuffer, frame: str, stop: str, at_ns: int | None) -> list[str] | None:
+    """List the frames from one up to just below `stop`; None if it is not met."""
+    line: list[str] = []
+    while frame != stop and len(line) <= MOST_EDGES:
+        line.append(frame)
+        parent = buffer.parent(frame, at_ns)
+        if parent is None:
+            return None
+        frame = parent
+    return line if frame == stop else None
 
 
 def _unit(components: Rigid) -> Rigid:

@@ -92,6 +92,12 @@ class Track:
         at = self.index(at_ns)
         return None if at is None else self.parents[at]
 
+    def parent_near(self, at_ns: int) -> str:
+        """Give the parent at a time, or at the sample nearest to it."""
+        if not self.varies:
+            return self.parents[-1]
+        return self.parents[max(bisect_right(self.stamps, at_ns) - 1, 0)]
+
     def at(self, at_ns: int) -> Rigid | None:
         """Give parent_from_child at a time, interpolated between two samples; None outside of them.
 

@@ -43,6 +43,11 @@ class Representation:
         """Show the name."""
         return f"<representation {self.name}>"
 
+    @property
+    def can_fail(self) -> bool:
+        """Tell whether finite numbers may be no rotation: a norm, an axis, a matrix; three angles always are one."""
+        return self._check is not None
+
     def to_quaternion(
         self, components: Components, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
     ) -> Quaternion:

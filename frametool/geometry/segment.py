@@ -46,13 +46,9 @@ def along(
     dx: Number, dy: Number, dz: Number, cx: Number, cy: Number, cz: Number, cw: Number, arc: Number,
     fraction: Number, xp: Namespace,
 ) -> Rigid:  # fmt: skip
-    """Give the pose at a fraction of the way from a, by what `prepare` gave; unit by one Newton step."""
+    """Give the pose at a fraction of the way from a, by what `prepare` gave; unit to some eps."""
     sine, cosine = xp.half_sincos(fraction * arc)
-    x = cosine * ax + sine * cx
-    y = cosine * ay + sine * cy
-    z = cosine * az + sine * cz
-    w = cosine * aw + sine * cw
-    scale = 1.5 - 0.5 * (x * x + y * y + z * z + w * w)
     return (
-        atx + fraction * dx, aty + fraction * dy, atz + fraction * dz, x * scale, y * scale, z * scale, w * scale,
+        atx + fraction * dx, aty + fraction * dy, atz + fraction * dz,
+        cosine * ax + sine * cx, cosine * ay + sine * cy, cosine * az + sine * cz, cosine * aw + sine * cw,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import hypothesis.strategies as st
@@ -59,7 +60,7 @@ class Oracle:
         for stamp, parent, pose in samples:
             if stamp == at:
                 return parent, as_matrix(*pose_of(pose))
-        for (begin, parent, first), (end, other, second) in zip(samples, samples[1:], strict=False):
+        for (begin, parent, first), (end, other, second) in pairwise(samples):
             if begin < at < end:
                 return parent, between(first, second if other == parent else first, (at - begin) / (end - begin))
         return None
