@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Report = Callable[[FormatError], None]
 
-_CHILD = re.compile("child_frame_id")
+_HEADER = re.compile(r"\bheader\b")
 
 
 class Recording:
@@ -184,7 +184,7 @@ def _message_samples(message: Message | FormatError, recording: Recording, repor
     except Misfit as misfit:
         report(message.error(misfit))
         return
-    numbers = _child_lines(message, len(found))
+    numbers = _header_lines(message, len(found))
     still = ros.topic_of(message.value).endswith("tf_static")
     for (transform, path), line in zip(found, numbers, strict=True):
         reading = Reading(message.source)
@@ -231,11 +231,11 @@ def _transforms(value: Any, path: Path, tally: Tally) -> Iterator[tuple[dict[str
         raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
 
 
-def _child_lines(message: Message, count: int) -> list[int]:
-    """Give the lines that name the children of a message's transforms."""
+def _header_lines(message: Message, count: int) -> list[int]:
+    """Give the lines on which the transforms of a message begin."""
     if message.source.text.count("\n") > 1:
         text = message.source.text
-        offsets = [match.start() for match in _CHILD.finditer(text)]
+        offsets = [match.start() for match in _HEADER.finditer(text)]
         if len(offsets) == count:
             return [message.line + text.count("\n", 0, offset) for offset in offsets]
     return [message.line] * count

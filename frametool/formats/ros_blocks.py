@@ -70,11 +70,11 @@ ROS1 = """\
 
 
 class Spelling(NamedTuple):
-    """How one of the tools prints a transform: a matcher of it, how many lines it takes, which one names the child."""
+    """How one of the tools prints a transform: a matcher of it, how many lines it takes, in which it begins."""
 
     match: Callable[[str, int], re.Match[str] | None]
     lines: int
-    child: int
+    first: int
 
 
 def _spelling(layout: str) -> Spelling:
@@ -82,8 +82,8 @@ def _spelling(layout: str) -> Spelling:
     pattern = layout.replace(":\n", ": ?\n").replace("-\n", "- ?\n")
     for mark, group in (("NUMBER", NUMBER), ("WHOLE", WHOLE), ("NAME", NAME)):
         pattern = pattern.replace(mark, group)
-    child = layout[: layout.index("child_frame_id")].count("\n")
-    return Spelling(re.compile(pattern, re.ASCII).match, layout.count("\n"), child)
+    first = layout[: layout.index("header")].count("\n")
+    return Spelling(re.compile(pattern, re.ASCII).match, layout.count("\n"), first)
 
 
 SPELLINGS = (_spelling(ROS2), _spelling(ROS1))
@@ -114,7 +114,7 @@ class Blocks:
             found = []
             at, line = head.end(), self.line + 1
             while entry := spelling.match(text, at):
-                sample = _sample(entry.groups(), self.tally, line + spelling.child)
+                sample = _sample(entry.groups(), self.tally, line + spelling.first)
                 if sample is None:
                     return
                 found.append(sample)
