@@ -47,7 +47,8 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
 
     A tree is written one line an edge, static2 (flags) unless --format says static1 (x y z qx qy qz qw PARENT CHILD)
     or another form. With --to rpy angles are written: --roll --pitch --yaw, and yaw pitch roll in static1, in radians.
-    Arguments that are read, in either spelling, become a tree entry: the pose of the child in its parent.
+    Arguments that are read, in either spelling, become a tree entry: the pose of the child in its parent. Their angles
+    are radians, as the tool has them; --deg is about the result.
     """
     flags = {name: value for name in FLAGS if (value := options.pop(name.replace("-", "_"))) is not None}
     form = options.pop("format_name")
@@ -61,7 +62,7 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
         return
     output = Output("tree", format_name=form, deg=deg, **options)
     tree = FrameTree("arguments")
-    pose = _pose(arguments, flags, Reading(Source("arguments", ""), degrees=deg, normalize=normalize))
+    pose = _pose(arguments, flags, Reading(Source("arguments", ""), normalize=normalize))
     tree.add_components(pose.parent or "", pose.name or "", pose.components)
     output.tree(tree)
 

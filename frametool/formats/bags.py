@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FileProblem, FormatError
+from frametool.errors import FileProblem, FormatError, FrametoolError
 from frametool.formats.ros_blocks import unit_components
 from frametool.formats.samples import Sample
 from frametool.frames.stamps import BILLION
@@ -28,7 +28,7 @@ def read_bag(path: str, tally: Tally) -> Iterator[Sample]:
     Raises FileProblem when the extra is missing, FormatError for a bag that is broken or holds no transforms.
     """
     try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.highlevel import AnyReader
     except ImportError:
         raise FileProblem(f"{path}: bags are read with an extra; install it: pip install 'frametool[bag]'") from None
     from pathlib import Path
@@ -38,8 +38,11 @@ def read_bag(path: str, tally: Tally) -> Iterator[Sample]:
     try:
         with AnyReader([Path(path)]) as reader:
             yield from _transforms(reader, path, tally)
-    except AnyReaderError as error:
-        raise FormatError(f"the bag cannot be read: {error}", source=path) from None
+    except FrametoolError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything, also MemoryError
+        said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
+        raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None
 
 
 def _transforms(reader: Any, path: str, tally: Tally) -> Iterator[Sample]:

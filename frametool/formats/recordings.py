@@ -127,7 +127,10 @@ def _samples(recording: Recording, report: Report) -> Iterator[Sample]:
     if recording.form in BAGS:
         from frametool.formats.bags import read_bag
 
-        yield from read_bag(recording.path, recording.tally)
+        try:
+            yield from read_bag(recording.path, recording.tally)
+        except FormatError as error:
+            report(error)
         return
     if recording.stream is not None and recording.form == "echo":
         for piece in documents(recording.stream, recording.name):
