@@ -27,6 +27,10 @@ COMMANDS = {
     "lookup": ("frametool.cli.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
     "apply": ("frametool.cli.apply", "points, vectors and poses moved into another frame"),
     "tree": ("frametool.cli.tree", "the tree of frames, drawn or written in another form"),
+    "echo": ("frametool.cli.echo", "where SOURCE is seen from TARGET as a recording goes by"),
+    "monitor": ("frametool.cli.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
+    "static": ("frametool.cli.static", "static_transform_publisher arguments, written and read"),
+    "check": ("frametool.cli.check", "what is wrong or odd in trees and recordings"),
     "sim": ("frametool.cli.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 HELP = """The calculator for rigid-body frames.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -9,16 +11,19 @@ import click
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, poses_from, source_of, usage_if_inline
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, announce, frame_name, load_tree, verbose_option
 from frametool.errors import FormatError, ValueInvalid
+from frametool.formats.load import open_source
 from frametool.formats.numbers import parse_number
 from frametool.formats.points import Point, read_moveables
 from frametool.formats.pose import Pose
+from frametool.formats.source import Source
 from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.formats.recordings import Recording
     from frametool.geometry.kinds import Rigid
 
 CHOICES = ("point", "vector", "pose")
@@ -29,6 +34,7 @@ CHOICES = ("point", "vector", "pose")
 @click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
 @click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
+@verbose_option
 @rotation_options
 @pose_options
 @result_options("points")
@@ -50,6 +56,15 @@ def command(
 
     A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
     each record says its own frame; without records standard input is read.
+
+    \b
+      ros2 topic echo /clicked_point | frametool apply tf.txt map
+
+    Records may be ROS messages, as the echo tools print them or as JSON lines: PointStamped, Vector3Stamped,
+    PoseStamped, PoseWithCovarianceStamped, WrenchStamped, TwistStamped, TransformStamped. Frame and stamp are those
+    of each header; the stamp and all other fields stay. Each 3x3 block C of a pose's covariance becomes R C R^T. A
+    wrench is that about TARGET's origin: force R f, torque R m + t x R f. A twist is the velocity of the same rigid
+    body at TARGET's origin: angular R w, linear R v + t x R w.
     """
     output = Output("points", deg=deg, **options)
     if pose is None:
@@ -57,18 +72,25 @@ def command(
     else:
         way, rest = _way_by_pose(_one_pose(pose, degrees=deg, normalize=normalize)), arguments
     records = _records(rest, kind, degrees=deg, normalize=normalize)
-    output.moved([move(record, way.from_frame(own_frame(record)), way.target) for record in records])
+    moved = (move(each, way.from_frame(own_frame(each), own_stamp(each)), way.target) for each in records)
+    first = next(moved)
+    if isinstance(first, (Pose, Point)):
+        output.moved([first, *moved])
+    else:
+        output.messages(itertools.chain([first], moved))
 
 
 class Way(NamedTuple):
     """Where records go: the target, and the transform that takes them there from the frame they are given in."""
 
     target: str | None
-    from_frame: Callable[[str | None], Rigid]
+    from_frame: Callable[[str | None, int | None], Rigid]
 
 
-def move(record: Pose | Point, target_from_source: Rigid, target: str | None) -> Pose | Point:
-    """Give a record as seen from the target: points shift and rotate, vectors rotate, poses compose."""
+def move(record: Any, target_from_source: Rigid, target: str | None) -> Any:
+    """Give a record as seen from the target: points shift and rotate, vectors rotate, poses compose, messages know."""
+    if not isinstance(record, (Pose, Point)):
+        return record.moved(target_from_source, target)
     if isinstance(record, Pose):
         return Pose.of(rigid.compose(*target_from_source, *record.components), record.name, target)
     if record.is_vector:
@@ -88,11 +110,11 @@ def _way_by_tree(arguments: Sequence[str], more: Sequence[str]) -> tuple[Way, Se
     if rest and not is_record(rest[0]):
         source, rest = frame_name(rest[0], tree), rest[1:]
 
-    def from_frame(own: str | None) -> Rigid:
+    def from_frame(own: str | None, at_ns: int | None) -> Rigid:
         start = _settled(own, source)
         if start is None:
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
-        return tree.lookup(target, start).components
+        return tree.lookup(target, start, at_ns).components
 
     return Way(target, from_frame), rest
 
@@ -100,16 +122,23 @@ def _way_by_tree(arguments: Sequence[str], more: Sequence[str]) -> tuple[Way, Se
 def _way_by_pose(pose: Pose) -> Way:
     """Move everything by one pose; where it names its frames, records must be given in its name."""
 
-    def from_frame(own: str | None) -> Rigid:
+    def from_frame(own: str | None, _at_ns: int | None) -> Rigid:
         _settled(own, pose.name)
         return pose.components
 
     return Way(pose.parent, from_frame)
 
 
-def own_frame(record: Pose | Point) -> str | None:
+def own_stamp(record: Any) -> int | None:
+    """Give the time a record says it is from."""
+    stamp_ns: int | None = getattr(record, "stamp_ns", None)
+    return stamp_ns
+
+
+def own_frame(record: Any) -> str | None:
     """Give the frame a record says it is given in."""
-    return record.parent if isinstance(record, Pose) else record.frame
+    frame: str | None = record.parent if isinstance(record, Pose) else record.frame
+    return frame
 
 
 def _settled(own: str | None, source: str | None) -> str | None:
@@ -133,7 +162,7 @@ def _one_pose(argument: str, *, degrees: bool, normalize: bool) -> Pose:
     return poses[0]
 
 
-def _records(arguments: Sequence[str], kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
+def _records(arguments: Sequence[str], kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Any]:
     """Read the records: bare numbers in threes, mappings, standard input."""
     pending: list[str] = []
     for argument in arguments or ("-",):
@@ -161,10 +190,25 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
         yield Point((x, y, z), kind or "point")
 
 
-def _read(argument: str, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
+def _input(argument: str) -> Source | Recording:
+    """Take an inline record as it stands, or look at what standard input holds."""
+    if is_inline(argument) or sys.stdin.isatty():
+        return source_of(argument)
+    source = open_source(argument)
+    announce(source)
+    return source
+
+
+def _read(argument: str, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Any]:
     """Read records from a mapping or from standard input, and take them for what --as says."""
+    source = _input(argument)
+    if not isinstance(source, Source):
+        from frametool.formats.stamped_stream import read_stamped_messages
+
+        yield from read_stamped_messages(source, kind, normalize=normalize)
+        return
     try:
-        records = read_moveables(source_of(argument), degrees=degrees, normalize=normalize)
+        records = read_moveables(source, degrees=degrees, normalize=normalize)
     except FormatError as error:
         raise usage_if_inline(error) from None
     for record in records:

@@ -10,7 +10,7 @@ import click
 from frametool.cli.command import TEXT, Command, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.times import TIME, at_ns, read_times, rules, rules_options, times_option
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
 from frametool.errors import LookupFailed
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 @click.option("--on-error", type=click.Choice(("fail", "skip")), default="fail", show_default=True,
               help="what a time without data does to --times; skip ends with exit code 3")
 @rules_options
+@verbose_option
 @rotation_options
 @result_options("poses")
 def command(

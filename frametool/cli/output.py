@@ -7,7 +7,7 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FileProblem
+from frametool.errors import FileProblem, ValueInvalid
 from frametool.formats import FORMATS, writers
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result, Style, is_locked, sample_results
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from frametool.formats.points import Point
+    from frametool.formats.stamped import Stamped
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.representations import Notation
 
@@ -40,6 +41,7 @@ class Output:
         """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
+        self.told = format_name is not None or _form_by_suffix(output, what) is not None
         form = (
             format_name
             or _form_by_suffix(output, what)
@@ -86,12 +88,45 @@ class Output:
         """Write points."""
         self.text(self._module("frametool.view.pose_text").write_points(records, self.style))
 
+    def report(self, entries: Sequence[dict[str, Any]]) -> None:
+        """Write flat records that are neither poses nor points."""
+        if self.style.form != "text":
+            self.text(self._module("").write_points(entries, self.style))
+            return
+        from frametool.view.report_text import write_report
+
+        self.text(write_report(entries, self.style))
+
     @property
     def _writes(self) -> tuple[str, ...]:
         return FORMATS[self.style.form].writes if self.style.form in FORMATS else ()
 
     def _module(self, text_module: str) -> Any:
         return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)
+
+    def messages(self, messages: Iterable[Stamped]) -> None:
+        """Write messages as they come, each as it was written unless the command was told otherwise."""
+        self.pieces(map(self._message, messages))
+
+    def _message(self, message: Stamped) -> str:
+        from frametool.formats.stamped import spelling
+
+        form = self.style.form if self.told or not message.form else message.form
+        if form == "text":
+            form = spelling(message.message)
+        if form == "csv":
+            raise ValueInvalid("a message is nested and has no place in csv; write json, yaml, ros1 or ros2")
+        style = self.style.in_form(form)
+        text: str = import_module(FORMATS[form].module).write_points([message.mapping()], style)
+        return f"{text}---\n" if form == "yaml" else text
+
+    def pieces(self, pieces: Iterable[str]) -> None:
+        """Write text as it comes; into a file, whole or not at all."""
+        if self.path is None or self.path == "-":
+            for piece in pieces:
+                sys.stdout.write(piece)
+        else:
+            write_whole(self.path, "".join(pieces), force=self.force)
 
     def text(self, text: str) -> None:
         """Write text to stdout, or to the file whole or not at all."""

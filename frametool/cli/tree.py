@@ -9,7 +9,7 @@ import click
 from frametool.cli.command import TEXT, Command, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import load_tree
+from frametool.cli.trees import load_tree, verbose_option
 from frametool.frames.tree import FrameTree
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
 @click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest of each edge]")
 @rules_options
+@verbose_option
 @rotation_options
 @result_options("tree")
 def command(

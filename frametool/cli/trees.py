@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+import sys
 from typing import TYPE_CHECKING
 
 import click
 
 from frametool.cli.command import Text
-from frametool.cli.poses import source_of
+from frametool.cli.poses import is_inline, source_of
 from frametool.errors import warn
-from frametool.formats.load import load_sources
+from frametool.formats.load import load_sources, open_source
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,16 +19,49 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
     from frametool.formats.assembly import Rules
+    from frametool.formats.recordings import Recording
+    from frametool.formats.source import Source
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
+
+VERBOSE = "frametool.verbose"
 
 
 def load_tree(argument: str, more: Sequence[str] = (), rules: Rules | None = None) -> FrameTree | TransformBuffer:
     """Read the tree of an argument (a file, inline, `-`, or `.` for FRAMETOOL_TREE) and merge further files into it."""
-    return load_sources([source_of(_tree_file(each)) for each in (argument, *more)], rules)
+    if (argument, *more).count("-") > 1:
+        raise click.UsageError("standard input can be read once; only one argument may be -")
+    return load_sources([_input(tree_file(each)) for each in (argument, *more)], rules)
 
 
-def _tree_file(argument: str) -> str:
+def _input(argument: str) -> Source | Recording:
+    """Take an inline tree as it stands, or open what the argument names."""
+    if is_inline(argument) or (argument == "-" and sys.stdin.isatty()):
+        return source_of(argument)
+    source = open_source(argument)
+    announce(source)
+    return source
+
+
+def announce(source: Source | Recording) -> None:
+    """Say what a file was taken for, if the command was asked to."""
+    context = click.get_current_context(silent=True)
+    if context is not None and context.meta.get(VERBOSE):
+        described = getattr(source, "described", f"{source.name}: a tree in YAML or JSON")
+        click.echo(f"frametool: {described}", err=True)
+
+
+def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:
+    context.meta[VERBOSE] = chosen
+
+
+verbose_option = click.option(
+    "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
+    help="say on stderr what each file was taken for",
+)  # fmt: skip
+
+
+def tree_file(argument: str) -> str:
     """Give the file that an argument stands for."""
     if argument != ".":
         return argument

@@ -74,5 +74,5 @@ def _cell(value: Any, style: Style) -> str:
     """Write one cell, quoted where a reader would split it."""
     if isinstance(value, float):
         return style.number(value)
-    text = str(value)
+    text = "" if value is None else str(value)
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from frametool.formats.assembly import Place
+    from frametool.formats.recordings import Recording
     from frametool.formats.trees import Edge
     from frametool.formats.values import Path
     from frametool.frames.buffer import TransformBuffer
@@ -50,27 +51,83 @@ def load(
 ) -> FrameTree | TransformBuffer:
     """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 
-    paths: YAML or JSON in the forms of `frametool.formats.trees`; `-` is standard input.
+    paths: trees in YAML or JSON (`frametool.formats.trees`) and recordings (`frametool.formats.detect`); `-` is
+    standard input.
     moving: an edge with a single stamp answers only that instant; otherwise it counts as standing.
     policy, keep_ns: as TransformBuffer has them.
     Raises FormatError and BadTopology with file, line and column; FileProblem.
     """
-    sources = [Source("stdin" if str(path) == "-" else str(path), read_text(path)) for path in paths]
-    return load_sources(sources, Rules(moving=moving, policy=policy, keep_ns=keep_ns))
+    return load_sources([open_source(path) for path in paths], Rules(moving=moving, policy=policy, keep_ns=keep_ns))
 
 
-def load_sources(sources: Sequence[Source], rules: Rules | None = None) -> FrameTree | TransformBuffer:
-    """Merge the frames of several texts; otherwise as `load`."""
+def open_source(path: str | PathLike[str]) -> Source | Recording:
+    """Open a file, a bag's folder or, for `-`, standard input; what is no recording is read whole.
+
+    Raises FileProblem, and FormatError for what is no text.
+    """
+    if _is_plainly_tree(str(path)):
+        return Source(str(path), read_text(path))
+    from frametool.formats.recordings import Recording
+
+    recording = Recording(path)
+    return recording if recording.holds_samples else Source(recording.name, recording.text())
+
+
+def _is_plainly_tree(path: str) -> bool:
+    """Tell a tree from what its first bytes say, without loading the readers of recordings (10 ms)."""
+    try:
+        with open(path, "rb") as stream:  # noqa: PTH123 (pathlib costs 6 ms at start-up)
+            head = stream.read(4096)
+    except (OSError, ValueError):
+        return False
+    return head.startswith((b"frames:", b'{"frames"')) or b"\nframes:" in head
+
+
+def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = None) -> FrameTree | TransformBuffer:
+    """Merge the frames of several texts and recordings; otherwise as `load`."""
     assembly = Assembly(", ".join(source.name for source in sources), rules)
+    raw = assembly.rules.policy != "frametool"
     with paused_collector():
         for source in sources:
-            for found in edges_of(source, raw=assembly.rules.policy != "frametool"):
-                edge = found.edge
-                if edge.parent is None:
-                    assembly.add_root(edge.child)
-                else:
-                    assembly.add(edge.parent, edge.child, edge.pose.components, edge.stamp_ns, found)
+            if isinstance(source, Source):
+                _add_tree(assembly, source, raw=raw)
+            else:
+                _add_recording(assembly, source, raw=raw)
         return assembly.finish()
+
+
+def _add_tree(assembly: Assembly, source: Source, *, raw: bool) -> None:
+    for found in edges_of(source, raw=raw):
+        edge = found.edge
+        if edge.parent is None:
+            assembly.add_root(edge.child)
+        else:
+            assembly.add(edge.parent, edge.child, edge.pose.components, edge.stamp_ns, found)
+
+
+def _add_recording(assembly: Assembly, recording: Recording, *, raw: bool) -> None:
+    sample = None
+    for sample in recording.samples(raw=raw):
+        spot = Spot(recording.name, sample.line)
+        assembly.add(sample.parent, sample.child, sample.components, sample.stamp_ns, spot)
+    if sample is None:
+        raise FormatError("no frames in it", source=recording.name)
+
+
+class Spot(NamedTuple):
+    """A line of a recording."""
+
+    source: str
+    line: int
+
+    def error(self, message: str, kind: type[FormatError]) -> FormatError:
+        """Make the error for this line."""
+        return kind(message, source=self.source, line=self.line)
+
+    def seen_from(self, other: Place) -> str:
+        """Give `line 7`, or `tf.txt:7` beside a place in another file."""
+        same = isinstance(other, Spot) and other.source == self.source
+        return f"line {self.line}" if same else f"{self.source}:{self.line}"
 
 
 def edges_of(source: Source, *, raw: bool = False) -> Iterator[Found]:
@@ -82,7 +139,7 @@ def edges_of(source: Source, *, raw: bool = False) -> Iterator[Found]:
         try:
             for edge in read_edges(document.value, reading):
                 count += 1
-                yield Found(edge if raw else _without_slashes(edge, reading), source, document.index)
+                yield Found(edge if raw else without_slashes(edge, reading), source, document.index)
         except Misfit as misfit:
             raise format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key) from None
         notes += [((document.index, *path), message) for path, message in reading.notes]
@@ -91,7 +148,7 @@ def edges_of(source: Source, *, raw: bool = False) -> Iterator[Found]:
     tell(source, notes)
 
 
-def _without_slashes(edge: Edge, reading: Reading) -> Edge:
+def without_slashes(edge: Edge, reading: Reading) -> Edge:
     """Take one leading `/` off the names, which tf2 has given up, and say so."""
     if edge.child[0] != "/" and (edge.parent or "")[:1] != "/":
         return edge

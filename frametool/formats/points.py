@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.formats.pose import POSITION_KEYS, Pose, read_name, read_position
+from frametool.formats.pose import POSITION_KEYS, read_name, read_position
 from frametool.formats.records import read_all, read_one_pose
 from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS
 from frametool.formats.values import Misfit, Reading, read_numbers, within
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 BESIDE_POINT = ("frame", "name")
+MESSAGE_KEYS = frozenset(("header", "linear", "force"))
 
 
 class Point(NamedTuple):
@@ -45,13 +46,21 @@ class Point(NamedTuple):
         return about | {self.key: dict(zip("xyz", values, strict=True)) if self.named else values}
 
 
-def read_moveables(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose | Point]:
-    """Read every point and pose of a text: what has a rotation is a pose, what has only a position a point."""
+def read_moveables(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Any]:
+    """Read every point and pose of a text: what has a rotation is a pose, what has only a position a point.
+
+    ROS messages that can be moved are `frametool.formats.stamped.Stamped`.
+    """
     return read_all(source, _moveable, degrees=degrees, normalize=normalize)
 
 
-def _moveable(value: Any, reading: Reading) -> Pose | Point:
-    """Read a point if there is a position and no rotation, else a pose."""
+def _moveable(value: Any, reading: Reading) -> Any:
+    """Read a point if there is a position and no rotation, else a pose; a ROS message as what it is."""
+    if type(value) is dict and not MESSAGE_KEYS.isdisjoint(value) and "child_frame_id" not in value:
+        from frametool.formats.stamped import kind_of, read_stamped
+
+        if key := kind_of(value):
+            return read_stamped(value, key, reading)
     if type(value) is list and len(value) == 3 and not any(type(item) is list for item in value):
         return Point(read_position(value, 1.0))
     if type(value) is not dict or any(key in ROTATION_KEYS or key in ("child_frame_id", AXES_KEY) for key in value):

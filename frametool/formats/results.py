@@ -45,6 +45,12 @@ class Style:
         self.precision = precision
         self.keep_sign = keep_sign
 
+    def in_form(self, form: str) -> Style:
+        """Give the same style in another form."""
+        return Style(
+            form, self.notations, degrees=self.degrees, precision=self.precision, keep_sign=self.keep_sign
+        )
+
     def number(self, value: float) -> str:
         """Write a number: shortest text that reads back to the same bits, or fixed decimals."""
         return repr(value) if self.precision is None else f"{value:.{self.precision}f}"

@@ -1,0 +1,72 @@
+"""What `monitor` tells, as plain mappings with units in their keys: one an edge, and one for a chain of edges."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.frames.edge_log import common_interval
+from frametool.frames.stamps import BILLION
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.frames.edge_log import EdgeLog
+
+
+def edge_entry(log: EdgeLog) -> dict[str, Any]:
+    """Describe an edge; what is not known or does not apply is None."""
+    longest = log.longest
+    delays = log.delays_ns
+    return {
+        "kind": "moving" if log.moves else "static",
+        "parent": log.parent,
+        "child": log.child,
+        "count": log.count,
+        "rate_hz": log.rate,
+        "first_ns": log.first_ns,
+        "last_ns": log.last_ns,
+        "gap_s": longest.pause_ns / BILLION if longest else None,
+        "gap_until_ns": longest.stamp_ns if longest else None,
+        "delay_mean_s": sum(delays) / len(delays) / BILLION if delays else None,
+        "delay_max_s": max(delays) / BILLION if delays else None,
+        "jumps": len(log.jumps()),
+        "backward": log.backward,
+        "parents": ", ".join(log.parents),
+    }
+
+
+def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, Any]:
+    """Describe the edges between two frames together: their common interval, and their worst."""
+    interval = common_interval(logs)
+    entries = [edge_entry(log) for log in logs]
+    first, last = interval or (None, None)
+    return {
+        "kind": "chain",
+        "parent": target,
+        "child": source,
+        "count": sum(log.count for log in logs),
+        "rate_hz": _extreme(min, [entry["rate_hz"] for entry in entries]),
+        "first_ns": first,
+        "last_ns": last,
+        "gap_s": _extreme(max, [entry["gap_s"] for entry in entries]),
+        "gap_until_ns": None,
+        "delay_mean_s": None,
+        "delay_max_s": _extreme(max, [entry["delay_max_s"] for entry in entries]),
+        "jumps": sum(entry["jumps"] for entry in entries),
+        "backward": sum(entry["backward"] for entry in entries),
+        "parents": " <- ".join([target, *_frames_between(target, logs)]),
+    }
+
+
+def _frames_between(target: str, logs: Sequence[EdgeLog]) -> list[str]:
+    """Walk the edges from the target: each leads from the frame reached to its other end."""
+    frames, here = [], target
+    for log in logs:
+        here = log.parent if log.child == here else log.child
+        frames.append(here)
+    return frames
+
+
+def _extreme(choose: Any, values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return choose(known) if known else None

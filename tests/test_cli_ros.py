@@ -1,0 +1,292 @@
+"""echo, monitor, static, check and ROS messages in apply, from outside."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import yaml
+
+from frametool.formats.findings import RULES
+from frametool.formats.results import Style
+from frametool.formats.ros_form import message_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Outcome
+
+    Run = Callable[..., Outcome]
+
+BILLION = 10**9
+EPOCH = 1_700_000_000 * BILLION
+
+
+def transform(parent: str, child: str, stamp_ns: int, x: float = 0.0, turn: float = 0.0) -> dict[str, Any]:
+    """Give a transform at x, turned about z by radians."""
+    stamp = dict(zip(("sec", "nanosec"), divmod(stamp_ns, BILLION), strict=True))
+    rotation = {"x": 0.0, "y": 0.0, "z": math.sin(turn / 2), "w": math.cos(turn / 2)}
+    inner = {"translation": {"x": x, "y": 0.0, "z": 0.0}, "rotation": rotation}
+    return {"header": {"stamp": stamp, "frame_id": parent}, "child_frame_id": child, "transform": inner}
+
+
+def dump(*transforms: dict[str, Any], form: str = "ros2") -> str:
+    return "".join(message_text({"transforms": [each]}, Style(form)) for each in transforms)
+
+
+DRIVE = dump(*(transform("map", "base", EPOCH + at * BILLION // 10 + 1, 0.1 * at) for at in range(21)))
+STATIC = dump(transform("base", "cam", EPOCH, 0.5))
+FILES = {"tf.txt": DRIVE, "tf_static.txt": STATIC}
+BOTH = ("tf.txt", "--with", "tf_static.txt")
+
+
+# --- lookups in recordings -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", ["json", "yaml", "ros1", "ros2", "foxglove", "csv"])
+def test_a_stamp_of_nanoseconds_comes_out_exact_in_every_form(run: Run, form: str) -> None:
+    found = run("lookup", *BOTH, "map", "cam", "--at", f"{EPOCH + 123456789}ns", "-f", form, files=FILES)
+    assert (found.status, found.err) == (0, "")
+    assert re.search(r"1700000000123456789|1700000000\D+123456789\b", found.out)
+
+
+@pytest.mark.parametrize("form", ["ros1", "ros2", "foxglove", "static2", "yaml", "json"])
+def test_what_is_written_of_a_lookup_is_a_tree_again(run: Run, form: str) -> None:
+    written = run("lookup", *BOTH, "map", "cam", "--at", "1700000000.5", "-f", form, files=FILES).out
+    again = json.loads(run("lookup", "-", "map", "cam", "-f", "json", stdin=written).out)
+    assert again["xyz"] == pytest.approx([0.999999999, 0.0, 0.0], abs=1e-9)
+
+
+def test_files_and_standard_input_are_merged(run: Run) -> None:
+    found = run("lookup", "-", "map", "cam", "--with", "tf_static.txt", "-f", "json", stdin=DRIVE, files=FILES)
+    assert json.loads(found.out)["xyz"] == [2.5, 0.0, 0.0]
+
+
+def test_what_was_detected_is_said_on_request(run: Run) -> None:
+    assert run("tree", "tf.txt", files=FILES).err == ""
+    assert "tf.txt: messages as `ros2 topic echo`" in run("tree", "-v", "tf.txt", files=FILES).err
+
+
+# --- echo ----------------------------------------------------------------------------------------------------------
+
+
+def test_echo_prints_the_block_of_tf2_echo_with_whole_stamps(run: Run) -> None:
+    found = run("echo", *BOTH, "map", "cam", "--rate", "2", "--limit", "1", files=FILES)
+    assert found.out == (
+        "cam seen from map (maps points in cam to points in map)\n"
+        "At time 1700000000.000000001\n"
+        "- Translation: [0.500, 0.000, 0.000]\n"
+        "- Rotation: in Quaternion [0.000, 0.000, 0.000, 1.000]\n"
+        "- Rotation: in RPY (radian) [0.000, 0.000, 0.000]\n"
+        "- Rotation: in RPY (degree) [0.000, 0.000, 0.000]\n"
+        "- Matrix:\n"
+        "  1.000  0.000  0.000  0.500\n"
+        "  0.000  1.000  0.000  0.000\n"
+        "  0.000  0.000  1.000  0.000\n"
+        "  0.000  0.000  0.000  1.000\n"
+    )
+
+
+def test_echo_goes_by_the_time_of_the_recording(run: Run) -> None:
+    rows = run("echo", *BOTH, "map", "cam", "--rate", "4", "-f", "json", files=FILES).out.splitlines()
+    assert [json.loads(row)["stamp_ns"] - EPOCH - 1 for row in rows] == [at * BILLION // 4 for at in range(9)]
+
+
+def test_echo_tells_of_times_without_data_and_goes_on(run: Run) -> None:
+    found = run("echo", *BOTH, "map", "cam", "--start", "1699999999", "-f", "json", files=FILES)
+    assert found.status == 3
+    assert len(found.out.splitlines()) == 2
+    assert "2 times without data" in found.err
+
+
+def test_echo_of_what_stands_still_has_no_time(run: Run) -> None:
+    out = run("echo", "tf_static.txt", "base", "cam", files=FILES).out
+    assert "At any time: the frames stand still" in out
+
+
+# --- monitor -------------------------------------------------------------------------------------------------------
+
+
+def test_monitor_tells_rate_interval_gap_and_jump_of_an_edge(run: Run) -> None:
+    samples = [transform("map", "base", EPOCH + at * BILLION // 10, 0.1 * at) for at in range(10)]
+    samples += [transform("map", "base", EPOCH + (at + 20) * BILLION // 10, 5 + 0.1 * at) for at in range(10)]
+    entry = json.loads(run("monitor", "-", "-f", "json", stdin=dump(*samples)).out)
+    assert (entry["count"], entry["first_ns"], entry["last_ns"]) == (20, EPOCH, EPOCH + 2_900_000_000)
+    assert (entry["rate_hz"], entry["gap_s"], entry["jumps"]) == (19 / 2.9, 1.1, 1)
+    assert entry["gap_until_ns"] == EPOCH + 2 * BILLION
+
+
+def test_monitor_tells_the_common_interval_of_a_chain(run: Run) -> None:
+    late = dump(*(transform("base", "arm", EPOCH + BILLION + at * BILLION) for at in range(5)))
+    found = run("monitor", "tf.txt", "--with", "arm.txt", "map", "arm", files=FILES | {"arm.txt": late})
+    chain = list(yaml.safe_load_all(found.out))[-1]
+    assert (chain["kind"], chain["first_ns"], chain["last_ns"]) == ("chain", EPOCH + BILLION, EPOCH + 2 * BILLION + 1)
+
+
+def test_monitor_knows_the_delay_from_a_csv_recording(run: Run) -> None:
+    rows = [f"{EPOCH + at + 2_000_000},0,{EPOCH + at},map,base,0,0,0,0,0,0,1" for at in (0, BILLION)]
+    text = "\n".join(["%time,field.transforms0.header.seq,rest", *rows]) + "\n"
+    entry = json.loads(run("monitor", "-", "-f", "json", stdin=text).out)
+    assert (entry["delay_mean_s"], entry["delay_max_s"]) == (0.002, 0.002)
+
+
+# --- static --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", ["static1", "static2"])
+def test_static_lines_of_a_tree_are_that_tree_again(run: Run, form: str) -> None:
+    tree = "frames: {base: {cam: {xyz: [0.1, 0, 0.2], rpy_deg: [0, 15, 90]}, lidar: {xyz: [0, 0, 1]}}}"
+    lines = run("static", "tree.yaml", "-f", form, files={"tree.yaml": tree}).out
+    assert lines.count("\n") == 2
+    again, first = (run("tree", *arguments, "-f", "json") for arguments in (["tree.yaml"], ["tree.yaml"]))
+    assert run("tree", "-", "-f", "json", stdin=lines).out == again.out == first.out
+
+
+def test_static_arguments_become_a_tree_entry(run: Run) -> None:
+    flags = ("--x", "-0.1", "--yaw", "1.5", "--frame-id", "base", "--child-frame-id", "cam")
+    assert run("static", *flags).out == run("static", "-0.1", "0", "0", "1.5", "0", "0", "base", "cam").out
+    assert yaml.safe_load(run("static", *flags).out)["frames"][1]["xyz"] == [-0.1, 0.0, 0.0]
+
+
+def test_static_refuses_what_moves_and_what_is_no_rotation(run: Run) -> None:
+    assert run("static", "tf.txt", files=FILES).err == "frametool: frames move and cannot be published as static: base\n"
+    assert run("static", "--qz", "0.5", "--frame-id", "a", "--child-frame-id", "b").status == 1
+    assert run("static", "1", "2", "3").status == 2
+
+
+# --- apply ---------------------------------------------------------------------------------------------------------
+
+
+def stamped(stamp_ns: int, **fields: Any) -> dict[str, Any]:
+    seconds, nanoseconds = divmod(stamp_ns, BILLION)
+    return {"header": {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": "cam"}, **fields}
+
+
+POINTS = [stamped(EPOCH + 1 + at * BILLION // 2, point={"x": 1.0, "y": 0.0, "z": 0.0}) for at in range(3)]
+
+
+def test_each_message_moves_at_its_own_stamp(run: Run) -> None:
+    text = "".join(json.dumps(point) + "\n" for point in POINTS)
+    rows = run("apply", *BOTH, "map", stdin=text, files=FILES).out.splitlines()
+    assert [json.loads(row)["point"]["x"] for row in rows] == pytest.approx([1.5, 2.0, 2.5])
+    assert [json.loads(row)["header"] for row in rows] == [point["header"] | {"frame_id": "map"} for point in POINTS]
+
+
+@pytest.mark.parametrize("form", ["ros1", "ros2"])
+def test_messages_come_out_as_they_went_in(run: Run, form: str) -> None:
+    twist = {"linear": {"x": 2.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": -0.25}}
+    pose = {"position": {"x": 1.0, "y": 0.0, "z": 1e-05}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}}
+    for message in (twist, POINTS[0], stamped(5, pose=pose), {"transforms": [transform("map", "on", EPOCH + 1)]}):
+        text = message_text(message, Style(form))
+        assert run("apply", "--transform", "{}", stdin=text).out == text
+
+
+def test_a_message_is_written_in_the_spelling_asked_for(run: Run) -> None:
+    out = run("apply", "--transform", "{}", "-f", "ros1", stdin=json.dumps(POINTS[0])).out
+    assert out.startswith('header: \n  seq: 0\n  stamp: \n    secs: 1700000000\n    nsecs:         1\n  frame_id: "cam"\n')
+
+
+def test_a_cut_covariance_is_refused_with_its_place(run: Run) -> None:
+    pose = {"position": {"x": 1.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    text = message_text(stamped(5, pose={"pose": pose, "covariance": [0.0, "..."]}), Style("ros2"))
+    found = run("apply", "--transform", "{}", stdin=text)
+    assert (found.status, found.out) == (1, "")
+    assert "stdin:19:" in found.err and "--full-length" in found.err  # noqa: PT018 - one message
+
+
+# --- check ---------------------------------------------------------------------------------------------------------
+
+OK = "{name: a, parent: map, xyz: [1, 0, 0]}"
+TREES = {
+    "syntax": "{name: a, parnt: map}",
+    "denormalized": "{name: a, parent: map, quaternion: {x: 0, y: 0, z: 0, w: 0.9}}",
+    "rounded": "{name: a, parent: map, quaternion: {x: 0, y: 0, z: 0, w: 1.0001}}",
+    "mirrored": "{name: a, parent: map, matrix: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}",
+    "not-finite": "{name: a, parent: map, xyz: [.nan, 0, 0]}",
+    "degrees": "{name: a, parent: map, rpy: [0, 0, 90]}",
+    "w-first": "{name: a, parent: map, xyzw: [1, 0, 0, 0]}",
+    "identity": "{name: a, parent: map}",
+    "self": "{name: a, parent: a, xyz: [1, 0, 0]}",
+    "cycle": "[{name: a, parent: b, xyz: [1, 0, 0]}, {name: b, parent: a, xyz: [1, 0, 0]}]",
+    "two-parents": f"[{OK}, {{name: a, parent: odom, xyz: [1, 0, 0]}}]",
+    "two-poses": f"[{OK}, {{name: a, parent: map, xyz: [2, 0, 0]}}]",
+    "several-roots": f"[{OK}, {{name: b, parent: odom, xyz: [1, 0, 0]}}]",
+    "slash": "{name: a, parent: /map, xyz: [1, 0, 0]}",
+    "empty": "frames:\n",
+}
+
+
+def moving(*stamps_and_places: tuple[float, float], parents: str = "m") -> str:
+    names = {"m": "map", "o": "odom"}
+    return dump(
+        *(
+            transform(names[parents[index % len(parents)]], "a", EPOCH + round(at * BILLION), x)
+            for index, (at, x) in enumerate(stamps_and_places)
+        )
+    )
+
+
+STEADY = [(0.1 * at, 0.01 * at) for at in range(20)]
+RECORDINGS = {
+    "repeated": moving(*STEADY, STEADY[-1]),
+    "repeated-stamp": moving(*STEADY, (1.9, 0.5)),
+    "backward": moving(*STEADY, (0.55, 0.055)),
+    "gap": moving(*STEADY, (5.0, 0.2)),
+    "jump": moving(*STEADY, (2.0, 7.0)),
+    "reparented": moving(*STEADY[:2]) + moving(*STEADY[2:], parents="o"),
+    "flicker": moving(*STEADY, parents="mo"),
+    "static-and-moving": moving(*STEADY),
+    "noise": "WARNING: topic [/tf] does not appear to be published yet\n" + moving(*STEADY),
+}
+
+
+def findings(run: Run, text: str, *more: str) -> list[dict[str, Any]]:
+    files = {"in.txt": text, "more.yaml": "frames: {map: {a: {xyz: [1, 0, 0]}}}"}
+    return [json.loads(line) for line in run("check", "in.txt", *more, "-f", "json", files=files).out.splitlines()]
+
+
+@pytest.mark.parametrize("rule", [*TREES, *RECORDINGS])
+def test_each_rule_finds_what_it_is_about_with_its_place(run: Run, rule: str) -> None:
+    text = (TREES | RECORDINGS)[rule]
+    more = ("more.yaml",) if rule == "static-and-moving" else ()
+    found = {each["rule"]: each for each in findings(run, text, *more)}
+    assert rule in found
+    assert found[rule]["level"] == RULES[rule][0]
+    assert found[rule]["line"] >= 1
+    assert found[rule]["column"] >= 1
+
+
+def test_a_sound_tree_and_a_sound_recording_have_no_findings(run: Run) -> None:
+    assert findings(run, "frames: {map: {b: {xyz: [1, 0, 0], rpy_deg: [180, 0, 0]}}}") == []
+    assert findings(run, moving(*STEADY)) == []
+
+
+def test_every_rule_but_the_rest_is_tested() -> None:
+    assert {*TREES, *RECORDINGS} == set(RULES) - {"odd"}
+
+
+def test_one_bad_entry_does_not_hide_the_others(run: Run) -> None:
+    text = f"frames:\n- {TREES['degrees']}\n- {TREES['mirrored']}\n- {TREES['not-finite']}\n"
+    assert [(each["line"], each["rule"]) for each in findings(run, text)] == [
+        (2, "degrees"), (3, "mirrored"), (4, "not-finite"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rule", "plain", "strict"), [("cycle", 1, 1), ("degrees", 0, 1), ("several-roots", 0, 0), ("gap", 0, 1)]
+)
+def test_errors_fail_and_warnings_fail_when_strict(run: Run, rule: str, plain: int, strict: int) -> None:
+    files = {"in.txt": (TREES | RECORDINGS)[rule]}
+    assert run("check", "in.txt", files=files).status == plain
+    assert run("check", "in.txt", "--strict", files=files).status == strict
+
+
+def test_findings_are_lines_that_editors_and_github_understand(run: Run) -> None:
+    files = {"a.yaml": TREES["denormalized"]}
+    text = run("check", "a.yaml", files=files).out
+    assert re.fullmatch(r"a\.yaml:1:\d+: error: quaternion 0 0 0 0\.9 has norm 0\.9; .* \[denormalized\]\n", text)
+    github = run("check", "a.yaml", "-f", "github", files=files).out
+    assert re.fullmatch(r"::error file=a\.yaml,line=1,col=\d+,title=denormalized::quaternion .*\n", github)
