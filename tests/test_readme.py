@@ -59,7 +59,8 @@ def test_an_example_in_a_help_runs(name: str, command: str, bin_folder: Path, tm
         ["bash", "-o", "pipefail", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False,
         stdin=subprocess.DEVNULL, env={"PATH": f"{bin_folder}:/usr/bin:/bin"},
     )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, ""), name
+    assert done.returncode == 0, name
+    assert name == "sim" or not done.stderr  # the turtles sum up there what they did
 
 
 def test_every_command_has_an_example_in_its_help_and_in_the_readme() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -31,6 +31,7 @@ COMMANDS = {
     "monitor": ("frametool.cli.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
     "static": ("frametool.cli.static", "static_transform_publisher arguments, written and read"),
     "check": ("frametool.cli.check", "what is wrong or odd in trees and recordings"),
+    "sim": ("frametool.cli.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 HELP = """The calculator for rigid-body frames.
 
@@ -44,18 +45,31 @@ points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
 """
 
 
+class ReaderGone(Exception):
+    """Say that nobody reads stdout any more."""
+
+
 class Group(WithHelp, click.Group):
-    """The commands of the table, each imported when it is called and not before."""
+    """The commands of a table, each imported when it is called and not before."""
+
+    table = COMMANDS
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; a closed pipe leaves as an error that click does not turn into status 1."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise ReaderGone from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Name the commands, in the table's order."""
-        return list(COMMANDS)
+        return list(self.table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         """Import one command."""
-        if cmd_name not in COMMANDS:
+        if cmd_name not in self.table:
             return None
-        command: click.Command = import_module(COMMANDS[cmd_name][0]).command
+        command: click.Command = import_module(self.table[cmd_name][0]).command
         return command
 
     def resolve_command(
@@ -64,20 +78,20 @@ class Group(WithHelp, click.Group):
         args: list[str],
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command, or say which ones there are."""
-        if args and args[0] not in COMMANDS:
-            raise click.UsageError(f"no command {args[0]!r}{alternatives(args[0], COMMANDS, 'commands')}", ctx)
+        if args and args[0] not in self.table:
+            raise click.UsageError(f"no command {args[0]!r}{alternatives(args[0], self.table, 'commands')}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands from the table, without importing any."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+            formatter.write_dl([(name, summary) for name, (_, summary) in self.table.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete command names from the table."""
         from click.shell_completion import CompletionItem
 
-        named = [CompletionItem(name, help=row[1]) for name, row in COMMANDS.items() if name.startswith(incomplete)]
+        named = [CompletionItem(name, help=row[1]) for name, row in self.table.items() if name.startswith(incomplete)]
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
@@ -117,7 +131,7 @@ def run(arguments: list[str]) -> int:
         return 130
     except FrametoolError as error:
         return _report(error, arguments)
-    except BrokenPipeError:
+    except (ReaderGone, BrokenPipeError):
         return _die_of_closed_pipe()
     except OSError as error:
         return _complain(f"{error.strerror or error}", 5)

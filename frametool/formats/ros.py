@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from frametool.formats.values import Path, Quaternion, Reading, Vector
 
 LISTS = ("transforms", "static_transforms")
+MARKS = frozenset(("child_frame_id", *LISTS))
 STALE = "euler_angles_degree"  # Apollo writes it beside the quaternion and does not keep it up to date
 BESIDE_LIST = ("timestamp",)  # of a FrameTransforms message
 PARTS = "a TransformStamped has header, child_frame_id, transform"
@@ -29,7 +30,7 @@ STALE_DEGREES = 0.1
 
 def is_message(value: dict[str, Any]) -> bool:
     """Tell whether a mapping is a TransformStamped, a list of them, or either in rosbridge's envelope."""
-    return "child_frame_id" in value or any(key in value for key in LISTS) or is_envelope(value)
+    return not MARKS.isdisjoint(value) or is_envelope(value)
 
 
 def is_envelope(value: dict[str, Any]) -> bool:

@@ -131,7 +131,7 @@ def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]
             yield from _entry(entry, here, reading)
 
 
-def _entry(entry: Any, path: Path, reading: Reading) -> Iterator[Edge]:
+def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
     """Read {name, parent, pose} or {name, parent, samples}; without parent and pose it only names a root."""
     try:
         pose = read_pose(as_mapping(entry, "an entry {name, parent, ..}"), reading, TIMED)
@@ -139,10 +139,9 @@ def _entry(entry: Any, path: Path, reading: Reading) -> Iterator[Edge]:
             raise Misfit("missing name; an entry is {name: .., parent: .., xyz: [..], ..}")
         if pose.parent is None and (pose.position or pose.rotation):
             raise Misfit(f"frame {pose.name!r} has a pose but no parent")
-        edges = _edges(entry, pose, pose.parent, pose.name, path, reading)
+        return _edges(entry, pose, pose.parent, pose.name, path, reading)
     except Misfit as misfit:
         raise misfit.below(*path) from None
-    yield from edges
 
 
 def _edges(
@@ -214,9 +213,9 @@ def _sample(sample: Any, reading: Reading) -> tuple[Pose, int]:
 
 def stamp_of(entry: dict[str, Any]) -> int | None:
     """Read `stamp: 12.5` in seconds or `stamp_ns: 12500000000`, exactly; None where there is neither."""
-    keys = [key for key in ("stamp", "stamp_ns") if key in entry]
-    if not keys:
+    if STAMP_KEYS.isdisjoint(entry):
         return None
+    keys = [key for key in ("stamp", "stamp_ns") if key in entry]
     if len(keys) > 1:
         raise Misfit("stamp and stamp_ns in one entry; keep one", ("stamp",), key=True)
     text = entry[keys[0]]

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     Stamps = NDArray[np.int64]
     Floats = NDArray[np.float64]
     Columns = tuple[Any, ...]
+    Way = tuple[tuple[str, ...], tuple[str, ...]]
 
 
 SHARED = 4  # times a sample
@@ -85,22 +86,37 @@ def _fill_sorted(out: Floats, buffer: TransformBuffer, target: str, source: str,
     """Compute sorted times, in stretches on which no parent changes."""
     buffer.require(target, source)
     if times.size:
-        _plan_at(buffer, target, source, int(times[0]))  # finds out whether newest parents form a circle
+        _way_at(buffer, target, source, int(times[0]))  # finds out whether newest parents form a circle
     edges = buffer.changes()
-    cuts = [0, *np.searchsorted(times, edges).tolist(), times.size]
     if not edges:
-        buffer.plan(target, source, None)  # raises for frames that are not connected
+        _fill(out, buffer.plan(target, source, None), times)
+        return
+    cuts = [0, *np.searchsorted(times, edges).tolist(), times.size]
+    for way, parts in _stretches(buffer, target, source, times, cuts).items():
+        at = np.concatenate([np.arange(begin, end) for begin, end in parts])
+        piece = np.empty((7, at.size))
+        _fill(piece, None if way is None else buffer.plan_of(*way), times[at])
+        out[:, at] = piece
+
+
+def _stretches(
+    buffer: TransformBuffer, target: str, source: str, times: Stamps, cuts: list[int]
+) -> dict[Way | None, list[tuple[int, int]]]:
+    """Give the stretches between cuts that have any times, by the way that holds in each; None where there is none."""
+    stretches: dict[Way | None, list[tuple[int, int]]] = {}
     for begin, end in itertools.pairwise(cuts):
         if begin < end:
-            _fill(out[:, begin:end], _plan_at(buffer, target, source, int(times[begin])), times[begin:end])
+            stretches.setdefault(_way_at(buffer, target, source, int(times[begin])), []).append((begin, end))
+    return stretches
 
 
-def _plan_at(buffer: TransformBuffer, target: str, source: str, at_ns: int) -> Plan | None:
-    """Give the way at a time; None where a changing parent leaves none."""
+def _way_at(buffer: TransformBuffer, target: str, source: str, at_ns: int) -> Way | None:
+    """Name the edges between two frames at a time; None where a changing parent leaves no way."""
     try:
-        return buffer.plan(target, source, at_ns)
+        down, up = buffer.between(target, source, at_ns)
     except (NoDataAt, NotConnected):
         return None
+    return tuple(down), tuple(up)
 
 
 def _fill(out: Floats, plan: Plan | None, times: Stamps) -> None:

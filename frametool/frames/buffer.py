@@ -13,6 +13,7 @@ from frametool.geometry import rigid
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any
 
     from frametool.frames.track import Track
@@ -130,13 +131,13 @@ class TransformBuffer(TrackStore):
 
         Raises UnknownFrame, NotConnected.
         """
-        down, up = self._between(target, source, at_ns)
+        down, up = self.between(target, source, at_ns)
         top = self.parent(up[-1] if up else down[0], at_ns) if up or down else source
         return [*reversed(down), str(top), *reversed(up)]
 
     def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
         """List the edges between two frames, from the target to the source; otherwise as `path`."""
-        down, up = self._between(target, source, at_ns)
+        down, up = self.between(target, source, at_ns)
         return [self._tracks[child] for child in (*reversed(down), *reversed(up))]
 
     def span(self, target: str, source: str) -> tuple[int, int] | None:
@@ -163,14 +164,17 @@ class TransformBuffer(TrackStore):
 
     def _plan(self, target: str, source: str, at_ns: int | None) -> Plan:
         """Find the way; keep it if no parent on it ever changes."""
-        down, up = self._between(target, source, at_ns)
-        tracks = self._tracks
-        plan = Plan([tracks[child] for child in down], [tracks[child] for child in reversed(up)])
+        plan = self.plan_of(*self.between(target, source, at_ns))
         if not self._varies or not (self._changes_above(target) or self._changes_above(source)):
             if len(self._plans) >= MOST_PLANS:
                 self._plans.clear()
             self._plans[target, source] = plan
         return plan
+
+    def plan_of(self, down: Sequence[str], up: Sequence[str]) -> Plan:
+        """Make the plan of a way that `between` named."""
+        tracks = self._tracks
+        return Plan([tracks[child] for child in down], [tracks[child] for child in reversed(up)])
 
     def _changes_above(self, frame: str) -> bool:
         """Say whether a frame or an ancestor of it ever changes its parent."""
@@ -178,7 +182,7 @@ class TransformBuffer(TrackStore):
             return True
         return any(frame in self._tracks and self._tracks[frame].varies for frame in to_root(frame, self.parent))
 
-    def _between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
+    def between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
         """Name the edges between two frames that both exist, as `edges_between` does."""
         self.require(target, source)
 
