@@ -153,4 +153,9 @@ def listing(names: Iterable[str], most: int = 20) -> str:
     """Give the names sorted and joined by commas, cut after `most` of them."""
     ordered = sorted(names)
     more = f" and {len(ordered) - most} more" if len(ordered) > most else ""
-    return ", ".join(ordered[:most]) + more
+    return ", ".join(map(printable, ordered[:most])) + more
+
+
+def printable(name: str) -> str:
+    """Give a name as a terminal may show it: control characters as escapes, so that no name can steer the terminal."""
+    return name if name.isprintable() else repr(name)[1:-1]

@@ -145,16 +145,27 @@ def _form_by_suffix(path: str | None, what: str) -> str | None:
 def write_whole(path: str, text: str, *, force: bool = False) -> None:
     """Write a file by way of a temporary one beside it, so that nobody ever sees half of it.
 
-    Raises FileProblem when it exists and `force` is not given, or cannot be written.
+    What is no regular file (a terminal, a pipe, /dev/null) is written to as it is; a link is followed; an old file's
+    mode is kept.  Raises FileProblem when it exists and `force` is not given, or cannot be written.
     """
-    if not force and os.path.lexists(path):
-        raise FileProblem(f"{path}: exists; give --force to replace it")
+    path = os.path.realpath(path)
     temporary = f"{path}.{os.getpid()}.part"
     try:
+        if os.path.exists(path) and not os.path.isfile(path):
+            with open(path, "w", encoding="utf-8", newline="") as stream:  # noqa: PTH123
+                stream.write(text)
+            return
+        mode = os.stat(path).st_mode & 0o7777 if os.path.lexists(path) else None
+        if mode is not None and not force:
+            raise FileProblem(f"{path}: exists; give --force to replace it")
         with open(temporary, "x", encoding="utf-8", newline="") as stream:  # noqa: PTH123
             stream.write(text)
-        os.replace(temporary, path)  # noqa: PTH105
+        if mode is not None:
+            os.chmod(temporary, mode)
+        os.replace(temporary, path)
+    except FileProblem:
+        raise
     except OSError as error:
         if os.path.lexists(temporary):
-            os.unlink(temporary)  # noqa: PTH108
+            os.unlink(temporary)
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None

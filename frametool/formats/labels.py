@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 METRES = 3
 DEGREES = 2
+MOST_PLAIN = 1e9
 
 
 def edge_label(transform: Transform, style: Style) -> tuple[str, str]:
@@ -35,7 +36,12 @@ def graphviz(text: str) -> str:
 
 def _short(values: Iterable[float], decimals: int) -> str:
     """Round for reading; trailing zeros and minus zero say nothing."""
-    return " ".join(
-        f"{round(value, decimals) + 0.0:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
-        for value in values
-    )
+    return " ".join(_rounded(value, decimals) for value in values)
+
+
+def _rounded(value: float, decimals: int) -> str:
+    """Round a number for reading; what would vanish or grow endless gets an exponent."""
+    if value and not 0.5 * 10.0**-decimals <= abs(value) < MOST_PLAIN:
+        return f"{value:.1e}"
+    text = f"{value + 0.0:.{decimals}f}"
+    return text.rstrip("0").rstrip(".") if decimals else text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from frametool.errors import ValueInvalid
 from frametool.formats.pose import Pose
 from frametool.frames.tree import FrameTree
 from frametool.geometry import euler, floats, quaternion
@@ -22,6 +23,9 @@ KEPT = {
     "xyzw": lambda x, y, z, w: (x, y, z, w),
     "wxyz": lambda x, y, z, w: (w, x, y, z),
 }
+
+
+INFINITE = float("inf")
 
 
 class Style:
@@ -52,7 +56,9 @@ class Style:
         )
 
     def number(self, value: float) -> str:
-        """Write a number: shortest text that reads back to the same bits, or fixed decimals."""
+        """Write a finite number: shortest text that reads back to the same bits, or fixed decimals."""
+        if not -INFINITE < value < INFINITE:
+            raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
         return repr(value) if self.precision is None else f"{value:.{self.precision}f}"
 
     def in_degrees(self, form: Notation) -> bool:

@@ -41,6 +41,8 @@ def read_text(path: str | PathLike[str]) -> str:
     name = str(path)
     try:
         if name == "-":
+            if sys.stdin is None:
+                raise FileProblem("standard input is closed")
             return _decode_whole(sys.stdin.buffer.read(MOST_CHARACTERS + 1), "stdin")
         with open(path, "rb") as stream:  # noqa: PTH123 (pathlib costs 6 ms at start-up)
             return _decode_whole(stream.read(MOST_CHARACTERS + 1), name)

@@ -117,7 +117,7 @@ def read_numbers(value: Any, names: Sequence[str], *, partial: bool = False) -> 
     texts = read_texts(value, names, partial=partial)
     try:
         return tuple(map(parse_number, texts))
-    except (ValueInvalid, AttributeError):
+    except (ValueInvalid, TypeError):
         raise misfit_among(texts, value, names, read_number) from None
 
 

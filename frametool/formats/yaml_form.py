@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.formats.results import tree_entries
-from frametool.formats.yaml_text import dump, quoted
+from frametool.formats.yaml_text import dump, key_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,7 +39,7 @@ def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
 
 def _flow(entry: dict[str, Any], style: Style) -> str:
     """Write one entry on one line."""
-    return "{" + ", ".join(f"{quoted(key)}: {_value(each, style)}" for key, each in entry.items()) + "}"
+    return "{" + ", ".join(f"{key_text(key, entry)}: {_value(each, style)}" for key, each in entry.items()) + "}"
 
 
 def _value(value: Any, style: Style) -> str:

@@ -50,7 +50,7 @@ def quoted(text: str) -> str:
     return f'"{re.sub(_ESCAPED, _escape, text)}"'
 
 
-def _key(key: str, beside: dict[str, Any]) -> str:
+def key_text(key: str, beside: dict[str, Any]) -> str:
     """Write a key; y beside x is the coordinate, which no reader in use takes for a truth value."""
     return key if key == "y" and "x" in beside else quoted(key)
 
@@ -87,7 +87,7 @@ def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
     if isinstance(value, dict):
         if len(value) > _WIDEST_FLOW_MAP or not all(_fits_flow(*item) for item in value.items()):
             return None
-        return "{" + ", ".join(f"{_key(key, value)}: {_scalar(each, number)}" for key, each in value.items()) + "}"
+        return "{" + ", ".join(f"{key_text(key, value)}: {_scalar(each, number)}" for key, each in value.items()) + "}"
     if isinstance(value, (list, tuple)):
         if any(isinstance(each, (dict, list, tuple)) for each in value):
             return None
@@ -104,7 +104,7 @@ def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:
     """Give the lines of a list or map, not indented."""
     if isinstance(value, dict):
         for key, each in value.items():
-            yield from _entry(key, _key(key, value), each, number)
+            yield from _entry(key, key_text(key, value), each, number)
     else:
         for each in value:
             yield from _item(each, number)

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from frametool.errors import BadTopology, NotConnected
 
+MOST_SHOWN = 16  # frames of a cycle
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,5 +53,8 @@ def edges_between(target: str, source: str, parent_of: Callable[[str], str | Non
 
 
 def cycle_message(frames: list[str]) -> str:
-    """Draw a cycle, parents to the left: `a <- b <- a`."""
+    """Draw a cycle, parents to the left: `a <- b <- a`; of a long one both ends."""
+    if len(frames) > MOST_SHOWN:
+        left_out = f"({len(frames) - MOST_SHOWN} more)"
+        frames = [*frames[: MOST_SHOWN // 2], left_out, *frames[-MOST_SHOWN // 2 :]]
     return f"frames form a cycle: {' <- '.join(reversed(frames))}"
