@@ -150,7 +150,8 @@ def _select(data: Bytes, end: int, found: _Found, columns: int, comment: bytes) 
     line_starts = np.concatenate([[MARGIN], found.line_ends[:-1]])[: len(found.line_ends)]
     line_ends = np.minimum(found.line_ends, end)
     counts = np.diff(found.stops, prepend=0)
-    counts[found.ends[found.stops - 1] <= line_starts] = 0
+    if len(found.ends):
+        counts[found.ends[found.stops - 1] <= line_starts] = 0
     if comment:
         counts[_begins_with(data, line_starts, comment)] = 0
     rows = np.flatnonzero(counts == columns)
