@@ -17,6 +17,7 @@ from frametool.text.spans import MARGIN, Spans, framed
 if TYPE_CHECKING:
     from frametool.text.arrays import Bytes, Flags, Ints
 
+_NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
 _NEWLINE, _RETURN, _QUOTE, _BLANK, _TAB = b'\n\r" \t'
 
 
@@ -70,7 +71,11 @@ def split_delimited(block: bytes, delimiter: bytes, columns: int, *, comment: by
     A line that begins with `comment`, if given, has no cells.
     """
     data, end = _closed(block)
-    found = _quoted_cells(block, data, delimiter) if b'"' in block else _plain_cells(data, end, delimiter)
+    hidden = _inside_quotes(data, end, delimiter) if b'"' in block else _NOTHING_HIDDEN
+    if hidden is None:
+        found = _quoted_cells(block, data, delimiter)
+    else:
+        found = _plain_cells(data, end, delimiter, hidden)
     if b"\r" in block:
         last = found.stops - 1
         found.ends[last] -= (data[found.ends[last] - 1] == _RETURN) & (found.ends[last] > found.starts[last])
@@ -116,15 +121,38 @@ def _closed(block: bytes) -> tuple[Bytes, int]:
     return data, end + 1
 
 
-def _plain_cells(data: Bytes, end: int, delimiter: bytes) -> _Found:
+def _plain_cells(data: Bytes, end: int, delimiter: bytes, hidden: Flags) -> _Found:
+    """Find cells where every delimiter and line end counts, but those that are hidden."""
     text = data[MARGIN:end]
-    marks = np.flatnonzero((text == delimiter[0]) | (text == _NEWLINE))
+    is_mark = (text == delimiter[0]) | (text == _NEWLINE)
+    if hidden.size:
+        is_mark &= ~hidden
+    marks = np.flatnonzero(is_mark)
     marks += MARGIN
     stops = np.flatnonzero(data.take(marks) == _NEWLINE) + 1
     starts = np.empty_like(marks)
     starts[:1] = MARGIN
     starts[1:] = marks[:-1] + 1
     return _Found(starts, marks, stops, marks[stops - 1] + 1)
+
+
+def _inside_quotes(data: Bytes, end: int, delimiter: bytes) -> Flags | None:
+    """Tell which bytes stand inside quotes; nothing if some quote neither opens, closes nor doubles another."""
+    quotes = np.flatnonzero(data[:end] == _QUOTE)
+    opening, closing = quotes[::2], quotes[1::2]
+    before, after = data[opening - 1], data[closing + 1]
+    opens = _is_any(before, (delimiter[0], _NEWLINE, _QUOTE)) | (opening == MARGIN)
+    closes = _is_any(after, (delimiter[0], _NEWLINE, _QUOTE, _RETURN))
+    if len(quotes) % 2 or not (opens.all() and closes.all()):
+        return None
+    return np.bitwise_xor.accumulate(data[MARGIN:end] == _QUOTE)
+
+
+def _is_any(text: Bytes, characters: tuple[int, ...]) -> Flags:
+    same = text == characters[0]
+    for character in characters[1:]:
+        same |= text == character
+    return same
 
 
 def _quoted_cells(block: bytes, data: Bytes, delimiter: bytes) -> _Found:
