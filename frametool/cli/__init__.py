@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool import __version__
-from frametool.errors import FrametoolError, FrametoolWarning, did_you_mean
+from frametool.errors import FrametoolError, FrametoolWarning, alternatives
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,12 +54,13 @@ class Group(click.Group):
         return command
 
     def resolve_command(
-        self, ctx: click.Context, args: list[str],
+        self,
+        ctx: click.Context,
+        args: list[str],
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command, or say which ones there are."""
         if args and args[0] not in COMMANDS:
-            near = did_you_mean(args[0], COMMANDS)
-            raise click.UsageError(f"no command {args[0]!r}{near}; commands: {', '.join(COMMANDS)}", ctx)
+            raise click.UsageError(f"no command {args[0]!r}{alternatives(args[0], COMMANDS, 'commands')}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002

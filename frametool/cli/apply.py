@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -17,9 +17,9 @@ from frametool.formats.records import Point, read_moveables
 from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.frames.tree import FrameTree
+    from frametool.geometry.kinds import Rigid
 
 CHOICES = ("point", "vector", "pose")
 
@@ -32,7 +32,15 @@ CHOICES = ("point", "vector", "pose")
 @rotation_options
 @pose_options
 @result_options("points")
-def command(arguments: tuple[str, ...], pose: str | None, more: Sequence[str], deg: bool, normalize: bool, kind: str | None, **options: Any) -> None:  # noqa: E501, FBT001
+def command(
+    arguments: tuple[str, ...],
+    pose: str | None,
+    more: Sequence[str],
+    deg: bool,
+    normalize: bool,
+    kind: str | None,
+    **options: Any,
+) -> None:
     """Move points, vectors and poses from SOURCE into TARGET.
 
     \b
@@ -45,20 +53,21 @@ def command(arguments: tuple[str, ...], pose: str | None, more: Sequence[str], d
     """
     output = Output("points", deg=deg, **options)
     if pose is None:
-        frames, target, source, rest = _tree_and_frames(arguments, more)
+        way, rest = _way_by_tree(arguments, more)
     else:
-        rest = arguments
-        edge = _one_pose(pose, degrees=deg, normalize=normalize)
-        frames, target, source = None, edge.parent, edge.name
-    moved = []
-    for record in _records(rest, kind, degrees=deg, normalize=normalize):
-        start = _start(record, source)
-        transform = edge.components if frames is None else _lookup(frames, target, start)
-        moved.append(move(record, transform, target))
-    output.moved(moved)
+        way, rest = _way_by_pose(_one_pose(pose, degrees=deg, normalize=normalize)), arguments
+    records = _records(rest, kind, degrees=deg, normalize=normalize)
+    output.moved([move(record, way.from_frame(own_frame(record)), way.target) for record in records])
 
 
-def move(record: Pose | Point, target_from_source: Sequence[float], target: str | None) -> Pose | Point:
+class Way(NamedTuple):
+    """Where records go: the target, and the transform that takes them there from the frame they are given in."""
+
+    target: str | None
+    from_frame: Callable[[str | None], Rigid]
+
+
+def move(record: Pose | Point, target_from_source: Rigid, target: str | None) -> Pose | Point:
     """Give a record as seen from the target: points shift and rotate, vectors rotate, poses compose."""
     if isinstance(record, Pose):
         return Pose.of(rigid.compose(*target_from_source, *record.components), record.name, target)
@@ -69,17 +78,47 @@ def move(record: Pose | Point, target_from_source: Sequence[float], target: str 
     return record._replace(position=(x, y, z), frame=target)
 
 
-def _tree_and_frames(
-    arguments: Sequence[str], more: Sequence[str],
-) -> tuple[FrameTree, str, str | None, Sequence[str]]:
-    """Split the arguments: the tree, the target, the source if one is named, and the records."""
+def _way_by_tree(arguments: Sequence[str], more: Sequence[str]) -> tuple[Way, Sequence[str]]:
+    """Take tree, target and, if one is named, source from the arguments; the rest are records."""
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
     tree = load_tree(arguments[0], more)
     target, rest = frame_name(arguments[1], tree), arguments[2:]
-    if not rest or is_record(rest[0]):
-        return tree, target, None, rest
-    return tree, target, frame_name(rest[0], tree), rest[1:]
+    source = None
+    if rest and not is_record(rest[0]):
+        source, rest = frame_name(rest[0], tree), rest[1:]
+
+    def from_frame(own: str | None) -> Rigid:
+        start = _settled(own, source)
+        if start is None:
+            raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
+        return tree.lookup(target, start).components
+
+    return Way(target, from_frame), rest
+
+
+def _way_by_pose(pose: Pose) -> Way:
+    """Move everything by one pose; where it names its frames, records must be given in its name."""
+
+    def from_frame(own: str | None) -> Rigid:
+        _settled(own, pose.name)
+        return pose.components
+
+    return Way(pose.parent, from_frame)
+
+
+def own_frame(record: Pose | Point) -> str | None:
+    """Give the frame a record says it is given in."""
+    return record.parent if isinstance(record, Pose) else record.frame
+
+
+def _settled(own: str | None, source: str | None) -> str | None:
+    """Settle which frame a record is given in: where both it and the command say, they must agree."""
+    if own is not None and source is not None and own != source:
+        raise ValueInvalid(
+            f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame"
+        )
+    return own or source
 
 
 def is_record(argument: str) -> bool:
@@ -137,17 +176,3 @@ def _read(argument: str, kind: str | None, *, degrees: bool, normalize: bool) ->
             yield record._replace(key="vector")
         else:
             yield record
-
-
-def _start(record: Pose | Point, source: str | None) -> str | None:
-    """Settle the frame a record is given in: its own, which must be SOURCE where both are known."""
-    own = record.parent if isinstance(record, Pose) else record.frame
-    if own is not None and source is not None and own != source:
-        raise ValueInvalid(f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame")
-    return own or source
-
-
-def _lookup(tree: FrameTree, target: str | None, source: str | None) -> Sequence[float]:
-    if source is None or target is None:
-        raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
-    return tree.lookup(target, source).components

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from frametool.errors import ValueInvalid
-from frametool.formats import FORMATS, writers
+from frametool.formats import writers
 from frametool.formats.numbers import parse_number
 from frametool.geometry.representations import REPRESENTATIONS, notation
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from frametool.geometry.representations import Notation
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
+SPELLINGS = [f"{name}:AXES" if name == "euler" else name for name in REPRESENTATIONS]
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 4 lookup failed, 5 file problem."
 
 
@@ -42,7 +43,7 @@ class Command(click.Command):
         formatter.write_text(EXIT_CODES)
 
 
-class Text(click.ParamType):
+class Text(click.ParamType[str]):
     """A text argument, without the blank that shields negative numbers."""
 
     name = "text"
@@ -65,7 +66,7 @@ class Number(Text):
             self.fail(str(error), param, ctx)
 
 
-class Notations(click.ParamType):
+class Notations(click.ParamType["tuple[Notation, ...]"]):
     """Names of representations, separated by commas."""
 
     name = "rep[,rep..]"
@@ -93,11 +94,22 @@ TEXT = Text()
 def result_options(what: str) -> Callable[[Function], Function]:
     """Give a command the options that shape and place its result; `what` it writes decides the formats."""
     options = [
-        click.option("-f", "--format", "format_name", type=click.Choice(("text", *writers(what))),
-                     help="form of the result  [default: text on a terminal, yaml otherwise]"),
-        click.option("--precision", type=click.IntRange(0, 30), metavar="N",
-                     help="digits after the point  [default: the shortest text that reads back to the same bits]"),
-        click.option("-o", "--output", type=TEXT, metavar="FILE", help="write there instead of stdout, whole or not at all"),
+        click.option(
+            "-f",
+            "--format",
+            "format_name",
+            type=click.Choice(("text", *writers(what))),
+            help="form of the result  [default: text on a terminal, yaml otherwise]",
+        ),
+        click.option(
+            "--precision",
+            type=click.IntRange(0, 30),
+            metavar="N",
+            help="digits after the point  [default: the shortest text that reads back to the same bits]",
+        ),
+        click.option(
+            "-o", "--output", type=TEXT, metavar="FILE", help="write there instead of stdout, whole or not at all"
+        ),
         click.option("--force", is_flag=True, help="let --output replace an existing file"),
     ]
     return lambda function: _decorated(function, options)
@@ -105,20 +117,32 @@ def result_options(what: str) -> Callable[[Function], Function]:
 
 def rotation_options(function: Function) -> Function:
     """Give a command the options that choose how rotations are written."""
-    return _decorated(function, [
-        click.option("--to", "notations", type=Notations(), metavar="REP[,REP..]",
-                     help=f"representations of the result: {', '.join(REPRESENTATIONS)}, euler:AXES; angles take _deg  [default: quaternion]"),
-        click.option("--deg", is_flag=True, help="angles in degrees"),
-        click.option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out instead of w >= 0"),
-    ])
+    return _decorated(
+        function,
+        [
+            click.option(
+                "--to",
+                "notations",
+                type=Notations(),
+                metavar="REP[,REP..]",
+                help=f"representations of the result: {', '.join(SPELLINGS)}; angles take _deg  [default: quaternion]",
+            ),
+            click.option("--deg", is_flag=True, help="angles in degrees"),
+            click.option(
+                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out instead of w >= 0"
+            ),
+        ],
+    )
 
 
 def pose_options(function: Function) -> Function:
     """Give a command the options that say how poses are read; they come beside `rotation_options`."""
-    return click.option("--normalize", is_flag=True, help="accept any non-zero quaternion and any matrix near a rotation")(function)
+    return click.option(
+        "--normalize", is_flag=True, help="accept any non-zero quaternion and any matrix near a rotation"
+    )(function)
 
 
-def _decorated(function: Function, options: list[Callable[[Function], Function]]) -> Function:
+def _decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
     for option in reversed(options):
         function = option(function)
     return function

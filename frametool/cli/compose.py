@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -15,16 +15,13 @@ from frametool.formats.pose import Pose
 from frametool.formats.results import Result
 from frametool.geometry import rigid
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
 
 @click.command(cls=Command, name="compose")
 @click.argument("poses", nargs=-1, required=True, type=TEXT, metavar="POSE POSE ..")
 @rotation_options
 @pose_options
 @result_options("poses")
-def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> None:  # noqa: FBT001 - click passes by name
+def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> None:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 
     \b
@@ -42,7 +39,7 @@ def product(left: Pose, right: Pose) -> Pose:
     """Give a_from_c of a_from_b and b_from_c; frames that are named must touch."""
     if left.name is not None and right.parent is not None and left.name != right.parent:
         raise ValueInvalid(
-            f"frames do not touch: {left.parent or '?'} <- {left.name} is followed by {right.parent} <- {right.name or '?'}; "
-            "change the order, or invert one",
+            f"frames do not touch: {left.parent or '?'} <- {left.name} is followed by "
+            f"{right.parent} <- {right.name or '?'}; change the order, or invert one",
         )
     return Pose.of(rigid.compose(*left.components, *right.components), right.name, left.parent)

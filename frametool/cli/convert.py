@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 @rotation_options
 @pose_options
 @result_options("poses")
-def command(values: tuple[str, ...], given: tuple[Notation, ...] | None, deg: bool, normalize: bool, **options: Any) -> None:  # noqa: FBT001
+def command(
+    values: tuple[str, ...], given: tuple[Notation, ...] | None, deg: bool, normalize: bool, **options: Any
+) -> None:
     """Write one rotation or pose in other representations.
 
     \b

@@ -22,7 +22,7 @@ from frametool.geometry import floats, rigid
 @rotation_options
 @pose_options
 @result_options("poses")
-def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: bool, **options: Any) -> None:  # noqa: FBT001
+def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: bool, **options: Any) -> None:
     """Give poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
 
     \b
@@ -34,10 +34,10 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
     """
     output = Output("poses", deg=deg, **options)
     pairs = combinations((a, b), degrees=deg, normalize=normalize)
-    output.poses([_between(*pair, fraction) for pair in pairs for fraction in fractions])
+    output.poses([_between(*pair, fraction=fraction) for pair in pairs for fraction in fractions])
 
 
-def _between(a: Pose, b: Pose, fraction: float) -> Result:
+def _between(a: Pose, b: Pose, *, fraction: float) -> Result:
     if a.parent is not None and b.parent is not None and a.parent != b.parent:
         raise ValueInvalid(f"A is given in {a.parent!r} and B in {b.parent!r}; give both in one frame")
     components = rigid.interpolate(*a.components, *b.components, fraction, floats)

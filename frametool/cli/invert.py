@@ -18,7 +18,7 @@ from frametool.formats.results import Result
 @rotation_options
 @pose_options
 @result_options("poses")
-def command(pose: str, deg: bool, normalize: bool, **options: Any) -> None:  # noqa: FBT001 - click passes by name
+def command(pose: str, deg: bool, normalize: bool, **options: Any) -> None:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.
 
     \b

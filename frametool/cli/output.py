@@ -25,14 +25,27 @@ class Output:
     """Where results go and how they look: what the options of a command say."""
 
     def __init__(
-        self, what: str, *, format_name: str | None = None, precision: int | None = None, output: str | None = None,
-        force: bool = False, notations: tuple[Notation, ...] | None = None, deg: bool = False, keep_sign: bool = False,
+        self,
+        what: str,
+        *,
+        format_name: str | None = None,
+        precision: int | None = None,
+        output: str | None = None,
+        force: bool = False,
+        notations: tuple[Notation, ...] | None = None,
+        deg: bool = False,
+        keep_sign: bool = False,
     ) -> None:
         """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
-        form = format_name or _form_by_suffix(output, what) or ("text" if output is None and sys.stdout.isatty() else "yaml")
-        chosen = notations or (() if form == "text" else (notation("quaternion"),))
+        form = (
+            format_name
+            or _form_by_suffix(output, what)
+            or ("text" if output is None and sys.stdout.isatty() else "yaml")
+        )
+        machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
+        chosen = notations or ((notation("quaternion"),) if machine else ())
         self.style = Style(form, chosen, deg, precision, keep_sign)
 
     def poses(self, results: Iterable[Result]) -> None:
@@ -44,7 +57,9 @@ class Output:
         if all(isinstance(each, Pose) for each in records):
             self.poses([Result(each) for each in records if isinstance(each, Pose)])
         else:
-            self.points([Result(each).mapping(self.style) if isinstance(each, Pose) else each.mapping() for each in records])
+            self.points(
+                [Result(each).mapping(self.style) if isinstance(each, Pose) else each.mapping() for each in records]
+            )
 
     def tree(self, tree: FrameTree) -> None:
         """Write a tree; on a terminal, in colour."""

@@ -47,7 +47,7 @@ def poses_from(argument: str, *, degrees: bool = False, normalize: bool = False)
 
 
 def usage_if_inline(error: FormatError) -> FormatError:
-    """Count an inline argument that cannot be parsed as misuse (2); one that parses but is no rotation stays bad data."""
+    """Count an inline argument that cannot be parsed as misuse (2); what parses but is no rotation is bad data (1)."""
     if error.source == INLINE and not isinstance(error.__cause__, NotARotation):
         error.exit_code = 2
     return error
@@ -67,7 +67,11 @@ def combinations(arguments: Sequence[str], *, degrees: bool, normalize: bool) ->
 
 
 def pose_from_numbers(
-    texts: Sequence[str], given: tuple[Notation, ...] | None, *, degrees: bool = False, normalize: bool = False,
+    texts: Sequence[str],
+    given: tuple[Notation, ...] | None,
+    *,
+    degrees: bool = False,
+    normalize: bool = False,
 ) -> Pose:
     """Read bare numbers: a rotation in the order of its representation, after x y z if there is a position.
 

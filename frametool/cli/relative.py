@@ -22,7 +22,7 @@ from frametool.geometry import floats, quaternion, rigid
 @rotation_options
 @pose_options
 @result_options("poses")
-def command(a: str, b: str, deg: bool, normalize: bool, **options: Any) -> None:  # noqa: FBT001 - click passes by name
+def command(a: str, b: str, deg: bool, normalize: bool, **options: Any) -> None:
     """Give B seen from A, inverse(A) B, with the distance and the angle between them.
 
     \b

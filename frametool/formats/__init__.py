@@ -15,8 +15,15 @@ class Row(NamedTuple):
 
 
 FORMATS = {
-    "yaml": Row("frametool.formats.yaml_form", (".yaml", ".yml"), "YAML, as trees and poses are read", ("poses", "points", "tree")),
-    "json": Row("frametool.formats.json_form", (".json", ".jsonl"), "JSON, one object a line", ("poses", "points", "tree")),
+    "yaml": Row(
+        "frametool.formats.yaml_form",
+        (".yaml", ".yml"),
+        "YAML, as trees and poses are read",
+        ("poses", "points", "tree"),
+    ),
+    "json": Row(
+        "frametool.formats.json_form", (".json", ".jsonl"), "JSON, one object a line", ("poses", "points", "tree")
+    ),
     "csv": Row("frametool.formats.csv_form", (".csv",), "CSV with a header", ("poses", "points")),
     "ros1": Row("frametool.formats.ros", (), "TransformStamped as `rostopic echo` prints it", ("poses", "tree")),
     "ros2": Row("frametool.formats.ros", (), "TransformStamped as `ros2 topic echo` prints it", ("poses", "tree")),

@@ -13,7 +13,7 @@ from frametool.errors import FormatError
 from frametool.formats.json_text import json_marks, looks_like_json, parse_json
 from frametool.formats.numbers import odd_characters
 from frametool.formats.places import longest_found
-from frametool.formats.source import Source, check_text, decode, placed_error, read_text
+from frametool.formats.source import Source, check_text, decode, placed_error, read_text, within
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[
         from frametool.formats.yaml_events import yaml_marks
 
         found = yaml_marks(source, paths)
-    return [_place(path, found, key=key) for path in paths]
+    return [within(source.text, *_place(path, found, key=key)) for path in paths]
 
 
 def _place(path: Path, found: dict[Path, tuple[tuple[int, int], tuple[int, int]]], *, key: bool) -> tuple[int, int]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 
+from frametool.formats.limits import DEEPEST, MOST_CONTAINERS, too_much
 from frametool.formats.places import END, LEAF, LIST, MAP, find_marks
 from frametool.formats.source import Source, error_at, place_of
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 
     from frametool.errors import FormatError
     from frametool.formats.places import Path, PlaceEvent
-
-DEEPEST = 1000
 
 _BLANKS = re.compile(r"[ \t\n\r]*")
 _TOKEN = re.compile(r'("[^"\\]*+(?:\\.[^"\\]*+)*+")|[{}\[\]]|[^\s{}\[\],:"]+')
@@ -40,8 +39,10 @@ def parse_json(source: Source) -> list[Any] | None:
     """Give the values of a text of one or several JSON objects or arrays; None if it is no JSON.
 
     Numbers and truth values stay text, null is None.  Raises FormatError for what is JSON but must not be:
-    a key twice, half a character, too deep.
+    a key twice, half a character, too deep, too much.
     """
+    if source.text.count("[") + source.text.count("{") > MOST_CONTAINERS:
+        raise error_at(source, 0, too_much(0))
     try:
         values = _decoded(source.text)
     except _RepeatedKey:
@@ -152,8 +153,8 @@ def _too_deep(source: Source) -> FormatError:
     for kind, _, mark in _place_events(source.text):
         depth += (kind in {LIST, MAP}) - (kind == END)
         if depth > DEEPEST:
-            return error_at(source, mark, f"nested deeper than {DEEPEST} levels")
-    return error_at(source, 0, "nested too deep")
+            return error_at(source, mark, too_much(DEEPEST))
+    return error_at(source, 0, too_much(DEEPEST))
 
 
 def _check_escapes(source: Source) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.formats.pose import Pose
-from frametool.formats.results import columns_of, rotation_numbers
+from frametool.formats.results import rotation_numbers
 from frametool.geometry.representations import notation
 
 if TYPE_CHECKING:
@@ -30,4 +30,7 @@ def edge_label(transform: Transform, style: Style) -> tuple[str, str]:
 
 def _short(values: Iterable[float], decimals: int) -> str:
     """Round for reading; trailing zeros and minus zero say nothing."""
-    return " ".join(f"{round(value, decimals) + 0.0:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}" for value in values)
+    return " ".join(
+        f"{round(value, decimals) + 0.0:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
+        for value in values
+    )

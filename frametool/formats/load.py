@@ -100,7 +100,8 @@ def _clash(earlier: Found, found: Found) -> str:
     places = [_place(each, found.source) for each in (earlier, found)]
     if earlier.edge.parent == found.edge.parent:
         return f"frame {child!r} has two different poses in {earlier.edge.parent!r}: {places[0]} and {places[1]}"
-    return f"frame {child!r} has two parents: {earlier.edge.parent!r} ({places[0]}) and {found.edge.parent!r} ({places[1]})"
+    parents = [f"{each.edge.parent!r} ({place})" for each, place in zip((earlier, found), places, strict=True)]
+    return f"frame {child!r} has two parents: {' and '.join(parents)}"
 
 
 def _place(found: Found, here: Source) -> str:

@@ -1,6 +1,6 @@
 """Mermaid: a flowchart from parents to children, edges labelled with their poses.
 
-    n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]
+n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]
 """
 
 from __future__ import annotations
@@ -27,4 +27,6 @@ def write_tree(tree: FrameTree, style: Style) -> str:
 
 def _escaped(text: str) -> str:
     """Write what mermaid or HTML would take for its own as character codes (`#quot;`)."""
-    return "".join(character if character.isalnum() or character in " _-/.:,+" else f"#{ord(character)};" for character in text)
+    return "".join(
+        character if character.isalnum() or character in " _-/.:,+" else f"#{ord(character)};" for character in text
+    )

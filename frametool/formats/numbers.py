@@ -126,6 +126,7 @@ _MISTAKES = (
     (_pattern(rf"[-+]?{_DECIMAL}(\s+[-+]?{_DECIMAL})+"), "is several numbers where one is expected"),
     (_pattern(r"true|false|yes|no|on|off"), "is a truth value where a number is expected"),
     (_pattern(r"null|~"), "is empty where a number is expected"),
+    (_pattern(rf"[-+]?{_DECIMAL}e[-+]?"), _UNKNOWN),
     (_pattern(rf"[-+]?{_DECIMAL}\s*[a-zµ°%\"'].*"), _UNIT),
 )
 

@@ -52,9 +52,13 @@ def find_marks(events: Iterable[PlaceEvent[Mark]], paths: Sequence[Path]) -> dic
 def _skip(walk: Iterator[PlaceEvent[Mark]]) -> None:
     """Pass over the rest of a list or map that has just begun."""
     depth = 1
-    while depth:
-        kind = next(walk)[0]
-        depth += (kind in {LIST, MAP}) - (kind == END)
+    for kind, _, _ in walk:
+        if kind == END:
+            depth -= 1
+            if not depth:
+                return
+        elif kind != LEAF:
+            depth += 1
 
 
 def longest_found(path: Path, found: dict[Path, tuple[Mark, Mark]]) -> Path:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from frametool.formats.values import Quaternion, Vector
+    from frametool.geometry.kinds import Rigid
 
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001}
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", "stamp_ns", "distance", "angle", "angle_deg"))
@@ -45,7 +46,7 @@ class Pose(NamedTuple):
         return cls((tx, ty, tz), (x, y, z, w), name, parent)
 
     @property
-    def components(self) -> tuple[float, float, float, float, float, float, float]:
+    def components(self) -> Rigid:
         """Give tx, ty, tz, x, y, z, w; what is missing is 0 and the identity."""
         return (*(self.position or (0.0, 0.0, 0.0)), *(self.rotation or (0.0, 0.0, 0.0, 1.0)))
 

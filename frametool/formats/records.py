@@ -94,7 +94,9 @@ def _pose(value: Any, reading: Reading) -> Pose:
         position, rotation = read_rotation("matrix", value, reading)
         return Pose(position, rotation)
     if type(value) is list:
-        raise Misfit(f"a bare list of {len(value)} numbers does not say what it is; write {{rpy_deg: [..]}}, {{xyzw: [..]}}, ..")
+        raise Misfit(
+            f"a bare list of {len(value)} numbers does not say what it is; write {{rpy_deg: [..]}}, {{xyzw: [..]}}, .."
+        )
     if type(value) is not dict:
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(value)}")
     if "child_frame_id" in value:
@@ -113,7 +115,9 @@ def _moveable(value: Any, reading: Reading) -> Pose | Point:
     if not keys and "x" in value:
         return _bare_point(value)
     if len(keys) != 1:
-        raise Misfit(f"expected a point like {{point: [x, y, z]}} or a pose, found the keys {', '.join(map(repr, value))}")
+        raise Misfit(
+            f"expected a point like {{point: [x, y, z]}} or a pose, found the keys {', '.join(map(repr, value))}"
+        )
     key = keys[0]
     if unknown := [each for each in value if each != key and each not in BESIDE_POINT]:
         raise Misfit(f"unknown key {unknown[0]!r} beside {key}", (unknown[0],), key=True)

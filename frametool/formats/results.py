@@ -84,7 +84,8 @@ def is_matrix(form: Notation) -> bool:
 
 def is_locked(pose: Pose, form: Notation) -> bool:
     """Tell whether the Euler angles asked for are not unique here: the third was set to 0."""
-    return form.axes is not None and pose.rotation is not None and bool(euler.is_locked(*pose.rotation, form.axes, floats))
+    axes = "sxyz" if form.representation.name == "rpy" else form.axes
+    return axes is not None and pose.rotation is not None and bool(euler.locked(*pose.rotation, axes))
 
 
 def rotation_numbers(pose: Pose, form: Notation, style: Style) -> Sequence[float]:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 LISTS = ("transforms", "static_transforms")
 STALE = "euler_angles_degree"  # Apollo writes it beside the quaternion and does not keep it up to date
+STALE_DEGREES = 0.1
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))
 _INTEGER = re.compile(r"[-+]?\d{1,25}", re.ASCII)
 
@@ -67,7 +68,13 @@ def read_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str,
     if STALE in transform:
         _warn_of_stale_angles(transform[STALE], rotation, reading)
     parent = _frame(header, "frame_id", ("header",))
-    return parent, _frame(message, "child_frame_id", ()), (position[0], position[1], position[2]), rotation, _stamp(header)
+    return (
+        parent,
+        _frame(message, "child_frame_id", ()),
+        (position[0], position[1], position[2]),
+        rotation,
+        _stamp(header),
+    )
 
 
 def _part(message: dict[str, Any], key: str) -> dict[str, Any]:
@@ -110,13 +117,15 @@ def _whole(stamp: dict[str, Any], key: str) -> int:
 
 def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) -> None:
     """Compare the angles beside a quaternion with it; the quaternion is what counts."""
+    from math import degrees
+
     from frametool.geometry import floats, quaternion
 
     path = ("transform", STALE)
-    _, angles = within(path, read_rotation, "rpy_deg", value, reading)
-    apart = quaternion.distance(*rotation, *angles, floats)
-    if apart > 0.1 * 3.141592653589793 / 180.0:
-        reading.note(f"{STALE} differs from the quaternion by {apart * 180.0 / 3.141592653589793:.3g} degrees; the quaternion is used", *path)
+    angles: Quaternion = within(path, read_rotation, "rpy_deg", value, reading)[1]
+    apart = degrees(quaternion.distance(*rotation, *angles, floats))
+    if apart > STALE_DEGREES:
+        reading.note(f"{STALE} differs from the quaternion by {apart:.3g} degrees; the quaternion is used", *path)
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:

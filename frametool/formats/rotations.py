@@ -63,7 +63,10 @@ def _checked(form: Notation, numbers: Sequence[float], reading: Reading, *, degr
 
 
 def read_components(
-    form: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading,
+    form: Notation,
+    texts: Sequence[Any],
+    places: Sequence[Path],
+    reading: Reading,
 ) -> tuple[list[float], bool]:
     """Read the components of a rotation; returns them with the unit of the angles among them (True: degrees)."""
     angles = form.representation.angles
@@ -85,7 +88,7 @@ def read_components(
     if any(units):
         degrees = _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
     elif angles and not degrees and form.degrees is None:
-        _note_degrees(form, numbers, reading)
+        _note_degrees(form, numbers, places, reading)
     return numbers, degrees
 
 
@@ -109,11 +112,13 @@ def _one_unit(numbers: list[float], angles: Sequence[int], units: Sequence[str |
     return False
 
 
-def _note_degrees(form: Notation, numbers: Sequence[float], reading: Reading) -> None:
+def _note_degrees(form: Notation, numbers: Sequence[float], places: Sequence[Path], reading: Reading) -> None:
     """Wonder about bare angles beyond a full turn."""
-    largest = max((numbers[index] for index in form.representation.angles), key=abs)
-    if abs(largest) > TURN and form.representation.name != "rotvec":
-        reading.note(f"{form.spec} {largest:g} is more than a full turn in radians; degrees? write {form.spec}_deg")
+    index = max(form.representation.angles, key=lambda index: abs(numbers[index]))
+    if abs(numbers[index]) > TURN:
+        name = form.representation.name
+        message = f"{name} {numbers[index]:g} is more than a full turn in radians; degrees? write {name}_deg"
+        reading.note(message, form.spec, *places[index])
 
 
 def _list_or_map(form: Notation, value: Any) -> Shape:
@@ -135,7 +140,9 @@ def _euler(form: Notation, value: Any) -> Shape:
     if type(value) is not dict:
         raise Misfit(f"expected {{axes: rzyx, angles: [..]}}, found {kind(value)}")
     if unknown := [key for key in value if key not in ("axes", "order", "frame", "angles")]:
-        raise Misfit(f"unknown key {unknown[0]!r}; expected axes and angles, or order, frame and angles", (unknown[0],), key=True)
+        raise Misfit(
+            f"unknown key {unknown[0]!r}; expected axes and angles, or order, frame and angles", (unknown[0],), key=True
+        )
     try:
         axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
         angles = value["angles"]
@@ -173,7 +180,10 @@ SHAPES = {"quaternion": _quaternion, "euler": _euler, "axis_angle": _axis_angle,
 
 
 def read_homogeneous(
-    form: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading,
+    form: Notation,
+    texts: Sequence[Any],
+    places: Sequence[Path],
+    reading: Reading,
 ) -> tuple[Vector, Quaternion]:
     """Read a 4x4 matrix: the whole pose."""
     m, _ = read_components(form, texts, places, reading)

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.formats import ros
-from frametool.formats.pose import POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
-from frametool.formats.values import Misfit, as_mapping, kind
+from frametool.formats.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
+from frametool.formats.values import Misfit, as_mapping
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -101,7 +101,10 @@ def _nested_pose(child: str, entry: Any, path: Path, reading: Reading) -> Pose:
         if entry is None:
             entry = {}
         if child in POSE_KEYS and type(entry) is not dict:
-            raise Misfit(f"{child!r} stands where a frame's name is expected: a root has no pose, its keys are its children", key=True)
+            raise Misfit(
+                f"{child!r} stands where a frame's name is expected: a root has no pose, its keys are its children",
+                key=True,
+            )
         for key in ("name", "parent"):
             if key in as_mapping(entry, f"the pose of frame {child!r}"):
                 raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)

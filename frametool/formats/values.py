@@ -68,7 +68,9 @@ def kind(value: Any) -> str:
     """Say in words what a value is."""
     if value is None:
         return "nothing"
-    return {dict: "a mapping", list: "a list"}.get(type(value), repr(value))
+    if isinstance(value, dict):
+        return "a mapping"
+    return "a list" if isinstance(value, list) else repr(value)
 
 
 def as_mapping(value: Any, what: str) -> dict[str, Any]:

@@ -6,14 +6,11 @@ text grow without bound.  The loop here keeps every scalar as text and counts de
 
 from __future__ import annotations
 
-import gc
 import re
-from contextlib import contextmanager
 
 import yaml
 from yaml.events import (
     AliasEvent,
-    CollectionEndEvent,
     MappingEndEvent,
     MappingStartEvent,
     ScalarEvent,
@@ -23,6 +20,8 @@ from yaml.events import (
 )
 
 from frametool.errors import FormatError
+from frametool.formats.collector import paused_collector
+from frametool.formats.limits import DEEPEST, MOST_CONTAINERS, too_much
 from frametool.formats.places import END, LEAF, LIST, MAP, find_marks
 from frametool.formats.source import Source, error_at, place_of, placed_error
 from frametool.formats.yaml_errors import translated
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
 
-DEEPEST = 1000
 MOST_ALIASES = 1000
 SPARE_COPIES = 10_000  # what aliases may repeat, beside one value for each character of the text
 
@@ -48,20 +46,15 @@ _ODD_KEYS = frozenset(("", "<<"))
 _OPENCV_HEAD = re.compile(r"%YAML:1\.[0-9]+[^\r\n]*")
 _OPENCV_TIGHT = re.compile(r"^([ \t]*[\w.]+):(?=\S)", re.MULTILINE)
 _OPENCV_TAGS = frozenset(("tag:yaml.org,2002:opencv-matrix",))
-_PLACE_KINDS = {ScalarEvent: LEAF, AliasEvent: LEAF, SequenceStartEvent: LIST, MappingStartEvent: MAP}
+_PLACE_KINDS: dict[type, int] = {
+    ScalarEvent: LEAF,
+    AliasEvent: LEAF,
+    SequenceStartEvent: LIST,
+    MappingStartEvent: MAP,
+    SequenceEndEvent: END,
+    MappingEndEvent: END,
+}
 _MOST_DIRECTIVES = 100  # libyaml compares each new %TAG with all before it
-
-
-@contextmanager
-def paused_collector() -> Iterator[None]:
-    """Keep the garbage collector off meanwhile: it would walk the growing result again and again."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 def parse_yaml(source: Source, allowed_tags: frozenset[str]) -> list[Value]:
@@ -71,9 +64,15 @@ def parse_yaml(source: Source, allowed_tags: frozenset[str]) -> list[Value]:
     Tags that are allowed are read over.  Raises FormatError.
     """
     readable = readable_yaml(source)
-    tags = allowed_tags | _OPENCV_TAGS if readable is not source else allowed_tags
-    with paused_collector():
-        return _Builder(source, readable.text, tags).build()
+    tags = allowed_tags if readable is source else allowed_tags | _OPENCV_TAGS
+    try:
+        with paused_collector():
+            return _Builder(readable, tags).build()
+    except FormatError as error:
+        if readable is source:
+            raise
+        place = _unshift((error.line, error.column), dict(_widened(source.text)))
+        raise placed_error(source, *place, error.message) from None
 
 
 def readable_yaml(source: Source) -> Source:
@@ -88,12 +87,20 @@ def readable_yaml(source: Source) -> Source:
 def yaml_marks(source: Source, paths: Sequence[Path]) -> dict[Path, tuple[tuple[int, int], tuple[int, int]]]:
     """Find the places (line, column) of keys and values; nothing for what the text does not hold."""
     readable = readable_yaml(source)
-    found = find_marks(_place_events(readable.text), paths)
+    found = {
+        path: (_place(key), _place(value))
+        for path, (key, value) in find_marks(_place_events(readable.text), paths).items()
+    }
     if readable is source:
         return found
     lines = {place[0] for places in found.values() for place in places}
     shifts = {line: end for line, end in _widened(source.text) if line in lines}
     return {path: (_unshift(key, shifts), _unshift(value, shifts)) for path, (key, value) in found.items()}
+
+
+def _place(mark: Any) -> tuple[int, int]:
+    """Give line and column from 1 of the parser's mark, which counts from 0."""
+    return mark.line + 1, mark.column + 1
 
 
 def _widened(text: str) -> Iterator[tuple[int, int]]:
@@ -107,37 +114,37 @@ def _unshift(place: tuple[int, int], shifts: dict[int, int]) -> tuple[int, int]:
     return line, column - (line in shifts and column > shifts[line])
 
 
-def _place_events(text: str) -> Iterator[PlaceEvent[tuple[int, int]]]:
-    """Reduce the parser's events to what finding places needs."""
+def _place_events(text: str) -> Iterator[PlaceEvent[Any]]:
+    """Reduce the parser's events to what finding places needs; what cannot be parsed ends them."""
     get: Callable[[], Any] = _Loader(text).get_event
-    while type(event := get()) is not StreamEndEvent:
-        if isinstance(event, CollectionEndEvent):
-            yield END, "", (0, 0)
-        elif type(event) in _PLACE_KINDS:
-            place = event.start_mark.line + 1, event.start_mark.column + 1
-            yield _PLACE_KINDS[type(event)], getattr(event, "value", ""), place
+    kinds = _PLACE_KINDS
+    try:
+        while (kind := type(event := get())) is not StreamEndEvent:
+            if kind in kinds:
+                yield kinds[kind], event.value if kind is ScalarEvent else "", event.start_mark
+    except yaml.YAMLError:
+        return
 
 
 class _Builder:
     """Build the values of one text; holds what the rare events need beside the loop."""
 
-    __slots__ = ("aliases", "allowed", "anchors", "copies", "documents", "open", "source", "text")
+    __slots__ = ("aliases", "allowed", "anchors", "copies", "documents", "open", "source")
 
-    def __init__(self, source: Source, text: str, allowed: frozenset[str]) -> None:
+    def __init__(self, source: Source, allowed: frozenset[str]) -> None:
         """Start with an empty list of documents, and the budget for aliases."""
         self.source = source
-        self.text = text
         self.allowed = allowed
         self.anchors: dict[str, Value] = {}
         self.aliases = MOST_ALIASES
-        self.copies = SPARE_COPIES + len(text)
+        self.copies = SPARE_COPIES + len(source.text)
         self.documents: list[Value] = []
         self.open: list[tuple[dict[str, Value] | list[Value], object]] = []
 
     def build(self) -> list[Value]:
         """Run the loop; what the parser itself refuses becomes our one-line error."""
         try:
-            self._run(_Loader(self.text).get_event)
+            self._run(_Loader(self.source.text).get_event)
         except FormatError:
             raise
         except (yaml.YAMLError, ValueError, RecursionError) as error:
@@ -153,6 +160,7 @@ class _Builder:
         stack, nulls, odd_keys, item = self.open, _NULLS, _ODD_KEYS, _ITEM
         current: Any = self.documents
         key: Any = item
+        room = MOST_CONTAINERS
         value: Value
         while True:
             event = get()
@@ -172,8 +180,9 @@ class _Builder:
                 value = {} if kind is MappingStartEvent else []
                 if key is None:
                     raise self._error(event, "a key must be one text, not a list or map")
-                if len(stack) >= DEEPEST:
-                    raise self._error(event, f"nested deeper than {DEEPEST} levels")
+                room -= 1
+                if len(stack) >= DEEPEST or not room:
+                    raise self._error(event, too_much(len(stack)))
             elif kind is MappingEndEvent or kind is SequenceEndEvent:
                 current, key = stack.pop()
                 continue
@@ -244,7 +253,7 @@ class _Builder:
             for container in level:
                 self.copies -= len(container)
                 if self.copies < 0:
-                    raise self._error(event, f"aliases repeat more than {SPARE_COPIES + len(self.text)} values")
+                    raise self._error(event, f"aliases repeat more than {SPARE_COPIES + len(self.source.text)} values")
                 for key, inner in _children(container):
                     if type(inner) is dict or type(inner) is list:
                         container[key] = inner.copy()
@@ -252,11 +261,11 @@ class _Builder:
             if not below:
                 return root[0]
             level = below
-        raise self._error(event, f"nested deeper than {DEEPEST} levels")
+        raise self._error(event, too_much(DEEPEST))
 
     def _error(self, event: Any, message: str) -> FormatError:
         """Make the error for the place where an event begins."""
-        return placed_error(self.source, event.start_mark.line + 1, event.start_mark.column + 1, message)
+        return placed_error(self.source, *_place(event.start_mark), message)
 
 
 def _children(container: dict[str, Value] | list[Value]) -> list[tuple[Any, Value]]:

@@ -25,11 +25,11 @@ def parse_stamp(text: str) -> int:
     shift = 9 - len(fraction) + exponent
     digits = int(whole + fraction)
     if shift < 0:
-        digits, lost = divmod(digits, 10**-shift)
+        digits, lost = divmod(digits, int(10**-shift))
         if lost:
             raise ValueInvalid(f"{text!r} is finer than a nanosecond; round it")
         shift = 0
-    stamp_ns = digits * 10**shift
+    stamp_ns = digits * int(10**shift)
     return -stamp_ns if sign == "-" else stamp_ns
 
 

@@ -12,9 +12,9 @@ from frametool.geometry.transform import Transform
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    Components = tuple[float, float, float, float, float, float, float]
+    from frametool.geometry.kinds import Rigid
 
-IDENTITY: Components = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class FrameTree:
@@ -30,7 +30,7 @@ class FrameTree:
     def __init__(self, name: str = "") -> None:
         """Begin an empty tree; `name` says in error messages where the frames come from."""
         self.name = name
-        self._edges: dict[str, tuple[str, Components]] = {}
+        self._edges: dict[str, tuple[str, Rigid]] = {}
         self._frames: dict[str, None] = {}
         self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
 
@@ -42,7 +42,7 @@ class FrameTree:
         """
         self.add_components(parent, child, transform.components)
 
-    def add_components(self, parent: str, child: str, components: Components) -> None:
+    def add_components(self, parent: str, child: str, components: Rigid) -> None:
         """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
         known = self._edges.get(child)
         if known is not None:
@@ -109,16 +109,16 @@ class FrameTree:
         Raises UnknownFrame (also for a frame against itself), NotConnected.
         """
         down, up = self._between(target, source)
-        target_from_top = rigid.inverse(*self._product(down)) if down else IDENTITY
+        target_from_top: Rigid = rigid.inverse(*self._product(down)) if down else IDENTITY
         if not up:
             return Transform.of(*target_from_top)
         top_from_source = self._product(reversed(up))
         return Transform.of(*(rigid.compose(*target_from_top, *top_from_source) if down else top_from_source))
 
-    def _product(self, children: Iterable[str]) -> Components:
+    def _product(self, children: Iterable[str]) -> Rigid:
         """Compose the edges of the named children, topmost first."""
         edges = self._edges
-        product: Components | None = None
+        product: Rigid | None = None
         for child in children:
             edge = edges[child][1]
             product = edge if product is None else rigid.compose(*product, *edge)

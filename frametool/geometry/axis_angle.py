@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 
 from frametool.errors import ValueInvalid
-from frametool.geometry.quaternion import unit_vector
+from frametool.geometry.quaternion import canonical, unit_vector
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -28,12 +28,10 @@ def from_quaternion(
 
     At half a turn, where both directions are right, the first non-zero component of the axis is positive.
     """
-    none = (x == 0.0) & (y == 0.0) & (z == 0.0)
-    ux, uy, uz = unit_vector(xp.where(none, 1.0, x), y, z, xp)
-    flip = xp.first_nonzero(w, x, y, z) < 0.0
-    flip &= not none if isinstance(none, bool) else ~none
-    angle = 2.0 * xp.atan2(xp.length(x, y, z), abs(w))
-    ux, uy, uz = (xp.where(flip, 0.0 - part, part) for part in (ux, uy, uz))
+    x, y, z, w = canonical(x, y, z, w, xp)
+    angle = 2.0 * xp.atan2(xp.length(x, y, z), w)
+    still = (x == 0.0) & (y == 0.0) & (z == 0.0)
+    ux, uy, uz = unit_vector(xp.where(still, 1.0, x), y, z, xp)
     return ux, uy, uz, xp.degrees(angle) if degrees else angle
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import pi, tau
 
-from frametool.geometry.quaternion import EPS
+from frametool.geometry.quaternion import EPS, settled
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -60,7 +60,8 @@ def to_quaternion(
         vector[i] = cb * mixed + signed * turned
         vector[j] = sb * cosines - (cb * parity) * sines
         vector[k] = cb * turned + signed * mixed
-    return vector[0], vector[1], vector[2], w
+    x, y, z = vector
+    return settled(x, y, z, w) if degrees else (x, y, z, w)
 
 
 def from_quaternion(
@@ -79,11 +80,10 @@ def from_quaternion(
     half_sum, half_difference = xp.atan2(b, a), xp.atan2(d, c)
     limit = LOCK * (squared_sum + squared_difference)
     no_sum, no_difference = squared_sum <= limit, squared_difference <= limit
-    opposite = 0.0 - half_difference
-    half_sum, half_difference = (
-        xp.where(no_sum, opposite if static else half_difference, half_sum),
-        xp.where(no_difference, 0.0 - half_sum if static else half_sum, half_difference),
-    )
+    if xp.some(no_sum | no_difference):
+        third_away = 0.0 - half_sum if static else half_sum
+        half_sum = xp.where(no_sum, 0.0 - half_difference if static else half_difference, half_sum)
+        half_difference = xp.where(no_difference, third_away, half_difference)
     outer, inner = _wrapped(half_sum + half_difference, xp), _wrapped(half_sum - half_difference, xp)
     first, third = (inner, outer) if static else (outer, inner)
     return (xp.degrees(first), xp.degrees(middle), xp.degrees(third)) if degrees else (first, middle, third)
@@ -122,5 +122,4 @@ def _middle(
 
 def _wrapped(angle: Number, xp: Namespace) -> Number:
     """Bring an angle between -2 pi and 2 pi into (-pi, pi]."""
-    turns = xp.where(angle > pi, tau, 0.0) - xp.where(angle <= -pi, tau, 0.0)
-    return angle - turns
+    return xp.minimum(angle - tau * xp.ceil(angle / tau - 0.5), pi)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from math import atan2, cbrt, copysign, cos, degrees, fmod, frexp, ldexp, radians, sin, sqrt
+from math import atan2, cbrt, ceil, copysign, cos, degrees, fmod, frexp, ldexp, radians, sin, sqrt
 from math import hypot as length
 
 __all__ = [
-    "atan2", "cbrt", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg", "largest",
-    "ldexp", "length", "maximum", "radians", "sqrt", "where",
+    "atan2", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
+    "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from frametool.geometry.kinds import Pair
 
 SQRT_HALF = sqrt(0.5)
-maximum = max
+maximum, minimum = max, min
 largest = abs
+some = bool
 
 
 def where(condition: bool, yes: float, no: float) -> float:  # noqa: FBT001 - numpy's signature
@@ -24,9 +25,17 @@ def where(condition: bool, yes: float, no: float) -> float:  # noqa: FBT001 - nu
     return yes if condition else no
 
 
+def negated_where(condition: bool, *values: float) -> tuple[float, ...]:  # noqa: FBT001 - as `where`
+    """Give the values negated if the condition holds, zeros as +0; else as they are."""
+    return tuple([0.0 - value for value in values]) if condition else values
+
+
 def first_nonzero(*values: float) -> float:
     """Give the first value that is not zero, or the last."""
-    return next((value for value in values if value), values[-1])
+    for value in values:
+        if value:
+            return value
+    return values[-1]
 
 
 def half_sincos(angle: float) -> Pair:

@@ -16,7 +16,7 @@ EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: what lies within 4 is left alone, bit for bit
 SILENT = 1e-6
 TOLERATED = 1e-3
-TINY = 1e-9  # below this angle x, sin(x)/x = 1 - x^2/6 is 1 to the last bit
+TINY = 1e-150  # the least angle or sine divided by: sin(x)/x there is 1, and numbers down to 1e-308 survive the quotient
 
 
 def squared_norm(x: Number, y: Number, z: Number, w: Number) -> Number:
@@ -34,17 +34,26 @@ def product(ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Numb
     )
 
 
-def compose(ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number) -> Quaternion:
-    """Multiply two unit quaternions and take the rounding off the norm.
+def compose(
+    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number
+) -> Quaternion:
+    """Multiply two unit quaternions and take the rounding off the norm: multiples of 90 degrees stay exact."""
+    return settled(
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
 
-    One Newton step for 1/norm, (3 - n^2)/2, needs no root; with it products of multiples of 90 degrees are exact.
+
+def settled(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
+    """Take the last rounding off the norm of a quaternion that is unit to 1e-8.
+
+    (1 + n^2)/2 is the norm to first order, and needs no root.  Divided by it, the products of 0, 1/2, sqrt(1/2)
+    and 1 that right angles consist of become these doubles again.
     """
-    x = aw * bx + ax * bw + ay * bz - az * by
-    y = aw * by - ax * bz + ay * bw + az * bx
-    z = aw * bz + ax * by - ay * bx + az * bw
-    w = aw * bw - ax * bx - ay * by - az * bz
-    scale = 1.5 - 0.5 * (x * x + y * y + z * z + w * w)
-    return x * scale, y * scale, z * scale, w * scale
+    norm = 0.5 + 0.5 * (x * x + y * y + z * z + w * w)
+    return x / norm, y / norm, z / norm, w / norm
 
 
 def conjugate(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
@@ -55,7 +64,10 @@ def conjugate(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
 def unit(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
     """Normalise a quaternion of moderate norm; what is unit to 4 eps keeps its bits."""
     squared = x * x + y * y + z * z + w * w
-    norm = xp.where(abs(squared - 1.0) <= UNIT, 1.0, xp.sqrt(squared))
+    off = abs(squared - 1.0) > UNIT
+    if not xp.some(off):
+        return x, y, z, w
+    norm = xp.where(off, xp.sqrt(squared), 1.0)
     return x / norm, y / norm, z / norm, w / norm
 
 
@@ -73,9 +85,8 @@ def normalized(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Qua
 
 def canonical(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
     """Choose between q and -q: w > 0, or w == 0 and the first non-zero of x, y, z positive."""
-    flip = xp.first_nonzero(w, x, y, z) < 0.0
-    where = xp.where
-    return where(flip, 0.0 - x, x), where(flip, 0.0 - y, y), where(flip, 0.0 - z, z), where(flip, 0.0 - w, w)
+    quaternion: Quaternion = xp.negated_where(xp.first_nonzero(w, x, y, z) < 0.0, x, y, z, w)
+    return quaternion
 
 
 def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
@@ -118,27 +129,23 @@ def slerp(
     Returns x, y, z, w, unit.  At exactly half a turn both arcs are shortest; the sign of b decides.
     Source: Shoemake 1985, with sin((1-f)a)/sin(a) written as cos(fa) - cos(a) sin(fa)/sin(a): one sine and cosine.
     """
-    where = xp.where
-    theta = arc(ax, ay, az, aw, bx, by, bz, bw, xp)
+    theta = xp.maximum(arc(ax, ay, az, aw, bx, by, bz, bw, xp), TINY)
     sine, cosine = xp.half_sincos(2.0 * theta)
     part_sine, part_cosine = xp.half_sincos(2.0 * (fraction * theta))
-    tiny = theta < TINY
-    to_b = where(tiny, fraction, part_sine / where(tiny, 1.0, sine))
+    to_b = part_sine / sine
     to_a = part_cosine - cosine * to_b
-    signed = where(ax * bx + ay * by + az * bz + aw * bw < 0.0, 0.0 - to_b, to_b)
+    signed = to_b * xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
     mixed = unit(
         to_a * ax + signed * bx, to_a * ay + signed * by, to_a * az + signed * bz, to_a * aw + signed * bw, xp
     )  # fmt: skip
-    return _at_ends((ax, ay, az, aw), mixed, (bx, by, bz, bw), fraction, xp)
-
-
-def _at_ends(start: Quaternion, mixed: Quaternion, end: Quaternion, fraction: Number, xp: Namespace) -> Quaternion:
-    """Put the very ends where the fraction is 0 or 1."""
-    x, y, z, w = (
-        xp.where(fraction == 0.0, a, xp.where(fraction == 1.0, b, middle))
-        for a, middle, b in zip(start, mixed, end, strict=True)
-    )
+    x, y, z, w = (ends(*three, fraction, xp) for three in zip((ax, ay, az, aw), mixed, (bx, by, bz, bw), strict=True))
     return x, y, z, w
+
+
+def ends(start: Number, between: Number, end: Number, fraction: Number, xp: Namespace) -> Number:
+    """Put the very ends, to the bit, where the fraction is 0 or 1."""
+    at_start, at_end = fraction == 0.0, fraction == 1.0
+    return xp.where(at_start, start, xp.where(at_end, end, between)) if xp.some(at_start | at_end) else between
 
 
 def to_matrix(x: Number, y: Number, z: Number, w: Number) -> Matrix:

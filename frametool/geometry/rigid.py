@@ -76,7 +76,7 @@ def _line(start: Number, end: Number, fraction: Number, xp: Namespace) -> Number
     """Interpolate two numbers from the nearer end, and give the very ends at 0 and 1."""
     step = end - start
     between = xp.where(fraction < 0.5, start + fraction * step, end - (1.0 - fraction) * step)
-    return xp.where(fraction == 0.0, start, xp.where(fraction == 1.0, end, between))
+    return quaternion.ends(start, between, end, fraction, xp)
 
 
 def distance(
@@ -114,11 +114,10 @@ def exp(vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number, 
     v in metres, w in radians, linear part first as in ROS messages.
     Source: Murray, Li & Sastry 1994: t = v + B w x v + C w x (w x v), B = (1 - cos a)/a^2, C = (a - sin a)/a^3.
     """
-    angle = xp.length(wx, wy, wz)
+    angle = xp.maximum(xp.length(wx, wy, wz), quaternion.TINY)
     half_sine, half_cosine = xp.half_sincos(angle)
-    tiny, low = angle < quaternion.TINY, angle < SERIES_EXP
-    safe = xp.where(tiny, 1.0, angle)
-    ratio = xp.where(tiny, 0.5, half_sine / safe)
+    low = angle < SERIES_EXP
+    ratio = half_sine / angle
     low_square, high = xp.where(low, angle, 0.0), xp.where(low, SERIES_EXP, angle)
     series = _polynomial(low_square * low_square, SINE_REST)
     second = xp.where(low, series, (high - 2.0 * half_sine * half_cosine) / (high * high * high))
@@ -127,7 +126,7 @@ def exp(vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number, 
     first = 2.0 * ratio * ratio
     return (
         vx + (first * cx + second * dx), vy + (first * cy + second * dy), vz + (first * cz + second * dz),
-        *rotvec.to_quaternion(wx, wy, wz, xp),
+        wx / angle * half_sine, wy / angle * half_sine, wz / angle * half_sine, half_cosine,
     )  # fmt: skip
 
 

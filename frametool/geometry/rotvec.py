@@ -15,30 +15,24 @@ if TYPE_CHECKING:
 def to_quaternion(rx: Number, ry: Number, rz: Number, xp: Namespace, *, degrees: bool = False) -> Quaternion:
     """Give the quaternion x, y, z, w of a rotation vector in radians or degrees.
 
-    Exact down to 1e-300: below 1e-9 rad the factor sin(angle/2)/angle is 1/2 to the last bit.
+    Exact down to 1e-300: an angle too small to be divided by stands for all smaller ones, with the same quotient.
     The unit axis is taken first, so that multiples of 90 degrees about a coordinate axis are exact.
     """
-    angle = xp.length(rx, ry, rz)
+    angle = xp.maximum(xp.length(rx, ry, rz), TINY)
     sine, cosine = xp.half_sincos_deg(angle) if degrees else xp.half_sincos(angle)
-    tiny = angle < TINY
-    divisor, factor = xp.where(tiny, 1.0, angle), xp.where(tiny, xp.radians(0.5) if degrees else 0.5, sine)
-    return rx / divisor * factor, ry / divisor * factor, rz / divisor * factor, cosine
+    return rx / angle * sine, ry / angle * sine, rz / angle * sine, cosine
 
 
 def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace, *, degrees: bool = False) -> Vector:
     """Give the rotation vector of a unit quaternion, of length 0 to pi (or 180 degrees).
 
-    Relative accuracy holds down to 1e-300: below 1e-9 the factor angle/|v| is 2/w.
-    Half a turn leaves with the sign the quaternion has.
+    Relative accuracy holds down to 1e-300.  Half a turn leaves with the sign the quaternion has.
     """
-    sine = xp.length(x, y, z)
-    angle = 2.0 * xp.atan2(sine, abs(w))
-    tiny = sine < TINY
-    divisor = xp.copysign(xp.where(tiny, abs(w), sine), w)
-    factor = xp.where(tiny, 2.0, angle)
+    sine = xp.maximum(xp.length(x, y, z), TINY)
+    angle = xp.copysign(2.0 * xp.atan2(sine, abs(w)), w)
     if degrees:
-        factor = xp.degrees(factor)
-    return x / divisor * factor, y / divisor * factor, z / divisor * factor
+        angle = xp.degrees(angle)
+    return x / sine * angle, y / sine * angle, z / sine * angle
 
 
 def check(

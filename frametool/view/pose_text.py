@@ -15,7 +15,13 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
 
 EVERYTHING = ("quaternion", "rpy_rad", "rpy_deg", "axis_angle_rad", "matrix")
-LABELS = {"axis_angle": "axis-angle", "rotvec": "rotation vector", "six_d": "6d", "xyzw": "quaternion", "wxyz": "quaternion"}
+LABELS = {
+    "axis_angle": "axis-angle",
+    "rotvec": "rotation vector",
+    "six_d": "6d",
+    "xyzw": "quaternion",
+    "wxyz": "quaternion",
+}
 
 
 class Line(NamedTuple):
@@ -33,9 +39,14 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     """Give one line a point, aligned, with its frame."""
-    rows = [(record.get("frame"), next(value for value in record.values() if isinstance(value, list))) for record in records]
+    rows = [
+        (record.get("frame"), next(value for value in record.values() if isinstance(value, list))) for record in records
+    ]
     aligned = _aligned([[_number(value, style) for value in numbers] for _, numbers in rows])
-    lines = [f"{'  '.join(cells)}  {f'm in {frame}' if frame else 'm'}" for cells, (frame, _) in zip(aligned, rows, strict=True)]
+    lines = [
+        f"{'  '.join(cells)}  {f'm in {frame}' if frame else 'm'}"
+        for cells, (frame, _) in zip(aligned, rows, strict=True)
+    ]
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -121,7 +132,8 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     wholes = [max(len(_split(row[at])[0]) for row in rows if at < len(row)) for at in range(columns)]
     rests = [max(len(_split(row[at])[1]) for row in rows if at < len(row)) for at in range(columns)]
     return [
-        [f"{_split(cell)[0]:>{wholes[at]}}{_split(cell)[1]:<{rests[at]}}" for at, cell in enumerate(row)] for row in rows
+        [f"{_split(cell)[0]:>{wholes[at]}}{_split(cell)[1]:<{rests[at]}}" for at, cell in enumerate(row)]
+        for row in rows
     ]
 
 

@@ -25,7 +25,9 @@ class Line(NamedTuple):
 
 def write_tree(tree: FrameTree, style: Style) -> str:
     """Draw a tree with plain lines: each frame below its parent, its pose beside it."""
-    return "".join(f"{line.branch}{line.frame}{pad}{'  '.join(line.label)}".rstrip() + "\n" for line, pad in _padded(tree, style))
+    return "".join(
+        f"{line.branch}{line.frame}{pad}{'  '.join(line.label)}".rstrip() + "\n" for line, pad in _padded(tree, style)
+    )
 
 
 def print_tree(tree: FrameTree, style: Style) -> None:
@@ -56,10 +58,9 @@ def _lines(tree: FrameTree, style: Style) -> Iterator[Line]:
         children.setdefault(parent, []).append((child, transform))
     pending: list[tuple[str, Transform | None, str, str]] = [(root, None, "", "") for root in reversed(tree.roots)]
     while pending:
-        frame, transform, branch, below = pending.pop()
-        yield Line(branch, frame, edge_label(transform, style) if transform is not None else ())
+        frame, pose, branch, below = pending.pop()
+        yield Line(branch, frame, edge_label(pose, style) if pose is not None else ())
         inner = children.get(frame, ())
         for at in range(len(inner) - 1, -1, -1):
-            child, moved = inner[at]
             last = at == len(inner) - 1
-            pending.append((child, moved, below + ("└── " if last else "├── "), below + ("    " if last else "│   ")))
+            pending.append((*inner[at], below + ("└── " if last else "├── "), below + ("    " if last else "│   ")))
