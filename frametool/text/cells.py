@@ -95,13 +95,21 @@ def split_blank(block: bytes, columns: int, *, comment: bytes = b"#") -> Cells:
     return _select(data, min(end, MARGIN + len(block)), found, columns, comment)
 
 
-def whole_records(text: bytes) -> int:
-    """Give how many bytes of the text are whole lines, none of which ends inside quotes."""
+def whole_records(text: bytes, delimiter: bytes = b",") -> int:
+    """Give how many bytes of the text are whole lines, the last of which ends outside quotes."""
     end = text.rfind(b"\n") + 1
-    if text.count(b'"', 0, end) % 2 == 0:
+    if _ends_outside_quotes(text[:end], delimiter):
         return end
-    newlines = [found.end() for found in _cell_pattern(b",").finditer(text) if found[1] == b"\n"]
-    return newlines[-1] if newlines else 0
+    before_last_quote = text.rfind(b"\n", 0, text.rfind(b'"', 0, end)) + 1
+    if before_last_quote and _ends_outside_quotes(text[:before_last_quote], delimiter):
+        return before_last_quote
+    record_ends = [cell.end() for cell in _cell_pattern(delimiter).finditer(text) if cell[1] == b"\n"]
+    return max(record_ends, default=0)
+
+
+def _ends_outside_quotes(lines: bytes, delimiter: bytes) -> bool:
+    """Tell whether whole lines certainly end outside quotes."""
+    return b'"' not in lines or _inside_quotes(framed(lines), MARGIN + len(lines), delimiter) is not None
 
 
 def without_quotes(cells: Spans) -> Spans:

@@ -10,6 +10,8 @@ import numpy as np
 from frametool.text.powers import TENS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.text.arrays import Ints, Words
 
 
@@ -87,14 +89,16 @@ def count_digits(numbers: Ints) -> Ints:
     return count
 
 
-def trailing_zeros(numbers: Ints) -> Ints:
-    """Count the zeros integers below 10**18 end with; 0 counts as eighteen of them."""
-    count = (numbers == 0) * np.int64(18)
-    rest = numbers
-    place = np.arange(len(numbers))
-    while place.size:
-        shorter = rest // 10
-        ends = (shorter * 10 == rest) & (rest != 0)
-        place, rest = place[ends], shorter[ends]
-        count[place] += 1
-    return count
+def significant_digits(words: Sequence[Words]) -> Ints:
+    """Count the digits of numbers in words of characters up to their last one that is not 0.
+
+    A word's highest byte that is not 0 is found in the exponent of the word as a float: digits are below 16, so that
+    rounding never reaches the next byte. The float 0 has the exponent -1023, which no other word is below.
+    """
+    last = np.full(words[0].shape, -1, np.int64)
+    for index, word in enumerate(words):
+        exponents = (word ^ ZEROS).view(np.int64).astype(np.float64).view(np.int64) >> 52
+        exponents -= 1023 - 64 * index
+        exponents >>= 3
+        np.maximum(last, exponents, out=last)
+    return last + 1

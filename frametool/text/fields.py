@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frametool.text.digits import count_digits, eight_digits
+from frametool.text.digits import ZEROS, count_digits, eight_digits
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
@@ -50,14 +50,17 @@ class Fields:
         if upper is not None:
             self.words[:, 0] = eight_digits(upper)
 
-    def write_fraction(self, fraction: Ints, digits: int) -> None:
-        """Write integers as exactly so many digits (up to 17) after the point."""
+    def write_fraction(self, fraction: Ints, digits: int) -> list[Words]:
+        """Write integers as exactly so many digits (up to 17) after the point; give their words, filled up with 0."""
+        words = []
         rest = fraction
-        for word, first in enumerate(range(0, digits, 8), 2):
-            behind = max(digits - first - 8, 0)
-            leading = rest // 10**behind if behind else rest * 10 ** (first + 8 - digits)
-            self.words[:, word] = eight_digits(leading)
-            rest = rest - leading * 10**behind
+        for left in range(digits, 0, -8):
+            leading = rest if left <= 8 else rest // 10 ** (left - 8)
+            words.append(_left_digits(leading, min(left, 8)))
+            self.words[:, 1 + len(words)] = words[-1]
+            if left > 8:
+                rest = rest - leading * 10 ** (left - 8)
+        return words
 
     def write_sign(self, starts: Ints, negative: Flags) -> Ints:
         """Put a minus before each start; give the starts, moved to the minus where it counts."""
@@ -67,6 +70,13 @@ class Fields:
     def whole_starts(self, whole: Ints) -> Ints:
         """Give where the first digits of the whole parts stand in `data`."""
         return self.origins + POINT - count_digits(whole)
+
+
+def _left_digits(numbers: Ints, digits: int) -> Words:
+    """Give the characters of integers of so many digits, filled up with 0 to eight."""
+    if digits == 1:
+        return numbers.view(np.uint64) + ZEROS
+    return eight_digits(numbers * 10 ** (8 - digits) if digits < 8 else numbers)
 
 
 def with_separators(spans: Spans, separators: bytes, rows: int) -> Spans:

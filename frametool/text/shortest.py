@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.text.decimals import Decimals, shortest_decimals
-from frametool.text.digits import count_digits, trailing_zeros
+from frametool.text.digits import count_digits, significant_digits
 from frametool.text.fields import GREATEST_WHOLE, POINT, Fields, replaced, with_separators
 from frametool.text.powers import TENS
 from frametool.text.spans import Spans, join
@@ -24,11 +24,10 @@ _MOST_EXPONENT = 330
 
 
 class _Parts(NamedTuple):
-    """A number's whole part, its fraction as 17 digits, how many of these are shown, and the zeros before them."""
+    """A number's whole part, its fraction as 17 digits, and the zeros before these."""
 
     whole: Ints
     fraction: Ints
-    shown: Ints
     zeros: Ints
 
 
@@ -87,8 +86,7 @@ def _plain_parts(size: Floats, decimals: Decimals) -> _Parts:
     fraction = digits - whole * TENS.take(places, mode="clip")
     fraction *= TENS.take(_MOST_DIGITS - places, mode="clip")
     zeros = np.maximum(places - _MOST_DIGITS, 0)
-    shown = np.maximum(places - trailing_zeros(digits), 1) - zeros
-    return _Parts(whole, fraction, shown, zeros)
+    return _Parts(whole, fraction, zeros)
 
 
 def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
@@ -99,7 +97,6 @@ def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
     whole = digits // scale
     parts.whole[powered] = whole
     parts.fraction[powered] = (digits - whole * scale) * TENS.take(_MOST_DIGITS - behind)
-    parts.shown[powered] = behind - trailing_zeros(digits)
     parts.zeros[powered] = 0
     return behind - places
 
@@ -107,9 +104,9 @@ def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
 def _write(fields: Fields, parts: _Parts) -> tuple[Ints, Ints]:
     """Write all parts; give where each number starts, without its sign, and ends."""
     fields.write_whole(parts.whole)
-    fields.write_fraction(parts.fraction, _MOST_DIGITS)
+    shown = significant_digits(fields.write_fraction(parts.fraction, _MOST_DIGITS))
     starts = fields.whole_starts(parts.whole)
-    ends = fields.origins + POINT + 1 + parts.shown
+    ends = fields.origins + (POINT + 1) + np.maximum(shown, 1)
     small = np.flatnonzero(parts.zeros)
     fields.words[small, 1] = _small_prefixes().take(parts.zeros[small])
     starts[small] -= parts.zeros[small]
@@ -117,12 +114,13 @@ def _write(fields: Fields, parts: _Parts) -> tuple[Ints, Ints]:
 
 
 def _write_exponents(fields: Fields, ends: Ints, powered: Ints, exponents: Ints) -> None:
-    """Put the exponents behind their numbers, in place of the point where no digit follows it."""
-    words, lengths = _exponent_texts()
-    # 0 digits shown: the point goes, too
-    begins = ends[powered] - (ends[powered] == fields.origins[powered] + POINT + 1)
-    texts = words[exponents + _MOST_EXPONENT]
-    for offset in range(5):
+    """Put the exponents behind their numbers; over the point and the 0 behind it, if nothing else follows the point."""
+    rows, lengths = _exponent_texts()
+    begins = ends[powered]
+    is_whole = (begins == fields.origins[powered] + POINT + 2) & (fields.data[begins - 1] == ord("0"))
+    begins -= 2 * is_whole
+    texts = rows[exponents + _MOST_EXPONENT]
+    for offset in range(texts.shape[1]):
         fields.data[begins + offset] = texts[:, offset]
     ends[powered] = begins + lengths[exponents + _MOST_EXPONENT]
 
