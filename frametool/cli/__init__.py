@@ -116,10 +116,12 @@ def _usage(error: click.ClickException) -> str:
     """Put a usage error on one line, with how the command is called."""
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
+    if message[1:2].islower():
+        message = message[0].lower() + message[1:]
     if ctx is None or ctx.parent is None:
-        return message[:1].lower() + message[1:]
+        return message
     pieces = " ".join(ctx.command.collect_usage_pieces(ctx))
-    return f"{ctx.info_name}: {message[:1].lower()}{message[1:]}; usage: {ctx.command_path} {pieces}"
+    return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
 
 
 def _with_snippet(error: FrametoolError) -> str:

@@ -76,7 +76,10 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
         if not isinstance(value, str):
             return tuple(value)
         try:
-            return tuple(notation(spec.strip()) for spec in value.split(","))
+            chosen = tuple(notation(spec.strip()) for spec in value.split(","))
+            for form in chosen:
+                form.bound_axes()  # euler without its axes is refused before any work
+            return chosen
         except ValueInvalid as error:
             self.fail(str(error), param, ctx)
 

@@ -59,13 +59,23 @@ def edges_of(source: Source) -> Iterator[Found]:
         try:
             for edge in read_edges(document.value, reading):
                 count += 1
-                yield Found(edge, source, document.index)
+                yield Found(_without_slashes(edge, reading), source, document.index)
         except Misfit as misfit:
             raise format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key) from None
         notes += [((document.index, *path), message) for path, message in reading.notes]
     if not count:
         raise FormatError("no frames in it", source=source.name)
     tell(source, notes)
+
+
+def _without_slashes(edge: Edge, reading: Reading) -> Edge:
+    """Take one leading `/` off the names, which tf2 has given up, and say so."""
+    for name in (edge.child, edge.parent):
+        if name is not None and name.startswith("/") and len(name) > 1:
+            reading.here = edge.path
+            reading.note(f"frame {name!r}: the leading / is no part of a name and was left out")
+    parent = edge.parent and (edge.parent.removeprefix("/") or edge.parent)
+    return edge._replace(child=edge.child.removeprefix("/") or edge.child, parent=parent)
 
 
 def tell(source: Source, notes: list[tuple[Path, str]], most: int = 10) -> None:

@@ -61,6 +61,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
     Raises Misfit with the path of what is wrong below this mapping.
     """
+    if not POSE_KEYS.issuperset(mapping):
+        _refuse_unknown_keys(mapping, also)
     position: Vector | None = None
     rotation: Quaternion | None = None
     outer_degrees = reading.degrees
@@ -76,8 +78,6 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
                 rotation = turned if rotation is None else _agreeing_rotation(rotation, turned)
                 if moved is not None:
                     position = _only_position(position, moved)
-            elif key not in POSE_KEYS and key not in also:
-                raise _unknown_keys(mapping, also)
     except Misfit as error:
         raise error.below(key) from None
     except ValueInvalid as error:
@@ -155,9 +155,11 @@ def _agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
     return first
 
 
-def _unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> Misfit:
+def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:
     """Name every unknown key of an entry, each with its nearest known one."""
     known = POSE_KEYS.union(also)
     unknown = [key for key in mapping if key not in known]
-    named = "; ".join(f"unknown key {key!r}{did_you_mean(key, known).replace('; ', ', ')}" for key in unknown)
-    return Misfit(f"{named}; a pose has xyz and one rotation: {', '.join(REPRESENTATIONS)}", (unknown[0],), key=True)
+    if unknown:
+        named = "; ".join(f"unknown key {key!r}{did_you_mean(key, known).replace('; ', ', ')}" for key in unknown)
+        choices = ", ".join(REPRESENTATIONS)
+        raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)

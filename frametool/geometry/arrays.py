@@ -6,13 +6,14 @@ The only module of the core that needs numpy at import.
 from __future__ import annotations
 
 import numpy as np
-from numpy import arctan2 as atan2
-from numpy import cbrt, ceil, copysign, degrees, frexp, ldexp, maximum, minimum, radians, sqrt, where
 from numpy import any as some
+from numpy import cbrt, ceil, copysign, degrees, frexp, ldexp, maximum, minimum, radians, sqrt, where
+
+from frametool.errors import ValueInvalid
 
 __all__ = [
-    "atan2", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
-    "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
+    "bearing", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
+    "incline", "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -57,6 +58,18 @@ def negated_where(condition: Number, *values: Number) -> Components:
     )  # fmt: skip
 
 
+def incline(rise: Number, run: Number) -> Number:
+    """Give the angle of a direction with run >= 0; arctan of a quotient is twice as fast as arctan2."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle: Array = np.arctan(rise / run)
+    return angle
+
+
+def bearing(y: Number, x: Number) -> Number:
+    """Give the angle of a direction in [-pi, pi], NaN for none; arctan2 by way of the faster arctan."""
+    return incline(y, x + 0.0) + (x < 0.0) * copysign(np.pi, y)
+
+
 def half_sincos(angle: Number) -> Pair:
     """Give sine and cosine of half an angle in radians, from the tangent of its quarter.
 
@@ -84,7 +97,7 @@ def half_sincos_deg(angle: Number) -> Pair:
 
 def run(kernel: Kernel, count: int, parts: Components, *args: object) -> Components:
     """Apply a kernel to components, some or all of them arrays; give `count` component arrays."""
-    shape = np.broadcast_shapes(*(np.shape(part) for part in parts))
+    shape = batch_shape(parts)
     out = np.empty((count, *shape))
     walk(kernel, parts, out.reshape(count, -1), *args)
     return tuple(out)
@@ -92,15 +105,28 @@ def run(kernel: Kernel, count: int, parts: Components, *args: object) -> Compone
 
 def rows(kernel: Kernel, count: int, parts: Components, *args: object) -> Array:
     """Apply a kernel to components; give an array (..., count) of rows."""
-    shape = np.broadcast_shapes(*(np.shape(part) for part in parts))
+    shape = batch_shape(parts)
     out = np.empty((*shape, count))
     walk(kernel, parts, out.reshape(-1, count).T, *args)
     return out
 
 
+def batch_shape(parts: Components) -> tuple[int, ...]:
+    """Give the shape components broadcast to.
+
+    Raises:
+        ValueInvalid: they do not.
+    """
+    try:
+        return np.broadcast_shapes(*(np.shape(part) for part in parts))
+    except ValueError:
+        shapes = " and ".join(dict.fromkeys(str(np.shape(part)) for part in parts))
+        raise ValueInvalid(f"batch shapes {shapes} do not broadcast") from None
+
+
 def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *args: object) -> None:
     """Fill flat targets block by block with what the kernel makes of the parts."""
-    shape = np.broadcast_shapes(*(np.shape(part) for part in parts))
+    shape = batch_shape(parts)
     columns = [part if isinstance(part, float) else np.broadcast_to(part, shape).reshape(-1) for part in parts]
     with np.errstate(all="ignore"):
         for start, stop in blocks(int(np.prod(shape))):
@@ -110,14 +136,14 @@ def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *a
 
 
 def guarded(kernel: Kernel, complain: Callable[[], None]) -> Kernel:
-    """Watch a kernel's last component: what is not finite in a row's input is not finite there either.
+    """Watch a kernel's first and last component: what is not finite in a row's input is not finite in one of them.
 
     `complain` then looks at the input itself, raises if that is to blame, and else lets pass.
     """
 
     def watched(*block: object) -> Components:
         results = kernel(*block)
-        if not np.isfinite(np.sum(results[-1])):
+        if not np.isfinite(np.sum(results[0]) + np.sum(results[-1])):
             complain()
         return results
 

@@ -17,7 +17,7 @@ HALF, ROOT = 0.5, sqrt(0.5)
 AXES: dict[str, tuple[Rotation, str]] = {
     "flu": (Rotation.of(0.0, 0.0, 0.0, 1.0), "ROS body (REP 103): x forward, y left, z up"),
     "frd": (Rotation.of(1.0, 0.0, 0.0, 0.0), "aircraft body: x forward, y right, z down"),
-    "optical": (Rotation.of(-HALF, HALF, -HALF, HALF), "camera image (ROS optical, OpenCV): x right, y down, z forward"),
+    "optical": (Rotation.of(-HALF, HALF, -HALF, HALF), "camera (ROS optical, OpenCV): x right, y down, z forward"),
     "opengl": (Rotation.of(HALF, -HALF, -HALF, HALF), "OpenGL and Blender camera: x right, y up, z backward"),
     "enu": (Rotation.of(0.0, 0.0, 0.0, 1.0), "world (REP 103): x east, y north, z up"),
     "ned": (Rotation.of(ROOT, ROOT, 0.0, 0.0), "world of aircraft: x north, y east, z down"),

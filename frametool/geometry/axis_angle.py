@@ -29,7 +29,7 @@ def from_quaternion(
     At half a turn, where both directions are right, the first non-zero component of the axis is positive.
     """
     x, y, z, w = canonical(x, y, z, w, xp)
-    angle = 2.0 * xp.atan2(xp.length(x, y, z), w)
+    angle = 2.0 * xp.incline(xp.length(x, y, z), abs(w))
     still = (x == 0.0) & (y == 0.0) & (z == 0.0)
     ux, uy, uz = unit_vector(xp.where(still, 1.0, x), y, z, xp)
     return ux, uy, uz, xp.degrees(angle) if degrees else angle

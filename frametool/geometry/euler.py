@@ -77,7 +77,7 @@ def from_quaternion(
     a, b, c, d = _pairs((x, y, z), w, i, j, k, parity, symmetric)
     squared_sum, squared_difference = a * a + b * b, c * c + d * d
     middle = _middle((x, y, z), w, i, j, k, parity, symmetric, squared_sum, squared_difference, xp)
-    half_sum, half_difference = xp.atan2(b, a), xp.atan2(d, c)
+    half_sum, half_difference = xp.bearing(b, a), xp.bearing(d, c)
     limit = LOCK * (squared_sum + squared_difference)
     no_sum, no_difference = squared_sum <= limit, squared_difference <= limit
     if xp.some(no_sum | no_difference):
@@ -115,9 +115,9 @@ def _middle(
 ) -> Number:  # fmt: skip
     """Give the middle angle from the radii of the two pairs; its sine directly where the axes are three."""
     if symmetric:
-        return 2.0 * xp.atan2(xp.sqrt(squared_difference), xp.sqrt(squared_sum))
+        return 2.0 * xp.incline(xp.sqrt(squared_difference), xp.sqrt(squared_sum))
     sine = 2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity)
-    return xp.atan2(sine, xp.sqrt(squared_sum * squared_difference))
+    return xp.incline(sine, xp.sqrt(squared_sum * squared_difference))
 
 
 def _wrapped(angle: Number, xp: Namespace) -> Number:

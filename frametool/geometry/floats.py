@@ -6,8 +6,8 @@ from math import atan2, cbrt, ceil, copysign, cos, degrees, fmod, frexp, ldexp, 
 from math import hypot as length
 
 __all__ = [
-    "atan2", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
-    "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
+    "bearing", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
+    "incline", "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 SQRT_HALF = sqrt(0.5)
 maximum, minimum = max, min
+bearing = incline = atan2
 largest = abs
 some = bool
 
@@ -51,6 +52,9 @@ def half_sincos_deg(angle: float) -> Pair:
     products cancel exactly.  The reduction to at most 45 degrees is exact.
     """
     half = 0.5 * fmod(angle, 720.0)
+    if -45.0 < half < 45.0:
+        rest = radians(half)
+        return sin(rest), cos(rest)
     quarter = round(half / 90.0)
     rest = half - 90.0 * quarter
     sine, cosine = sin(radians(rest)), cos(radians(rest))

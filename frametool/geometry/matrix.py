@@ -8,6 +8,8 @@ from frametool.geometry.quaternion import EPS, SILENT, TOLERATED, to_matrix
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from frametool.geometry.kinds import Matrix, Namespace, Number, Quaternion
 
 ORTHONORMAL = 8 * EPS  # of the Gram matrix: what rounding alone leaves on a correctly rounded rotation
@@ -69,7 +71,7 @@ def nearest(
     The convergence is quadratic: a step below 1e-9 leaves 1e-18.
     """
     scale = 1.0 / xp.cbrt(determinant(a, b, c, d, e, f, g, h, i))
-    x: Matrix = tuple(part * scale for part in (a, b, c, d, e, f, g, h, i))  # type: ignore[assignment]
+    x: Matrix = tuple(part * scale for part in (a, b, c, d, e, f, g, h, i))
     for _ in range(60):
         x, step = _newton(x, xp)
         if step < 1e-9:
@@ -86,11 +88,11 @@ def _newton(x: Matrix, xp: Namespace) -> tuple[Matrix, float]:
         b * f - c * e, c * d - a * f, a * e - b * d,
     )  # fmt: skip
     half = 0.5 / (a * cofactors[0] + b * cofactors[1] + c * cofactors[2])
-    after: Matrix = tuple(0.5 * old + cofactor * half for old, cofactor in zip(x, cofactors, strict=True))  # type: ignore[assignment]
+    after: Matrix = tuple(0.5 * old + cofactor * half for old, cofactor in zip(x, cofactors, strict=True))
     return after, max(xp.largest(new - old) for new, old in zip(after, x, strict=True))
 
 
-def check(*entries: float, normalize: bool = False) -> Matrix:
+def check(*values: float, normalize: bool = False) -> Matrix:
     """Check one matrix at the door, nine entries row-major, and give the rotation nearest to it.
 
     Orthonormal to 1e-6 in silence, to 1e-3 with a warning; with `normalize` any of positive determinant.
@@ -98,18 +100,19 @@ def check(*entries: float, normalize: bool = False) -> Matrix:
     Raises:
         ValueInvalid: not finite, mirrored, singular or not orthonormal.
     """
+    entries: Matrix = as_nine(values)
     off = defect(*entries, floats)
     problem = complaint(entries, off, normalize=normalize)
     if problem:
         raise ValueInvalid(problem)
     if off <= ORTHONORMAL:
-        return entries  # type: ignore[return-value]
+        return entries
     if off > SILENT and not normalize:
         warn(f"matrix is orthonormal only to {off:.2g} and was replaced by the nearest rotation")
     return nearest(*scaled(*entries, floats), floats)
 
 
-def complaint(entries: tuple[float, ...], off: float, *, normalize: bool) -> str:
+def complaint(entries: Matrix, off: float, *, normalize: bool) -> str:
     """Say why a matrix that far from orthonormal is refused, or nothing."""
     if not all(abs(value) < float("inf") for value in entries):
         return f"matrix {_shown(entries)} is not finite; give nine finite numbers"
@@ -130,7 +133,7 @@ def scaled(
     larger = xp.maximum
     largest = larger(larger(larger(abs(a), abs(b)), larger(abs(c), abs(d))), larger(abs(e), abs(f)))
     shift = -xp.frexp(larger(larger(largest, abs(g)), larger(abs(h), abs(i))))[1]
-    return tuple(xp.ldexp(part, shift) for part in (a, b, c, d, e, f, g, h, i))  # type: ignore[return-value]
+    return tuple(xp.ldexp(part, shift) for part in (a, b, c, d, e, f, g, h, i))
 
 
 def relative_volume(
@@ -140,6 +143,12 @@ def relative_volume(
     a, b, c, d, e, f, g, h, i = scaled(a, b, c, d, e, f, g, h, i, xp)
     lengths = xp.length(a, b, c) * xp.length(d, e, f) * xp.length(g, h, i)
     return determinant(a, b, c, d, e, f, g, h, i) / xp.where(lengths == 0.0, 1.0, lengths)
+
+
+def as_nine(values: Any) -> Matrix:
+    """Name nine values a matrix."""
+    nine: Matrix = values
+    return nine
 
 
 def _shown(entries: tuple[float, ...]) -> str:

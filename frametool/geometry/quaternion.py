@@ -16,7 +16,7 @@ EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: what lies within 4 is left alone, bit for bit
 SILENT = 1e-6
 TOLERATED = 1e-3
-TINY = 1e-150  # the least angle or sine divided by: sin(x)/x there is 1, and numbers down to 1e-308 survive the quotient
+TINY = 1e-150  # the least angle divided by: sin(x)/x is 1 there, and parts down to 1e-308 survive the quotient
 
 
 def squared_norm(x: Number, y: Number, z: Number, w: Number) -> Number:
@@ -24,7 +24,9 @@ def squared_norm(x: Number, y: Number, z: Number, w: Number) -> Number:
     return x * x + y * y + z * z + w * w
 
 
-def product(ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number) -> Quaternion:
+def product(
+    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number
+) -> Quaternion:
     """Multiply two quaternions of any norm: the rotation b followed by the rotation a (Hamilton 1843)."""
     return (
         aw * bx + ax * bw + ay * bz - az * by,
@@ -37,13 +39,16 @@ def product(ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Numb
 def compose(
     ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number
 ) -> Quaternion:
-    """Multiply two unit quaternions and take the rounding off the norm: multiples of 90 degrees stay exact."""
-    return settled(
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
+    """Multiply two unit quaternions and take the rounding off the norm: multiples of 90 degrees stay exact.
+
+    `product` and `settled` written as one: the call every lookup makes at every edge.
+    """
+    x = aw * bx + ax * bw + ay * bz - az * by
+    y = aw * by - ax * bz + ay * bw + az * bx
+    z = aw * bz + ax * by - ay * bx + az * bw
+    w = aw * bw - ax * bx - ay * by - az * bz
+    norm = 0.5 + 0.5 * (x * x + y * y + z * z + w * w)
+    return x / norm, y / norm, z / norm, w / norm
 
 
 def settled(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
@@ -96,7 +101,7 @@ def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -
 
 def angle(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Number:
     """Give the rotation angle in [0, pi] radians, accurate at both ends (half the angle by atan2)."""
-    return 2.0 * xp.atan2(xp.length(x, y, z), abs(w))
+    return 2.0 * xp.incline(xp.length(x, y, z), abs(w))
 
 
 def arc(
@@ -109,7 +114,7 @@ def arc(
     apart = xp.sqrt(squared_norm(bx - ax, by - ay, bz - az, bw - aw))
     along = xp.sqrt(squared_norm(bx + ax, by + ay, bz + az, bw + aw))
     nearer = apart <= along
-    return 2.0 * xp.atan2(xp.where(nearer, apart, along), xp.where(nearer, along, apart))
+    return 2.0 * xp.incline(xp.where(nearer, apart, along), xp.where(nearer, along, apart))
 
 
 def distance(
@@ -207,22 +212,27 @@ def complaint(x: float, y: float, z: float, w: float, norm: float, *, normalize:
 def between(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:
     """Give the shortest rotation that turns the direction a into the direction b.
 
-    Turning by twice the angle between a and the bisector is exact near opposite directions too: the sum of the
-    two unit vectors has no rounding there.  Opposite to 4 eps: half a turn about an axis at right angles to a.
+    The turn by twice the angle between a and the bisector a + b.  Near opposite directions the bisector is all
+    rounding along a - b, which is taken out of it (a + b itself is exact there); opposite to 1 eps: half a turn
+    about an axis at right angles to a.
     """
     ax, ay, az = unit_vector(ax, ay, az, xp)
     bx, by, bz = unit_vector(bx, by, bz, xp)
     mx, my, mz = ax + bx, ay + by, az + bz
-    opposite = abs(mx) + abs(my) + abs(mz) <= UNIT
+    dx, dy, dz = ax - bx, ay - by, az - bz
+    apart = dx * dx + dy * dy + dz * dz
+    along = xp.where(apart > 2.0, mx * dx + my * dy + mz * dz, 0.0) / xp.maximum(apart, 2.0)
+    mx, my, mz = mx - along * dx, my - along * dy, mz - along * dz
+    opposite = abs(mx) + abs(my) + abs(mz) <= EPS
     sx, sy, sz = _sideways(ax, ay, az, xp)
     mx, my, mz = unit_vector(xp.where(opposite, sx, mx), xp.where(opposite, sy, my), xp.where(opposite, sz, mz), xp)
-    return ay * mz - az * my, az * mx - ax * mz, ax * my - ay * mx, ax * mx + ay * my + az * mz
+    return *cross(ax, ay, az, mx, my, mz), ax * mx + ay * my + az * mz
 
 
 def _sideways(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
     """Give a vector at right angles to a unit vector, from the coordinate axis farthest from it."""
-    first, second = abs(x) <= abs(y), abs(y) <= abs(z)
-    use_x, use_y = first & (abs(x) <= abs(z)), second
+    use_x = (abs(x) <= abs(y)) & (abs(x) <= abs(z))
+    use_y = abs(y) <= abs(z)
     zero = 0.0 * x
     # a x e_x = (0, z, -y);  a x e_y = (-z, 0, x);  a x e_z = (y, -x, 0)
     return (
@@ -245,3 +255,8 @@ def unit_vector(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
     x, y, z = xp.ldexp(x, shift), xp.ldexp(y, shift), xp.ldexp(z, shift)
     length = xp.length(x, y, z)
     return x / length, y / length, z / length
+
+
+def cross(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Vector:
+    """Give the vector product."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from frametool.errors import ValueInvalid, did_you_mean
+from frametool.errors import ValueInvalid, alternatives, did_you_mean
 from frametool.geometry import axis_angle, euler, matrix, mrp, quaternion, rotvec, six_d
 
 TYPE_CHECKING = False
@@ -181,14 +181,14 @@ class Notation:
     def to_quaternion(self, components: Components, xp: Namespace, *, degrees: bool = False) -> Quaternion:
         """Give x, y, z, w; `degrees` counts where the notation itself says no unit."""
         unit = degrees if self.degrees is None else self.degrees
-        return self.representation.to_quaternion(components, xp, degrees=unit, axes=self._bound_axes())
+        return self.representation.to_quaternion(components, xp, degrees=unit, axes=self.bound_axes())
 
     def from_quaternion(
         self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False
     ) -> Components:
         """Give the components of a unit quaternion; `degrees` counts where the notation itself says no unit."""
         unit = degrees if self.degrees is None else self.degrees
-        return self.representation.from_quaternion(x, y, z, w, xp, degrees=unit, axes=self._bound_axes())
+        return self.representation.from_quaternion(x, y, z, w, xp, degrees=unit, axes=self.bound_axes())
 
     def checked_quaternion(
         self, components: Sequence[float], xp: Namespace, *, degrees: bool = False, normalize: bool = False
@@ -200,7 +200,8 @@ class Notation:
         """
         return self.to_quaternion(self.representation.checked(components, normalize=normalize), xp, degrees=degrees)
 
-    def _bound_axes(self) -> str:
+    def bound_axes(self) -> str:
+        """Give the Euler axes; raise ValueInvalid where `euler` was named without them."""
         if self.representation.name == "euler" and self.axes is None:
             raise ValueInvalid(f"{self.spec} needs its axes: write euler:rzyx (one of {', '.join(sorted(euler.AXES))})")
         return self.axes or "sxyz"
@@ -218,16 +219,12 @@ def notation(spec: str) -> Notation:
         bare, degrees = name[:-4], name.endswith("_deg")
     row = REPRESENTATIONS.get(bare)
     if row is None:
-        raise ValueInvalid(f"unknown representation {bare!r}{did_you_mean(bare, REPRESENTATIONS)}; {_choices()}")
+        raise ValueInvalid(f"unknown representation {bare!r}{alternatives(bare, REPRESENTATIONS, 'representations')}")
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
     if colon and bare != "euler":
         raise ValueInvalid(f"{bare} has no axes to name; only euler has: euler:{axes or 'rzyx'}")
     return Notation(spec, row, checked_axes(axes) if colon else None, degrees=degrees)
-
-
-def _choices() -> str:
-    return "representations: " + ", ".join(f"{name}:AXES" if name == "euler" else name for name in REPRESENTATIONS)
 
 
 def checked_axes(axes: str) -> str:

@@ -9,6 +9,7 @@ from math import isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rotvec
+from frametool.geometry.quaternion import cross
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -29,8 +30,12 @@ def compose(
     btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number,
 ) -> Rigid:  # fmt: skip
     """Give a_from_c of a_from_b and b_from_c."""
-    tx, ty, tz = apply(atx, aty, atz, ax, ay, az, aw, btx, bty, btz)
-    return tx, ty, tz, *quaternion.compose(ax, ay, az, aw, bx, by, bz, bw)
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(ax, ay, az, aw)
+    x, y, z, w = quaternion.compose(ax, ay, az, aw, bx, by, bz, bw)
+    return (
+        r11 * btx + r12 * bty + r13 * btz + atx, r21 * btx + r22 * bty + r23 * btz + aty,
+        r31 * btx + r32 * bty + r33 * btz + atz, x, y, z, w,
+    )  # fmt: skip
 
 
 def inverse(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number) -> Rigid:
@@ -137,7 +142,7 @@ def log(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: 
     """
     wx, wy, wz = rotvec.from_quaternion(x, y, z, w, xp)
     sine, cosine = xp.length(x, y, z), abs(w)
-    half = xp.atan2(sine, cosine)
+    half = xp.incline(sine, cosine)
     squared = 4.0 * half * half
     low = 2.0 * half < SERIES_LOG
     series = _polynomial(xp.where(low, squared, 0.0), COTANGENT_REST)
@@ -145,11 +150,6 @@ def log(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: 
     cx, cy, cz = cross(wx, wy, wz, tx, ty, tz)
     dx, dy, dz = cross(wx, wy, wz, cx, cy, cz)
     return tx + (factor * dx - 0.5 * cx), ty + (factor * dy - 0.5 * cy), tz + (factor * dz - 0.5 * cz), wx, wy, wz
-
-
-def cross(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Vector:
-    """Give the vector product."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def _polynomial(x: Number, coefficients: tuple[float, ...]) -> Number:

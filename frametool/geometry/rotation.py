@@ -6,7 +6,7 @@ Knows no text and no files; radians only. One item is four Python floats and nee
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import axis_angle, doors, euler, floats, matrix, mrp, quaternion, rotvec, six_d
+from frametool.geometry import axis_angle, batches, doors, euler, floats, matrix, mrp, quaternion, rotvec, six_d
 from frametool.geometry.representations import checked_axes
 
 TYPE_CHECKING = False
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from frametool.geometry.kinds import Array, Components, Kernel, Numbers, Quaternion
 
 NEAR = 1e-9  # rad: rotations closer than this count as close, three digits above the rounding of long chains
+
+_new = object.__new__
 
 
 class Rotation:
@@ -37,8 +39,8 @@ class Rotation:
     @classmethod
     def of(cls, x: Any, y: Any, z: Any, w: Any) -> Rotation:
         """Trust components to be unit, all floats or all arrays of one shape: the fast door without checks."""
-        made = cls.__new__(cls)
-        made._components = (x, y, z, w)
+        made = _new(cls)
+        made._components = (x, y, z, w)  # noqa: SLF001 - its own class
         return made
 
     @property
@@ -74,7 +76,9 @@ class Rotation:
         given = doors.columns(xyzw, 4, "xyzw")
         if doors.single(given):
             return cls.of(*quaternion.check(*given, normalize=normalize))
-        return cls._of_columns(doors.unit_quaternions(given, "xyzw", normalize=normalize))
+        from frametool.geometry.sifting import unit_quaternions
+
+        return cls._of_columns(unit_quaternions(given, "xyzw", normalize=normalize))
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Rotation:
@@ -88,7 +92,9 @@ class Rotation:
         given = doors.matrices(matrices, 3, "matrix")
         if doors.single(given):
             return cls.of(*matrix.to_quaternion(*matrix.check(*given, normalize=normalize), floats))
-        return cls._of_columns(doors.rotation_quaternions(given, "matrix", normalize=normalize))
+        from frametool.geometry.sifting import rotation_quaternions
+
+        return cls._of_columns(rotation_quaternions(given, "matrix", normalize=normalize))
 
     @classmethod
     def from_rotvec(cls, rotvec_xyz: Numbers) -> Rotation:
@@ -105,12 +111,12 @@ class Rotation:
     def from_euler(cls, axes: str, angles: Numbers) -> Rotation:
         """Take angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`."""
         given = doors.columns(angles, 3, "angles")
-        return cls._of_columns(doors.convert(euler.to_quaternion, 4, given, "angles", checked_axes(axes)))
+        return cls._of_columns(batches.convert(euler.to_quaternion, 4, given, "angles", checked_axes(axes)))
 
     @classmethod
     def from_rpy(cls, rpy: Numbers) -> Rotation:
         """Take roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
-        return cls._of_columns(doors.convert(euler.to_quaternion, 4, doors.columns(rpy, 3, "rpy"), "rpy", "sxyz"))
+        return cls._of_columns(batches.convert(euler.to_quaternion, 4, doors.columns(rpy, 3, "rpy"), "rpy", "sxyz"))
 
     @classmethod
     def from_mrp(cls, parameters: Numbers) -> Rotation:
@@ -137,7 +143,7 @@ class Rotation:
 
     @classmethod
     def _checked(cls, given: Components, name: str, kernel: Kernel, check: Any) -> Rotation:
-        return cls._of_columns(doors.checked(kernel, 4, given, name, check))
+        return cls._of_columns(batches.checked(kernel, 4, given, name, check))
 
     @classmethod
     def _of_columns(cls, components: Components) -> Rotation:
@@ -146,20 +152,20 @@ class Rotation:
 
     def as_quaternion(self) -> Array:
         """Give x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""
-        return doors.rows(quaternion.from_quaternion, 4, self._components)
+        return batches.rows(quaternion.from_quaternion, 4, self._components)
 
     def as_matrix(self) -> Array:
         """Give matrices of shape (..., 3, 3); columns are the turned axes."""
-        nine = doors.rows(lambda x, y, z, w, _xp: quaternion.to_matrix(x, y, z, w), 9, self._components)
+        nine = batches.rows(lambda x, y, z, w, _xp: quaternion.to_matrix(x, y, z, w), 9, self._components)
         return nine.reshape(*self.shape, 3, 3)
 
     def as_rotvec(self) -> Array:
         """Give rotation vectors of shape (..., 3), radians, of length 0 to pi."""
-        return doors.rows(rotvec.from_quaternion, 3, self._components)
+        return batches.rows(rotvec.from_quaternion, 3, self._components)
 
     def as_axis_angle(self) -> tuple[Array, Any]:
         """Give unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x."""
-        four = doors.rows(axis_angle.from_quaternion, 4, self._components)
+        four = batches.rows(axis_angle.from_quaternion, 4, self._components)
         return four[..., :3], four[..., 3] if four.ndim > 1 else float(four[3])
 
     def as_euler(self, axes: str) -> Array:
@@ -168,7 +174,7 @@ class Rotation:
         The middle one lies in [-pi/2, pi/2], or in [0, pi] where first and third axis are the same; at gimbal lock
         (see `gimbal_lock`) the third is 0.
         """
-        return doors.rows(euler.from_quaternion, 3, self._components, checked_axes(axes))
+        return batches.rows(euler.from_quaternion, 3, self._components, checked_axes(axes))
 
     def as_rpy(self) -> Array:
         """Give roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
@@ -176,11 +182,11 @@ class Rotation:
 
     def as_mrp(self) -> Array:
         """Give modified Rodrigues parameters of shape (..., 3), of length 0 to 1."""
-        return doors.rows(mrp.from_quaternion, 3, self._components)
+        return batches.rows(mrp.from_quaternion, 3, self._components)
 
     def as_six_d(self) -> Array:
         """Give the first two matrix columns, one after the other, of shape (..., 6)."""
-        return doors.rows(lambda x, y, z, w, _xp: six_d.from_quaternion(x, y, z, w), 6, self._components)
+        return batches.rows(lambda x, y, z, w, _xp: six_d.from_quaternion(x, y, z, w), 6, self._components)
 
     def gimbal_lock(self, axes: str) -> Any:
         """Say per element whether the angles of a convention are at gimbal lock, to 1 eps."""
@@ -189,12 +195,14 @@ class Rotation:
 
     def __matmul__(self, other: Rotation) -> Rotation:
         """Compose: a_from_b @ b_from_c is a_from_c."""
-        if not isinstance(other, Rotation):
+        if type(other) is not Rotation:
             return NotImplemented
         ours, theirs = self._components, other._components
-        if type(ours[3]) is float and type(theirs[3]) is float:
-            return Rotation.of(*quaternion.compose(*ours, *theirs))
-        return self._of_columns(doors.run(quaternion.compose, 4, (*ours, *theirs)))
+        if type(ours[3]) is type(theirs[3]) is float:
+            product = _new(Rotation)
+            product._components = quaternion.compose(*ours, *theirs)  # noqa: SLF001 - its own class
+            return product
+        return self._of_columns(batches.run(quaternion.compose, 4, (*ours, *theirs)))
 
     def inverse(self) -> Rotation:
         """Give the rotation back."""
@@ -202,20 +210,20 @@ class Rotation:
 
     def canonical(self) -> Rotation:
         """Give the same rotation, its quaternion with the canonical sign."""
-        return self._of_columns(doors.run_with_xp(quaternion.from_quaternion, 4, self._components))
+        return self._of_columns(batches.run_with_xp(quaternion.from_quaternion, 4, self._components))
 
     def apply(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
         given = doors.columns(vectors, 3, "vectors")
-        return doors.moved(quaternion.rotate, self._components, quaternion.to_matrix, given, "vectors")
+        return batches.moved(quaternion.rotate, self._components, quaternion.to_matrix, given, "vectors")
 
     def angle(self) -> Any:
         """Give the angle of rotation in [0, pi] radians."""
-        return doors.number(quaternion.angle, self._components)
+        return batches.number(quaternion.angle, self._components)
 
     def distance(self, other: Rotation) -> Any:
         """Give the angle in [0, pi] radians of the rotation between two."""
-        return doors.number(quaternion.distance, (*self._components, *other._components))
+        return batches.number(quaternion.distance, (*self._components, *require(other, "other").components))
 
     def is_close(self, other: Rotation, *, angle: float = NEAR) -> Any:
         """Say per element whether two rotations are within an angle in radians; q and -q are one."""
@@ -226,8 +234,8 @@ class Rotation:
 
         fraction: a number, or an array that broadcasts with the rotations.
         """
-        parts = (*self._components, *other._components, doors.scalars(fraction, "fraction"))
-        return self._of_columns(doors.run_with_xp(quaternion.slerp, 4, parts))
+        parts = (*self._components, *require(other, "other").components, doors.scalars(fraction, "fraction"))
+        return self._of_columns(batches.run_with_xp(quaternion.slerp, 4, parts))
 
     def mean(self, weights: Numbers | None = None) -> Rotation:
         """Give the chordal mean of all elements: the rotation with the least sum of squared matrix differences.
@@ -239,7 +247,7 @@ class Rotation:
         if doors.single(self._components):
             return self
         heavy = None if weights is None else doors.weights(weights, self.shape)
-        moment = doors.second_moment(self._components, heavy)
+        moment = batches.second_moment(self._components, heavy)
         return Rotation.from_quaternion(np.linalg.eigh(moment)[1][:, 3], normalize=True).canonical()
 
     @property
@@ -257,7 +265,7 @@ class Rotation:
         """Choose elements as numpy does."""
         if not self.shape:
             raise TypeError("one rotation has no elements")
-        return self._of_columns(doors.chosen(self._components, index))
+        return self._of_columns(batches.chosen(self._components, index))
 
     def __iter__(self) -> Iterator[Rotation]:
         """Go along the first axis."""

@@ -29,7 +29,7 @@ def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace, *
     Relative accuracy holds down to 1e-300.  Half a turn leaves with the sign the quaternion has.
     """
     sine = xp.maximum(xp.length(x, y, z), TINY)
-    angle = xp.copysign(2.0 * xp.atan2(sine, abs(w)), w)
+    angle = xp.copysign(2.0 * xp.incline(sine, abs(w)), w)
     if degrees:
         angle = xp.degrees(angle)
     return x / sine * angle, y / sine * angle, z / sine * angle
@@ -44,5 +44,6 @@ def check(
         ValueInvalid: not finite, or so long that its square overflows.
     """
     if not all(abs(value) <= LIMIT for value in (rx, ry, rz)):
-        raise ValueInvalid(f"rotation vector {rx:g} {ry:g} {rz:g} is not finite or too long; give numbers below {LIMIT:g}")
+        shown = f"rotation vector {rx:g} {ry:g} {rz:g}"
+        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below {LIMIT:g}")
     return rx, ry, rz

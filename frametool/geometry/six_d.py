@@ -6,7 +6,7 @@ from math import isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats, matrix
-from frametool.geometry.quaternion import to_matrix, unit_vector
+from frametool.geometry.quaternion import cross, to_matrix, unit_vector
 
 PARALLEL = 1e-12  # sine between the columns: below, rounding decides the plane they span
 
@@ -28,7 +28,7 @@ def to_quaternion(
     for _ in range(2):
         along = ax * bx + ay * by + az * bz
         bx, by, bz = unit_vector(bx - along * ax, by - along * ay, bz - along * az, xp)
-    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    cx, cy, cz = cross(ax, ay, az, bx, by, bz)
     return matrix.to_quaternion(ax, bx, cx, ay, by, cy, az, bz, cz, xp)
 
 
@@ -38,18 +38,20 @@ def from_quaternion(x: Number, y: Number, z: Number, w: Number) -> Components:
     return r11, r21, r31, r12, r22, r32
 
 
-def check(*columns: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any two columns will do
-    """Check one pair of columns at the door.
+def check(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float, *, normalize: bool = False  # noqa: ARG001
+) -> Components:
+    """Check one pair of columns at the door; any two that span a plane will do.
 
     Raises:
         ValueInvalid: not finite, zero or parallel.
     """
-    shown = f"columns {' '.join(f'{value:g}' for value in columns[:3])} and {' '.join(f'{value:g}' for value in columns[3:])}"
-    if not all(map(isfinite, columns)):
+    shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
+    if not all(map(isfinite, (ax, ay, az, bx, by, bz))):
         raise ValueInvalid(f"{shown} are not finite; give six finite numbers")
-    if not any(columns[:3]) or not any(columns[3:]):
+    if not (ax or ay or az) or not (bx or by or bz):
         raise ValueInvalid(f"{shown} span no plane: one is zero")
-    (ax, ay, az), (bx, by, bz) = unit_vector(*columns[:3], floats), unit_vector(*columns[3:], floats)
-    if floats.length(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx) <= PARALLEL:
+    first, second = unit_vector(ax, ay, az, floats), unit_vector(bx, by, bz, floats)
+    if floats.length(*cross(*first, *second)) <= PARALLEL:
         raise ValueInvalid(f"{shown} span no plane: they are parallel")
-    return columns
+    return ax, ay, az, bx, by, bz

@@ -6,7 +6,7 @@ Knows no names and no time. `a_from_b` takes points seen in b to the same points
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import doors, floats, matrix, quaternion, rigid
+from frametool.geometry import batches, doors, floats, matrix, rigid
 from frametool.geometry.rotation import NEAR, Rotation, require
 
 TYPE_CHECKING = False
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from frametool.geometry.kinds import Array, Components, Numbers, Rigid
 
 NEAR_BY = 1e-9  # metres: translations closer than this count as close
+_new = object.__new__
 
 
 class Transform:
@@ -33,13 +34,13 @@ class Transform:
         """Join a rotation and a translation of shape (..., 3) in metres; batch shapes broadcast."""
         shift = doors.columns(translation, 3, "translation")
         parts = (*shift, *require(rotation, "rotation").components)
-        self._components = doors.joined(parts, "translation")  # type: ignore[assignment]
+        self._components = doors.joined(parts, "translation")
 
     @classmethod
     def of(cls, tx: Any, ty: Any, tz: Any, x: Any, y: Any, z: Any, w: Any) -> Transform:
         """Trust components, all floats or all arrays of one shape, the quaternion unit: the fast door."""
-        made = cls.__new__(cls)
-        made._components = (tx, ty, tz, x, y, z, w)
+        made = _new(cls)
+        made._components = (tx, ty, tz, x, y, z, w)  # noqa: SLF001 - its own class
         return made
 
     @property
@@ -85,7 +86,9 @@ class Transform:
         if doors.single(m):
             rotation: Any = matrix.to_quaternion(*matrix.check(*turned, normalize=normalize), floats)
         else:
-            rotation = doors.rotation_quaternions(turned, "matrix", normalize=normalize)
+            from frametool.geometry.sifting import rotation_quaternions
+
+            rotation = rotation_quaternions(turned, "matrix", normalize=normalize)
         return cls._of_columns(doors.joined((m[3], m[7], m[11], *rotation), "matrix"))
 
     @classmethod
@@ -95,7 +98,7 @@ class Transform:
         Linear part first, as in ROS messages: metres, then radians.
         """
         given = doors.columns(twist, 6, "twist")
-        return cls._of_columns(doors.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
+        return cls._of_columns(batches.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
 
     @classmethod
     def _of_columns(cls, components: Components) -> Transform:
@@ -105,7 +108,7 @@ class Transform:
     @property
     def xyz(self) -> Array:
         """The translations, shape (..., 3), metres."""
-        return doors.stacked(self._components[:3])
+        return batches.stacked(self._components[:3])
 
     @property
     def xyzw(self) -> Array:
@@ -124,33 +127,35 @@ class Transform:
 
     def as_matrix(self) -> Array:
         """Give homogeneous matrices of shape (..., 4, 4)."""
-        return doors.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
+        return batches.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
 
     def log(self) -> Array:
         """Give the twists (vx, vy, vz, wx, wy, wz), shape (..., 6), whose `exp` this is; angles up to pi."""
-        return doors.rows(rigid.log, 6, self._components)
+        return batches.rows(rigid.log, 6, self._components)
 
     def __matmul__(self, other: Transform) -> Transform:
         """Compose: a_from_b @ b_from_c is a_from_c."""
-        if not isinstance(other, Transform):
+        if type(other) is not Transform:
             return NotImplemented
         ours, theirs = self._components, other._components
-        if type(ours[6]) is float and type(theirs[6]) is float:
-            return Transform.of(*rigid.compose(*ours, *theirs))
-        return self._of_columns(doors.run(rigid.compose, 7, (*ours, *theirs)))
+        if type(ours[6]) is type(theirs[6]) is float:
+            product = _new(Transform)
+            product._components = rigid.compose(*ours, *theirs)  # noqa: SLF001 - its own class
+            return product
+        return self._of_columns(batches.run(rigid.compose, 7, (*ours, *theirs)))
 
     def inverse(self) -> Transform:
         """Give b_from_a of a_from_b."""
-        return self._of_columns(doors.run(rigid.inverse, 7, self._components))
+        return self._of_columns(batches.run(rigid.inverse, 7, self._components))
 
     def relative(self, other: Transform) -> Transform:
         """Give the pose of the other seen from this one: self.inverse() @ other, near poses keeping their digits."""
-        return self._of_columns(doors.run(rigid.relative, 7, (*self._components, *_components_of(other))))
+        return self._of_columns(batches.run(rigid.relative, 7, (*self._components, *_components_of(other))))
 
     def apply(self, points: Numbers) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
         given = doors.columns(points, 3, "points")
-        return doors.moved(rigid.apply, self._components, rigid.to_matrix, given, "points")
+        return batches.moved(rigid.apply, self._components, rigid.to_matrix, given, "points")
 
     def apply_vector(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
@@ -162,11 +167,11 @@ class Transform:
         fraction: a number, or an array that broadcasts with the transforms.
         """
         parts = (*self._components, *_components_of(other), doors.scalars(fraction, "fraction"))
-        return self._of_columns(doors.run_with_xp(rigid.interpolate, 7, parts))
+        return self._of_columns(batches.run_with_xp(rigid.interpolate, 7, parts))
 
     def distance(self, other: Transform) -> tuple[Any, Any]:
         """Give the metres and the radians between two."""
-        metres, radians = doors.run_with_xp(rigid.distance, 2, (*self._components, *_components_of(other)))
+        metres, radians = batches.run_with_xp(rigid.distance, 2, (*self._components, *_components_of(other)))
         return metres, radians
 
     def is_close(self, other: Transform, *, angle: float = NEAR, distance: float = NEAR_BY) -> Any:
@@ -183,7 +188,7 @@ class Transform:
         """Give the weighted mean of all elements: of the translations, and the chordal one of the rotations."""
         if not self.shape:
             return self
-        return Transform(self.rotation.mean(weights), doors.mean_rows(self._components[:3], weights))
+        return Transform(self.rotation.mean(weights), batches.mean_rows(self._components[:3], weights))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -200,7 +205,7 @@ class Transform:
         """Choose elements as numpy does."""
         if not self.shape:
             raise TypeError("one transform has no elements")
-        return self._of_columns(doors.chosen(self._components, index))
+        return self._of_columns(batches.chosen(self._components, index))
 
     def __iter__(self) -> Iterator[Transform]:
         """Go along the first axis."""

@@ -48,7 +48,7 @@ def _padded(tree: FrameTree, style: Style) -> Iterator[tuple[Line, str]]:
     firsts = max((len(line.label[0]) for line in lines if line.label), default=0)
     for line in lines:
         label = (f"{line.label[0]:<{firsts}}", *line.label[1:]) if line.label else ()
-        yield line._replace(label=label), " " * (width - len(line.branch) - len(line.frame) + 2)
+        yield line._replace(label=label), " " * bool(label) * (width - len(line.branch) - len(line.frame) + 2)
 
 
 def _lines(tree: FrameTree, style: Style) -> Iterator[Line]:
