@@ -8,17 +8,21 @@ import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, poses_from, source_of, usage_if_inline
+from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline
+from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.numbers import parse_number
 from frametool.formats.pose import Pose
 from frametool.formats.records import Point, read_moveables
 from frametool.geometry import quaternion, rigid
+from frametool.stream.operation import Operation
+from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.formats.source import Source
     from frametool.geometry.kinds import Rigid
 
 CHOICES = ("point", "vector", "pose")
@@ -32,6 +36,8 @@ CHOICES = ("point", "vector", "pose")
 @rotation_options
 @pose_options
 @result_options("points")
+@click.option("--frame-column", "frame_column", type=TEXT, metavar="NAME", help="without SOURCE, the column that names each row's frame")
+@stream_options
 def command(
     arguments: tuple[str, ...],
     pose: str | None,
@@ -39,8 +45,9 @@ def command(
     deg: bool,
     normalize: bool,
     kind: str | None,
+    frame_column: str | None,
     **options: Any,
-) -> None:
+) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
 
     \b
@@ -51,13 +58,33 @@ def command(
     A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
     each record says its own frame; without records standard input is read.
     """
+    stream = Stream(options)
     output = Output("points", deg=deg, **options)
     if pose is None:
         way, rest = _way_by_tree(arguments, more)
     else:
-        way, rest = _way_by_pose(_one_pose(pose, degrees=deg, normalize=normalize)), arguments
+        way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
+    if rest in ((), ("-",)):
+        wishes = _wishes(way, frame_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
+        outcome = stream.run(wishes, output)
+        if isinstance(outcome, int):
+            return outcome
+        rest = (outcome,)
+    elif stream.path:
+        raise click.UsageError("-i FILE and records are two inputs; give one")
     records = _records(rest, kind, degrees=deg, normalize=normalize)
     output.moved([move(record, way.from_frame(own_frame(record)), way.target) for record in records])
+    return 0
+
+
+def _wishes(way: Way, frame_column: str | None) -> Request:
+    """Say how a stream's rows move: all from one frame, or each from the one it names."""
+    fixed = None if frame_column else way.fixed
+    frames = () if fixed else (frame_column or "",)
+    return Request(
+        Operation(left=fixed, moves=True), frames=frames, edge_of=None if fixed else way.from_frame, way=way.from_frame,
+        told=way.target,
+    )  # fmt: skip
 
 
 class Way(NamedTuple):
@@ -65,6 +92,7 @@ class Way(NamedTuple):
 
     target: str | None
     from_frame: Callable[[str | None], Rigid]
+    fixed: Rigid | None = None  # where all come from one frame
 
 
 def move(record: Pose | Point, target_from_source: Rigid, target: str | None) -> Pose | Point:
@@ -78,7 +106,7 @@ def move(record: Pose | Point, target_from_source: Rigid, target: str | None) ->
     return record._replace(position=(x, y, z), frame=target)
 
 
-def _way_by_tree(arguments: Sequence[str], more: Sequence[str]) -> tuple[Way, Sequence[str]]:
+def _way_by_tree(arguments: tuple[str, ...], more: Sequence[str]) -> tuple[Way, tuple[str | Source, ...]]:
     """Take tree, target and, if one is named, source from the arguments; the rest are records."""
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
@@ -94,7 +122,8 @@ def _way_by_tree(arguments: Sequence[str], more: Sequence[str]) -> tuple[Way, Se
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
         return tree.lookup(target, start).components
 
-    return Way(target, from_frame), rest
+    fixed = tree.lookup(target, source).components if source is not None else None
+    return Way(target, from_frame, fixed), rest
 
 
 def _way_by_pose(pose: Pose) -> Way:
@@ -104,7 +133,7 @@ def _way_by_pose(pose: Pose) -> Way:
         _settled(own, pose.name)
         return pose.components
 
-    return Way(pose.parent, from_frame)
+    return Way(pose.parent, from_frame, pose.components)
 
 
 def own_frame(record: Pose | Point) -> str | None:
@@ -126,18 +155,13 @@ def is_record(argument: str) -> bool:
     return argument == "-" or is_inline(argument)
 
 
-def _one_pose(argument: str, *, degrees: bool, normalize: bool) -> Pose:
-    poses = poses_from(argument, degrees=degrees, normalize=normalize)
-    if len(poses) != 1:
-        raise click.UsageError(f"--transform takes one pose, {argument} holds {len(poses)}")
-    return poses[0]
-
-
-def _records(arguments: Sequence[str], kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
+def _records(
+    arguments: Sequence[str | Source], kind: str | None, *, degrees: bool, normalize: bool
+) -> Iterator[Pose | Point]:
     """Read the records: bare numbers in threes, mappings, standard input."""
     pending: list[str] = []
-    for argument in arguments or ("-",):
-        if not is_record(argument):
+    for argument in arguments:
+        if isinstance(argument, str) and not is_record(argument):
             pending.append(argument)
             continue
         yield from _points(pending, kind)
@@ -161,7 +185,7 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
         yield Point((x, y, z), kind or "point")
 
 
-def _read(argument: str, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
+def _read(argument: str | Source, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
     """Read records from a mapping or from standard input, and take them for what --as says."""
     try:
         records = read_moveables(source_of(argument), degrees=degrees, normalize=normalize)

@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, Notations, pose_options, result_options, rotation_options
+from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, pose_from_numbers, poses_from
+from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.formats.results import Result
+from frametool.geometry.representations import notation
+from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
@@ -17,13 +20,19 @@ if TYPE_CHECKING:
 
 @click.command(cls=Command, name="convert", short_help="one rotation or pose in other representations")
 @click.argument("values", nargs=-1, type=TEXT, metavar="[VALUES.. | POSE]")
-@click.option("--from", "given", type=Notations(), metavar="REP", help="what the bare VALUES are")
 @rotation_options
 @pose_options
 @result_options("poses")
+@click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
+@stream_options
 def command(
-    values: tuple[str, ...], given: tuple[Notation, ...] | None, deg: bool, normalize: bool, **options: Any
-) -> None:
+    values: tuple[str, ...],
+    given: tuple[Notation, ...] | None,
+    deg: bool,
+    normalize: bool,
+    unwrap: bool,
+    **options: Any,
+) -> int:
     """Write one rotation or pose in other representations.
 
     \b
@@ -35,10 +44,21 @@ def command(
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
     poses; without any argument standard input is read.
     """
+    stream = Stream(options)
     output = Output("poses", deg=deg, **options)
-    if values and not is_inline(values[0]) and (given or len(values) > 1):
+    if values in ((), ("-",)):
+        forms = output.notations or (notation("quaternion"),)
+        wishes = Request(given=one_notation(given), degrees=deg, normalize=normalize, notations=forms, unwrap=unwrap)
+        outcome = stream.run(wishes, output)
+        if isinstance(outcome, int):
+            return outcome
+        poses = poses_from(outcome, degrees=deg, normalize=normalize)
+    elif stream.path:
+        raise click.UsageError("-i FILE and VALUES are two inputs; give one")
+    elif values and not is_inline(values[0]) and (given or len(values) > 1):
         poses = [pose_from_numbers(values, given, degrees=deg, normalize=normalize)]
     else:
-        poses = [pose for each in values or ("-",) for pose in poses_from(each, degrees=deg, normalize=normalize)]
+        poses = [pose for each in values for pose in poses_from(each, degrees=deg, normalize=normalize)]
     output.poses(Result(pose) for pose in poses)
     output.tell_of_lock(poses)
+    return 0

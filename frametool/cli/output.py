@@ -39,9 +39,10 @@ class Output:
         """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
+        self.told = format_name or _form_by_suffix(output, what)
+        self.notations = notations or ()
         form = (
-            format_name
-            or _form_by_suffix(output, what)
+            self.told
             or ("text" if output is None and sys.stdout.isatty() else "yaml")
         )
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for

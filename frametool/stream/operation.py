@@ -41,7 +41,7 @@ class Operation(NamedTuple):
     @property
     def changes_nothing(self) -> bool:
         """Tell whether rows only change their notation."""
-        return self == Operation()
+        return self.left is self.right is None and not self.inverse and not self.of
 
     def point(self, kind: str, x: object, y: object, z: object, edge: Rigid | None) -> Components:
         """Move a point or a vector by `edge`, else by `left`."""

@@ -21,7 +21,8 @@ class Request(NamedTuple):
     kind: what rows are taken for ("" as they look); given: notation of their rotations; degrees: of bare angles
     notations: those of the result (none: as read); columns: which are ours, one entry a pose
     keep, prefix: results beside what they come from, under other names
-    frames: columns or keys that name a row's frame; told: the frame results are in, if it is known
+    frames: columns that name a row's frame, edge_of: the pose that moves from it; told: the frame results are in
+    way: the pose that moves a record given in a frame; rename: a record's parent and name to those of its result
     """
 
     operation: Operation = Operation()
@@ -38,6 +39,8 @@ class Request(NamedTuple):
     prefix: str = ""
     frames: tuple[str, ...] = ()
     edge_of: Callable[[str], Rigid] | None = None
+    way: Callable[[str | None], Rigid] | None = None
+    rename: Callable[[str | None, str | None], tuple[str | None, str | None]] | None = None
     told: str | None = None
     unwrap: bool = False
     on_error: str = STOP

@@ -1,0 +1,144 @@
+"""Streams on the command line: the options they add, and the run itself."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import click
+
+from frametool.cli.command import TEXT, Notations
+from frametool.errors import FileProblem, FormatError
+from frametool.formats.source import Source, decode
+from frametool.stream.detect import RECORDS, STREAMS, form_of
+from frametool.stream.faults import MOST, ON_ERROR, Policy
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import TypeVar
+
+    from frametool.cli.output import Output
+    from frametool.stream.request import Request
+    from frametool.stream.run import Outcome
+
+    Function = TypeVar("Function", bound=Callable[..., Any])
+
+NAMES = ("input_path", "input_form", "columns", "keep", "prefix", "header", "on_error", "max_errors", "jobs", "quiet", "verbose")
+
+
+def stream_options(function: Function) -> Function:
+    """Give a command the options of streams; `Stream` takes them."""
+    options = [
+        click.option("-i", "--input", "input_path", type=TEXT, metavar="FILE", help="stream from this file instead of standard input"),
+        click.option("--in", "input_form", type=click.Choice(tuple(STREAMS)), help="form of the stream  [default: by suffix or first line]"),
+        click.option("--from", "given", type=Notations(), metavar="REP", help="what the rotations of bare VALUES or of a stream's columns are"),
+        click.option("--columns", multiple=True, type=TEXT, metavar="NAME,..", help="columns that are ours, by name or number; once for each pose"),
+        click.option("--keep", is_flag=True, help="add the result's columns instead of replacing ours"),
+        click.option("--prefix", default="", type=TEXT, metavar="TEXT", help="put this before the names of the result's columns"),
+        click.option("--no-header", "header", is_flag=True, flag_value=False, default=True, help="the table has no header; columns are numbered from 1"),
+        click.option("--on-error", type=click.Choice(ON_ERROR), default="stop", show_default=True, help="what bad rows do"),
+        click.option("--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N", help="tell of so many bad rows; all are counted"),
+        click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, metavar="N", help="processes for a large stream"),
+        click.option("--quiet", is_flag=True, help="no progress on stderr"),
+        click.option("-v", "--verbose", is_flag=True, help="say on stderr what was detected"),
+    ]  # fmt: skip
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+class Stream:
+    """The stream of a command, as its options describe it."""
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        """Take the stream's options out of a command's."""
+        self.options = {name: options.pop(name) for name in NAMES}
+        self.given = one_notation(options.pop("given", None))
+        self.path: str | None = self.options["input_path"]
+        if self.path == "-":
+            self.path = None
+
+    def is_wanted(self, argument: object) -> bool:
+        """Tell whether standard input or -i FILE is to be read in this argument's place."""
+        if self.path is not None and argument not in (None, "-"):
+            raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
+        return self.path is not None or argument in (None, "-")
+
+    def run(self, request: Request, output: Output) -> int | Source:
+        """Run the stream and give its exit status; or give the text of a few records that are to be shown otherwise."""
+        name = self.path or "stdin"
+        with _opened(self.path) as stream:
+            begin = stream.peek() if hasattr(stream, "peek") else b""
+            form, known_by = form_of(begin, self.path or "", told=self.options["input_form"] or _table_form(output))
+            if self.options["verbose"] and known_by:
+                click.echo(f"frametool: {name}: read as {form} ({STREAMS[form]}), known by {known_by}", err=True)
+            if form in RECORDS and (output.told or form) != form:
+                return Source(name, decode(stream.read(), name))
+            if form not in RECORDS and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
+                raise click.UsageError(f"a stream of {form} stays {form}; --format {output.told} is for single results and records")
+            return self._run(stream, form, self._completed(request, output), output)
+
+    def _completed(self, request: Request, output: Output) -> Request:
+        """Add what the stream's options say to the request."""
+        options = self.options
+        if options["keep"] and output.told in RECORDS:
+            raise click.UsageError("--keep is for tables; a record holds one pose")
+        return request._replace(
+            given=request.given or self.given, notations=request.notations or output.notations, precision=output.style.precision,
+            keep_sign=output.style.keep_sign, columns=options["columns"], keep=options["keep"], prefix=options["prefix"], on_error=options["on_error"],
+        )
+
+    def _run(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        from frametool.stream.run import run
+        from frametool.stream.sink import Sink
+        from frametool.view.progress import Progress
+
+        name = self.path or "stdin"
+        policy = Policy(name, request.on_error, most=self.options["max_errors"], tell=lambda text: click.echo(f"frametool: {text}", err=True))
+        progress = Progress(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"])  # noqa: PTH202
+        try:
+            with Sink(None if output.path == "-" else output.path, force=output.force) as sink:
+                return run(self._outcomes(stream, form, request, name), sink.write, policy, progress.advance)
+        finally:
+            progress.stop()
+
+    def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Iterator[Outcome]:
+        if form in RECORDS:
+            from frametool.stream.documents import run_records
+
+            return run_records(stream, form, request, source=name, jobs=self.options["jobs"])
+        from frametool.stream.tables import run_table
+
+        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
+
+
+def _table_form(output: Output) -> str:
+    """Give the form of a table if --format names one: a table is written as it is read."""
+    return output.told if output.told in STREAMS and output.told not in RECORDS else ""
+
+
+def _opened(path: str | None) -> BinaryIO:
+    """Open the input; raises FileProblem."""
+    if path is None:
+        if sys.stdin.isatty():
+            click.echo("frametool: reading from the terminal; end with Ctrl-D", err=True)
+        return sys.stdin.buffer  # type: ignore[return-value]
+    try:
+        return open(path, "rb")  # noqa: PTH123
+    except OSError as error:
+        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def one_notation(given: Any) -> Any:
+    """Take the one representation of --from."""
+    if given and len(given) > 1:
+        raise click.UsageError("--from takes one representation")
+    return given[0] if given else None
+
+
+def no_columns(error: FormatError) -> FormatError:
+    """Count what --columns names wrongly as misuse."""
+    if not error.line:
+        error.exit_code = 2
+    return error

@@ -1,0 +1,75 @@
+"""Where a stream's bytes go: standard output, whole lines at a time, or a file that is there whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from typing import TYPE_CHECKING
+
+from frametool.errors import FileProblem
+
+if TYPE_CHECKING:
+    from types import FrameType, TracebackType
+    from typing import BinaryIO, Self
+
+
+class Sink:
+    """Take blocks of whole lines; Ctrl-C waits until a block is out, so that no line is cut."""
+
+    def __init__(self, path: str | None, *, force: bool = False) -> None:
+        """Write to a temporary file beside `path`, or to standard output; raises FileProblem if the file exists."""
+        self.path = path
+        self._part = f"{path}.{os.getpid()}.part"
+        self._writing = self._interrupted = False
+        self._stream = self._opened(force=force) if path else sys.stdout.buffer
+
+    def _opened(self, *, force: bool) -> BinaryIO:
+        if not force and os.path.lexists(str(self.path)):
+            raise FileProblem(f"{self.path}: exists; give --force to replace it")
+        try:
+            return open(self._part, "xb")  # noqa: PTH123, SIM115 - closed in __exit__
+        except OSError as error:
+            raise self._problem(error) from None
+
+    def __enter__(self) -> Self:
+        """Take over Ctrl-C."""
+        self._before = signal.signal(signal.SIGINT, self._interrupt)
+        return self
+
+    def write(self, block: bytes) -> None:
+        """Write whole lines at once."""
+        self._writing = True
+        try:
+            self._stream.write(block)
+            self._stream.flush()
+        except OSError as error:
+            if self.path:
+                raise self._problem(error) from None
+            if not isinstance(error, BrokenPipeError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered is lost anyway
+                raise FileProblem(f"standard output: {(error.strerror or str(error)).lower()}") from None
+            raise
+        finally:
+            self._writing = False
+        if self._interrupted:
+            raise KeyboardInterrupt
+
+    def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
+        if not self._writing or self._interrupted:
+            raise KeyboardInterrupt
+        self._interrupted = True
+
+    def __exit__(self, kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None) -> None:
+        """Put the file in its place if all went well, else leave nothing."""
+        signal.signal(signal.SIGINT, self._before)
+        if not self.path:
+            return
+        self._stream.close()
+        if kind is None:
+            os.replace(self._part, self.path)  # noqa: PTH105
+        else:
+            os.unlink(self._part)  # noqa: PTH108
+
+    def _problem(self, error: OSError) -> FileProblem:
+        return FileProblem(f"{self.path}: {(error.strerror or str(error)).lower()}")
