@@ -9,10 +9,11 @@ import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.formats.numbers import explain_angle, explain_number, parse_angle
-from frametool.geometry import arrays
+from frametool.geometry import arrays, rigid
 from frametool.stream.faults import NULL, STOP, Fault
 from frametool.stream.rotations import read_rotations
-from frametool.stream.rows import Const, Out, assemble, chosen, number_spans, separators, texts_as_rows
+from frametool.stream.pieces import Const, Out
+from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
 from frametool.stream.shape import IDENTITY, POSE, TURN, pose_of
 from frametool.text.parse import parse_floats
 
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 
     from frametool.geometry.kinds import Components, Rigid
     from frametool.stream.operation import Operation
-    from frametool.stream.rows import Block, Piece
+    from frametool.stream.pieces import Piece
+    from frametool.stream.rows import Block
     from frametool.stream.shape import Shape, Target
     from frametool.text.arrays import Floats, Ints
     from frametool.text.spans import Spans
@@ -34,11 +36,11 @@ class Plan(NamedTuple):
 
     shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
     pieces: the text of a result; null: what stands for each number of a row without one
-    edge_of: the pose that moves a row, by the name of its frame; yaml: numbers need a point before the exponent
+    edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape; yaml: numbers need a point before the exponent
     """
 
     shapes: tuple[Shape, ...]
-    target: Target
+    targets: tuple[Target, ...]
     operation: Operation
     pieces: tuple[Piece, ...]
     names: tuple[str, ...]
@@ -49,6 +51,7 @@ class Plan(NamedTuple):
     on_error: str = STOP
     unwrap: bool = False
     yaml: bool = False
+    edges: tuple[Rigid | None, ...] = ()
 
 
 class State:
@@ -81,13 +84,13 @@ class Run:
         numbers = self._read()
         edge = None if plan.edge_of is None or not self.count else self._edges(plan.edge_of)
         with np.errstate(all="ignore"):
-            parts = self._compute(list(np.ascontiguousarray(numbers.T)), edge, state)
-            self.results, self.locked = self._results(parts)
+            moved = self._compute(list(np.ascontiguousarray(numbers.T)), edge, state)
+            self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
         if self.reasons:
             self._keep(np.array([row not in self.reasons for row in range(self.count)], np.bool_))
         if plan.unwrap and len(self.rows):
-            _unwrap(self.results, plan.target.angle_columns(), state)
+            _unwrap(self.results, plan.targets[0].angle_columns(), state)
 
     def _blame(self, row: int, column: str, reason: str) -> None:
         """Keep the first reason why a row is bad."""
@@ -127,20 +130,30 @@ class Run:
         chosen_rows = np.array([known[name][0] for name in self.block.frames], np.int64)
         return tuple(np.array(column)[chosen_rows] for column in zip(*table, strict=True))  # type: ignore[return-value]
 
-    def _compute(self, columns: list[Floats], edge: Rigid | None, state: State) -> Components:
-        """Apply the operation to points, or to poses whose rotations are checked."""
-        shapes, operation = self.plan.shapes, self.plan.operation
-        if shapes and shapes[0].kind != POSE:
-            return operation.point(shapes[0].kind, *shapes[0].position(columns), edge)
+    def _compute(self, columns: list[Floats], edge: Rigid | None, state: State) -> list[Components]:
+        """Apply the operation to each point or pose of the rows."""
+        shapes, operation, moved = self.plan.shapes, self.plan.operation, []
         poses: list[Rigid] = []
         first = 0
-        for shape in shapes:
+        for index, shape in enumerate(shapes):
             numbers = columns[first : first + shape.count]
-            poses.append(pose_of(shape.position(numbers), self._rotation(shape, numbers, first)))
+            mover = edge if edge is not None else self.plan.edges[index] if self.plan.edges else None
+            if shape.kind != POSE:
+                moved.append(operation.point(shape.kind, *shape.position(numbers), mover))
+            else:
+                pose = pose_of(shape.position(numbers), self._rotation(shape, numbers, first))
+                poses.append(rigid.inverse(*pose) if shape.inverse else pose)
+                if len(self.plan.targets) > 1 or operation.of != "pair":
+                    moved.append(operation.pose(self._with_previous(poses.pop(), state), mover, arrays))
             first += shape.count
-        if operation.of == "previous" and self.count:
-            poses = _with_previous(poses[0], [row for row in range(self.count) if row not in self.reasons], state, self.count)
-        return operation.pose(poses or [NOWHERE], edge, arrays)
+        if poses or not shapes:
+            moved.append(operation.pose(poses or [NOWHERE], edge, arrays))
+        return moved
+
+    def _with_previous(self, pose: Rigid, state: State) -> list[Rigid]:
+        if self.plan.operation.of != "previous" or not self.count:
+            return [pose]
+        return _with_previous(pose, [row for row in range(self.count) if row not in self.reasons], state, self.count)
 
     def _rotation(self, shape: Shape, numbers: list[Floats], first: int) -> Components:
         if shape.notation is None:
@@ -162,30 +175,41 @@ class Run:
             found = " ".join(f"{number[row]:g}" for number in numbers)
             self._blame(row, name, f"the last row of a 4x4 pose is 0 0 0 1, found {found}")
 
-    def _results(self, parts: Components) -> tuple[Floats, Ints]:
+    def _results(self, moved: list[Components]) -> tuple[Floats, Ints]:
         """Give the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
-        pose = parts[:7] if len(parts) > 3 else parts
-        numbers = [*self.plan.target.numbers(pose, arrays), *parts[7:]]
+        numbers: list[Floats] = []
+        locked = np.zeros(self.count, np.int64)
+        for target, parts in zip(self.plan.targets, moved, strict=True):
+            pose = parts[:7] if len(parts) > 3 else parts
+            numbers += [*target.numbers(pose, arrays), *parts[7:]]
+            flags = target.locked(pose)
+            if flags is not None:
+                locked |= flags
         results = np.empty((self.count, len(numbers)))
         for column, number in enumerate(numbers):
             results[:, column] = number
         if not np.isfinite(results.sum()):
             for row in np.flatnonzero(~np.isfinite(results).all(axis=1)).tolist():
                 self._blame(row, "", "the result is not finite: the numbers are too large")
-        locked = self.plan.target.locked(pose, arrays)
-        return results, np.zeros(self.count, np.int64) if locked is None else np.broadcast_to(locked, self.count).astype(np.int64)
+        return results, locked
 
     def _keep(self, kept: Ints) -> None:
         self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
 
-    def groups(self) -> list[tuple[Ints, list[Spans]]]:
-        """Give what is written, by place: results, rows without one, and what passes; only what precedes a stop."""
+    def first_fault(self) -> int | None:
+        """Give the place of the first bad row, if the run stops there."""
+        if self.plan.on_error != STOP:
+            return None
+        bad = [int(self.block.places[row]) for row in self.reasons]
+        return min([*bad, *(each.place for each in self.block.broken)], default=None)
+
+    def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
+        """Give what is written before place `end`: results, rows without one, and what passes."""
         odd = list(self.block.odd)
-        if self.plan.on_error == STOP and (self.reasons or self.block.broken):
-            end = min([*(int(self.block.places[row]) for row in self.reasons), *(each.place for each in self.block.broken)])
+        if end is not None:
             self._keep(self.block.places[self.rows] < end)
             odd = [(place, text) for place, text in odd if place < end]
-        elif self.plan.on_error == NULL:
+        if self.plan.on_error == NULL:
             odd += [(each.place, each.null_row) for each in self.block.broken]
         groups = [*self._written(), *self._null_rows()]
         return [*groups, texts_as_rows(odd)] if odd else groups

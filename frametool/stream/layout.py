@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.errors import FormatError
-from frametool.stream.rows import Const, In, Out
+from frametool.stream.pieces import Const, In, Out
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.stream.rows import Piece
+    from frametool.stream.pieces import Piece
 
 Stretch: TypeAlias = tuple[int, int, str, str]
 

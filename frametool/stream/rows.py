@@ -5,10 +5,11 @@ Knows no syntax: what a format found is spans of text, what it wants written is 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from frametool.stream.pieces import Const, IfLocked, In, Out
 from frametool.text.fixed import fixed_spans
 from frametool.text.shortest import shortest_spans
 from frametool.text.spans import MARGIN, Spans, framed, join
@@ -16,36 +17,8 @@ from frametool.text.spans import MARGIN, Spans, framed, join
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from frametool.stream.pieces import Piece
     from frametool.text.arrays import Floats, Ints
-
-
-class In(NamedTuple):
-    """A stretch of the input, by its index among the spans a format found."""
-
-    index: int
-
-
-class Out(NamedTuple):
-    """Numbers of the result, from the first up to before the last, each followed by `between` but for the last."""
-
-    first: int
-    last: int
-    between: bytes = b","
-
-
-class Const(NamedTuple):
-    """The same text in every row."""
-
-    text: bytes
-
-
-class IfLocked(NamedTuple):
-    """Text that stands only in rows whose angles are not unique."""
-
-    text: bytes
-
-
-Piece: TypeAlias = In | Out | Const | IfLocked
 
 
 class Broken(NamedTuple):

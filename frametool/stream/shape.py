@@ -26,6 +26,7 @@ class Shape(NamedTuple):
     """The numbers of a row in order: position (3, if any), then rotation (if any); or the 16 of a whole matrix.
 
     unit: how many of the position's numbers make a metre; None where there is no position
+    inverse: what is written is the inverse
     """
 
     kind: str
@@ -33,6 +34,7 @@ class Shape(NamedTuple):
     notation: Notation | None = None
     degrees: bool = False
     whole: bool = False
+    inverse: bool = False
 
     @property
     def count(self) -> int:
@@ -67,6 +69,11 @@ class Shape(NamedTuple):
         return tuple(numbers[index] for index in self.rotation_at)
 
 
+def axes_of(form: Notation) -> str | None:
+    """Give the Euler axes of a notation whose angles may not be unique; None for others."""
+    return "sxyz" if form.representation.name == "rpy" else form.axes
+
+
 class Target(NamedTuple):
     """How results are written: the unit of positions (None: not at all), notations with their unit of angles."""
 
@@ -90,6 +97,13 @@ class Target(NamedTuple):
         return form.from_quaternion(x, y, z, w, xp, degrees=degrees)
 
 
+    @property
+    def count(self) -> int:
+        """Count the numbers of a result."""
+        if self.whole:
+            return 16
+        return (self.unit is not None) * 3 + sum(len(form.representation.columns) for form, _ in self.notations)
+
     def angle_columns(self) -> list[tuple[int, float]]:
         """Give which of the numbers are angles, each with the size of a full turn."""
         found, first = [], 0 if self.unit is None else 3
@@ -98,10 +112,10 @@ class Target(NamedTuple):
             first += len(form.representation.columns)
         return found
 
-    def locked(self, parts: Components, xp: Namespace) -> Any:
+    def locked(self, parts: Components) -> Any:
         """Tell whether Euler angles among the notations are not unique; None where there are none."""
-        axes = next((form.axes for form, _ in self.notations if form.axes is not None), None)
-        return None if axes is None or len(parts) == 3 else euler.is_locked(*parts[3:7], axes, xp)
+        axes = next((axes for form, _ in self.notations if (axes := axes_of(form))), None)
+        return None if axes is None or len(parts) == 3 else euler.locked(*parts[3:7], axes)
 
 
 def _homogeneous(rows: Sequence[Any], position: Components) -> list[Any]:

@@ -38,7 +38,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
     return Plan(
-        shapes, target, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
+        shapes, (target,), request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         request.edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
     ), layout  # fmt: skip
 

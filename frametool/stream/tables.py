@@ -81,4 +81,4 @@ class Work:
         faults = run.faults()
         doubted = [(block.line_of(row), angle) for row, angle in run.doubted[:1]]
         rows = len(block.places) + len(block.broken)
-        return Outcome(written(run.groups()), faults, rows, text.count(b"\n"), len(run.mended), doubted, len(text))
+        return Outcome(written(run.groups(run.first_fault())), faults, rows, text.count(b"\n"), len(run.mended), doubted, len(text))
