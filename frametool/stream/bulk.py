@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.stream.blocks import Plan, Run, State
-from frametool.stream.documents import NULLS, attempt
+from frametool.stream.documents import NULLS, attempt, end_of_record
 from frametool.stream.faults import NULL, STOP, Fault
 from frametool.stream.pieces import Const, In
 from frametool.stream.rows import Block, written
@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from frametool.text.arrays import Ints
 
 MOST_KINDS = 64  # kinds of records kept in mind
-MOST_TRIED = 8  # of them tried on whole blocks of lines
+MOST_TRIED = 8  # of them tried on whole blocks
+MOST_LOOKED = 1 << 16  # bytes in which the first record of what is left is looked for
+WORTH_CUTTING = 1 << 12  # bytes
 
 
 class Cut(NamedTuple):
@@ -51,31 +53,49 @@ class Work:
 
     def __call__(self, text: bytes) -> Outcome:
         """Process one block."""
-        data = framed(text)
-        cuts, rest = self._cut_lines(text) if self.splitter.lines else ([], [(0, len(text))])
+        cuts: list[Cut] = []
+        rest = [(0, len(text))]
+        if self.splitter.lines is not False or self.form == "yaml":
+            rest = self._cut(text, rest, self.kinds[-MOST_TRIED:][::-1], cuts)
+            rest = self._learn_and_cut(text, rest, cuts)
         odd: list[tuple[int, bytes]] = []
         faults: list[tuple[int, Fault]] = []
         singles: dict[Learned, list[tuple[tuple[int, int], ...]]] = {}
         for start, end in rest:
             self._rest(text, start, end, odd, faults, singles)
         cuts += [_as_cut(learned, spans) for learned, spans in singles.items()]
-        return self._outcome(text, data, cuts, odd, faults)
+        return self._outcome(text, framed(text), cuts, odd, faults)
 
-    def _cut_lines(self, text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
-        """Cut a block of lines by the kinds met before, the last one met first; give also what is left."""
-        cuts = []
-        rest = [(0, len(text))]
-        for learned in self.kinds[-MOST_TRIED:][::-1]:
+    def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
+        """Learn the kinds of the first records that are left, a few, and cut by them too."""
+        for _ in range(MOST_TRIED):
+            spans = [(start, span) for start, end in rest[:1] for span in self.splitter.records(text[start : min(end, start + MOST_LOOKED)])[:1]]
+            if len(rest) > 1 or not spans or not rest or rest[0][1] - rest[0][0] < WORTH_CUTTING:
+                return rest
+            start, (begin, stop) = spans[0]
+            known = len(self.kinds)
+            line = text.count(b"\n", 0, start + begin)
+            record = text[start + begin : start + stop]
+            if self._match(record, 0, len(record)) is None:
+                problem = attempt(record, self.form, self.request, self.source, line, self._remember)
+                if isinstance(problem, Fault) or len(self.kinds) == known:
+                    return rest
+            rest = self._cut(text, rest, self.kinds[-1:], cuts)
+        return rest
+
+    def _cut(
+        self, text: bytes, rest: list[tuple[int, int]], kinds: Sequence[Learned], cuts: list[Cut],
+    ) -> list[tuple[int, int]]:
+        """Cut what is left of a block by the kinds met before; give what is then left."""
+        for learned in kinds:
             left = []
             for start, end in rest:
-                cut, gaps = _cut_chunk(learned, text[start:end] if rest != [(0, len(text))] else text, start)
+                cut, gaps = _cut_chunk(learned, text[start:end], start)
                 if cut is not None:
                     cuts.append(cut)
                 left += gaps
             rest = left
-            if not rest:
-                break
-        return cuts, rest
+        return rest
 
     def _rest(
         self, text: bytes, start: int, end: int, odd: list[tuple[int, bytes]], faults: list[tuple[int, Fault]],
@@ -85,7 +105,7 @@ class Work:
         chunk = text[start:end]
         at = 0
         for begin, stop in self.splitter.records(chunk):
-            after = self._after(chunk, stop)
+            after = end_of_record(chunk, stop, self.form)
             if begin > at:
                 odd.append((start + at, chunk[at:begin]))
             at = after
@@ -105,11 +125,6 @@ class Work:
             singles.setdefault(learned, []).append(tuple((a + start, b + start) for a, b in spans))
         if at < len(chunk):
             odd.append((start + at, chunk[at:]))
-
-    def _after(self, chunk: bytes, stop: int) -> int:
-        from frametool.stream.documents import _end_of_record
-
-        return _end_of_record(chunk, stop, self.form)
 
     def _match(self, chunk: bytes, begin: int, stop: int) -> tuple[Learned, re.Match[bytes]] | None:
         for learned in reversed(self.kinds):
@@ -178,7 +193,7 @@ class Work:
 def _cut_chunk(learned: Learned, chunk: bytes, offset: int) -> tuple[Cut | None, list[tuple[int, int]]]:
     """Cut a chunk of lines by one expression; give the records, and the gaps between them."""
     stretches = len(learned.stretches) + 1
-    pieces = learned.line_pattern.split(chunk)
+    pieces = learned.block_pattern.split(chunk)
     count = len(pieces) // (stretches + 1)
     if not count:
         return None, [(offset, offset + len(chunk))]

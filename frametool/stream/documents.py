@@ -25,6 +25,8 @@ _DOCUMENT_END = re.compile(rb"^---[ \t]*\r?\n", re.MULTILINE)
 _ARRAY = re.compile(rb"\s*\[\s*(?:\{|$)")
 _TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|[{}\[\]]', re.DOTALL)
 _LINE = re.compile(rb"[^\n]*\n|[^\n]+\Z")
+_AFTER_RECORD = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
+_NO_DOCUMENT = re.compile(rb"(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|---)\s*)?")
 MARK = b"\xef\xbb\xbf"
 
 
@@ -154,7 +156,7 @@ def _documents(text: bytes) -> list[tuple[int, int]]:
         found.append((start, mark.start()))
         start = mark.end()
     found.append((start, len(text)))
-    return [span for span in found if not re.fullmatch(rb"(?:\s*(?:#[^\n]*)?(?:\n|\Z))*(?:\.\.\.\s*|---\s*)?", text[span[0] : span[1]])]
+    return [span for span in found if not _NO_DOCUMENT.fullmatch(text, *span)]
 
 
 def _singly(text: bytes, records: list[tuple[int, int]], form: str, request: Request, source: str) -> Iterator[Outcome]:
@@ -169,7 +171,7 @@ def _singly(text: bytes, records: list[tuple[int, int]], form: str, request: Req
             faults.append(result)
             out.append(b"null" if request.on_error == NULL else b"")
             if request.on_error != NULL:
-                at = _end_of_record(text, end, form)
+                at = end_of_record(text, end, form)
             if request.on_error == STOP:
                 out.pop()
                 at = len(text)
@@ -183,12 +185,12 @@ def _rendered(request: Request) -> Callable[..., bytes]:
     return lambda learned: result_of(learned, request).encode()
 
 
-def _end_of_record(text: bytes, end: int, form: str) -> int:
+def end_of_record(text: bytes, end: int, form: str) -> int:
     """Give where a record ends with what parts it from the next."""
     if form == "yaml":
         mark = _DOCUMENT_END.match(text, end)
         return mark.end() if mark else end
-    following = re.compile(rb"[ \t]*,?[ \t]*\r?\n?").match(text, end)
+    following = _AFTER_RECORD.match(text, end)
     return following.end() if following else end
 
 

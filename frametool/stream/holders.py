@@ -160,7 +160,7 @@ def _with_rotation(value: Any, key: str, holder: Holder, below: Path, reading: R
     from frametool.formats.rotations import read_components
 
     values, degrees = read_components(form, texts, places, reading)
-    paths = tuple(_path_if_there(value, (*holder.path, *below), place) for place in places)
+    paths = tuple(_path_if_there(value, (*holder.path, *below), place) for place in places[: len(texts)])
     shape = holder.shape._replace(kind=POSE, notation=form, degrees=degrees, whole=whole)
     if request.poses != 1:
         raise Misfit("a record holds one pose; two in a row are for tables")

@@ -30,13 +30,14 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.shape import Shape, Target
 
-JSON_NUMBER = r"-?(?:0|[1-9][0-9]*)(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?"
-YAML_NUMBER = r"[-+.]?[0-9][-+.0-9eE]*"
+# what may be a number; reading it decides
+JSON_NUMBER = r"-?(?!0[0-9])[0-9][-+.0-9eE]*+"
+YAML_NUMBER = r"[-+.]?[0-9][-+.0-9eE]*+"
 JSON_TEXT = r'"[^"\\\x00-\x1f]*(?:\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4})[^"\\\x00-\x1f]*)*"'
 # what may stand for a scalar that passes, by its quotes: never anything that could be read as more than one scalar
 YAML_PLAIN = r"(?:-(?! )|[A-Za-z0-9_./+])(?:[\w./+-]| (?=[\w./+(-])|:(?=[\w/]))*"
 FREE = {
-    (True, True): JSON_TEXT, (True, False): rf"(?:{JSON_NUMBER}|true|false|null)",
+    (True, True): JSON_TEXT, (True, False): r"(?:-?(?!0[0-9])[0-9]++(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+|true|false|null)",
     (False, True): r'"[^"\\\x00-\x1f]*"', (False, False): YAML_PLAIN,
 }  # fmt: skip
 SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
@@ -81,9 +82,11 @@ class Learned:
         return re.compile(self.expression)
 
     @cached_property
-    def line_pattern(self) -> re.Pattern[bytes]:
-        """Match a line with such a record; its last group is what follows up to the line's end."""
-        return re.compile(rb"(?m:^)" + self.expression + rb"([ \t]*,?[ \t]*\r?\n)")
+    def block_pattern(self) -> re.Pattern[bytes]:
+        """Match such a record from where one may begin; its last group is what parts it from the next."""
+        if self.json:
+            return re.compile(rb"(?m:^)" + self.expression + rb"([ \t]*,?[ \t]*\r?\n)")
+        return re.compile(rb"(?:\A|(?<=\n---\n)|(?<=\n---\r\n))" + self.expression + rb"(---[ \t]*\r?\n)")
 
     @property
     def names(self) -> tuple[str, ...]:
