@@ -28,7 +28,7 @@ _HOMES = {
     "Transform": "frametool.geometry.transform",
     "load": "frametool.formats.load",
 }
-__all__ = ["FrameTree", "FrametoolError", "Rotation", "Transform", "__version__", "load"]  # noqa: F822 - loaded below
+__all__ = ["FrameTree", "FrametoolError", "Rotation", "Transform", "__version__", "load"]
 
 
 def __getattr__(name: str) -> object:

@@ -19,7 +19,10 @@ import warnings
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
+    from typing import TypeVar
+
+    Result = TypeVar("Result")
 
 
 class FrametoolError(Exception):
@@ -101,9 +104,25 @@ class FrametoolWarning(UserWarning):
     """Mark what was read, used and is nevertheless worth a look."""
 
 
+_listeners: list[list[str]] = []
+
+
 def warn(message: str) -> None:
     """Tell of something odd that does not stop the work."""
-    warnings.warn(message, FrametoolWarning, stacklevel=3)
+    if _listeners:
+        _listeners[-1].append(message)
+    else:
+        warnings.warn(message, FrametoolWarning, stacklevel=3)
+
+
+def overheard(call: Callable[..., Result], *arguments: object, **options: object) -> tuple[Result, list[str]]:
+    """Call a function; give its result and what it would have warned of, for a reader to add the place."""
+    messages: list[str] = []
+    _listeners.append(messages)
+    try:
+        return call(*arguments, **options), messages
+    finally:
+        _listeners.pop()
 
 
 def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
+from frametool import Transform
 from frametool.cli import COMMANDS
 
 if TYPE_CHECKING:
@@ -256,6 +257,7 @@ WRONG = {
     ("convert '{xyz: [1,2,x]}'", 2): "argument:1:12: 'x' is not a number",
     ("convert '{rpy_deg: [0,0,1], rotvec: [0,0,1]}'", 2):
         "argument:1:28: two rotations in one entry disagree by 56.2958 degrees; keep one",
+    ("convert {xyz:[1,2,3]}", 2): "argument:1:5: found unexpected ':'; write a blank after the colon",
     ("convert missing.yaml", 5): "missing.yaml: no such file or directory",
     ("lookup . a b", 2):
         "lookup: TREE is . but FRAMETOOL_TREE is not set; name a file; "
@@ -343,3 +345,45 @@ def test_a_quaternion_nearly_of_norm_1_is_normalised_with_a_warning(run: Run) ->
     outcome = run("convert", "--from", "quaternion", "0", "0", "0.7071", "0.7071")
     assert outcome.status == 0
     assert "has norm 0.99999 and was normalised" in outcome.err
+
+
+def test_what_a_file_holds_nearly_normalised_is_told_with_its_place(run: Run) -> None:
+    text = "frames:\n  - {name: b, parent: a, xyzw: [0, 0, 0.7071, 0.7071]}\n"
+    outcome = run("lookup", "near.yaml", "a", "b", files={"near.yaml": text})
+    assert outcome.status == 0
+    message = "quaternion 0 0 0.7071 0.7071 has norm 0.99999 and was normalised"
+    assert outcome.err == f"frametool: warning: near.yaml:2:5: {message}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "yaw_pitch_roll"),
+    [
+        (["--axes", "optical"], [-90.0, 0.0, -90.0]),
+        (["{axes: optical}"], [-90.0, 0.0, -90.0]),
+        (["{rpy_deg: [0, 0, 90]}", "--axes", "frd"], [90.0, 0.0, 180.0]),
+        (["{axes: ned_from_enu}"], [90.0, 0.0, 180.0]),
+    ],
+)
+def test_axes_of_the_field_have_names(run: Run, arguments: list[str], yaw_pitch_roll: list[float]) -> None:
+    assert mapping(run("convert", *arguments, "--to", "euler_deg:rzyx"))["euler_deg"]["angles"] == yaw_pitch_roll
+
+
+def test_axes_without_such_a_name_are_misuse(run: Run) -> None:
+    outcome = run("convert", "--axes", "optcal")
+    assert outcome.status == 2
+    assert "unknown axes 'optcal'; did you mean 'optical'? axes: flu, frd, optical, opengl, enu, ned" in outcome.err
+
+
+def test_a_position_alone_is_a_pose_without_a_turn(run: Run) -> None:
+    assert mapping(run("convert", "{xyz: [1, 2, 3]}", "--to", "rpy")) == {
+        "xyz": [1.0, 2.0, 3.0], "rpy": {"roll": 0.0, "pitch": 0.0, "yaw": 0.0},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("form", ["yaml", "json"])
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_printed_reads_back_to_the_same_bits(run: Run, form: str, seed: int) -> None:
+    pose = Transform.random(seed=seed)
+    text = json.dumps({"xyz": pose.xyz.tolist(), "quaternion": dict(zip("xyzw", pose.xyzw.tolist(), strict=True))})
+    first = run("convert", text, "--format", form).out
+    assert run("convert", "-", "--format", form, stdin=first).out == first

@@ -49,8 +49,10 @@ def test_click_rich_and_yaml_stay_in_their_rooms(path: Path) -> None:
 
 def loaded_by(*arguments: str, stdin: str = "") -> set[str]:
     """Name the top-level modules that a command loads in a fresh interpreter."""
-    code = f"import sys; from frametool.cli import run; status = run({list(arguments)!r}); " \
-        "print(status, *{name.split('.')[0] for name in sys.modules}, file=sys.stderr)"  # fmt: skip
+    code = (
+        f"import sys; from frametool.cli import run; status = run({list(arguments)!r}); "
+        "print(status, *{name.split('.')[0] for name in sys.modules}, file=sys.stderr)"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], input=stdin, capture_output=True, text=True, check=True, cwd=ROOT.parent
     )
@@ -94,4 +96,4 @@ def test_every_public_name_is_there_and_says_what_it_is_for(name: str) -> None:
 
 def test_an_unknown_public_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'nope'"):
-        _ = frametool.nope  # type: ignore[attr-defined]
+        _ = frametool.nope

@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 from importlib import import_module
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import console
 import pytest
@@ -14,6 +14,9 @@ import pytest
 from frametool.cli import COMMANDS
 from frametool.formats import FORMATS
 from frametool.geometry.representations import REPRESENTATIONS
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 README = (console.ROOT / "README.md").read_text()
 EXAMPLES = [pair for block in console.BLOCK.findall(README) for pair in console.commands(block)]

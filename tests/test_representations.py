@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,9 +15,12 @@ from frametool.geometry import arrays, euler, floats, quaternion
 from frametool.geometry.representations import REPRESENTATIONS, Notation, axes_name, notation
 from frametool.geometry.rotation import Rotation
 
-SPECS = [spec for name in REPRESENTATIONS for spec in ((f"{name}:rzyx", f"{name}:sxzx") if name == "euler" else (name,))]
+if TYPE_CHECKING:
+    from frametool.geometry.kinds import Quaternion
+
+SPECS = [*(name for name in REPRESENTATIONS if name != "euler"), "euler:rzyx", "euler:sxzx"]
 ROWS = samples.quaternions(10)
-COLUMNS = tuple(np.array(ROWS).T)
+COLUMNS: Quaternion = tuple(np.array(ROWS).T)
 
 
 def spelled(spec: str, unit: str) -> Notation:
@@ -40,7 +44,7 @@ def test_floats_and_arrays_agree(spec: str, unit: str) -> None:
     together = np.array(form.from_quaternion(*COLUMNS, arrays)).T
     for row, among in zip(ROWS, together, strict=True):
         ours = form.to_quaternion(form.from_quaternion(*row, floats), floats)
-        theirs = form.to_quaternion(tuple(among.tolist()), floats)
+        theirs = form.to_quaternion(among.tolist(), floats)
         assert quaternion.distance(*ours, *theirs, floats) <= 8e-15
 
 
@@ -78,9 +82,9 @@ def test_columns_carry_the_unit_that_was_said(spec: str, columns: tuple[str, ...
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("quaternon", "unknown representation 'quaternon'; did you mean 'quaternion'; representations: quaternion, xyzw"),
+        ("quaternon", "unknown representation 'quaternon'; did you mean 'quaternion'? representations: "),
         ("matrix_deg", "matrix has no angle: write it without _deg"),
-        ("euler:rzyz_", "unknown Euler axes 'rzyz_'; did you mean 'rzyz'"),
+        ("euler:rzyz_", "unknown Euler axes 'rzyz_'; did you mean 'rzyz'? s (static axes) or r (rotating axes)"),
         ("euler:ZYX", "unknown Euler axes 'ZYX'"),
         ("rpy:rzyx", "rpy has no axes to name"),
         ("", "unknown representation ''"),
@@ -89,8 +93,7 @@ def test_columns_carry_the_unit_that_was_said(spec: str, columns: tuple[str, ...
 def test_unknown_notations_are_refused_with_the_nearest(spec: str, message: str) -> None:
     with pytest.raises(ValueInvalid) as caught:
         notation(spec)
-    assert message.split("; did")[0] in str(caught.value)
-    assert ("did you mean" in str(caught.value)) == ("did you mean" in message) or "ZYX" in spec
+    assert str(caught.value).startswith(message)
 
 
 def test_euler_without_axes_asks_for_them() -> None:

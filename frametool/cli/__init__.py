@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool import __version__
+from frametool.cli.help import WithHelp
 from frametool.errors import FrametoolError, FrametoolWarning, alternatives
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
 """
 
 
-class Group(click.Group):
+class Group(WithHelp, click.Group):
     """The commands of the table, each imported when it is called and not before."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
@@ -76,10 +77,17 @@ class Group(click.Group):
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
-@click.command(cls=Group, help=HELP, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=True)
-@click.version_option(__version__, "--version", prog_name="frametool", message="%(prog)s %(version)s")
+@click.command(cls=Group, help=HELP, no_args_is_help=True)
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, help="Show the version and exit.",
+              callback=lambda ctx, _, wanted: _show_version(ctx) if wanted else None)  # fmt: skip
 def group() -> None:
     """Hold the commands."""
+
+
+def _show_version(ctx: click.Context) -> None:
+    """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
+    click.echo(f"frametool {__version__}")
+    ctx.exit()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

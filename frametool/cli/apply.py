@@ -13,8 +13,8 @@ from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.numbers import parse_number
+from frametool.formats.points import Point, read_moveables
 from frametool.formats.pose import Pose
-from frametool.formats.records import Point, read_moveables
 from frametool.geometry import quaternion, rigid
 from frametool.stream.operation import Operation
 from frametool.stream.request import Request

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from frametool.cli.help import WithHelp
 from frametool.errors import ValueInvalid
 from frametool.formats import writers
 from frametool.formats.numbers import parse_number
@@ -25,7 +26,7 @@ SPELLINGS = [f"{name}:AXES" if name == "euler" else name for name in REPRESENTAT
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 4 lookup failed, 5 file problem."
 
 
-class Command(click.Command):
+class Command(WithHelp):
     """A command whose arguments may be negative numbers.
 
     click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
@@ -79,9 +80,9 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
             chosen = tuple(notation(spec.strip()) for spec in value.split(","))
             for form in chosen:
                 form.bound_axes()  # euler without its axes is refused before any work
-            return chosen
         except ValueInvalid as error:
             self.fail(str(error), param, ctx)
+        return chosen
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
         """Complete the last name of the list."""

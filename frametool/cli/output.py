@@ -16,7 +16,7 @@ from frametool.geometry.representations import notation
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frametool.formats.records import Point
+    from frametool.formats.points import Point
     from frametool.frames.tree import FrameTree
     from frametool.geometry.representations import Notation
 
@@ -47,7 +47,7 @@ class Output:
         )
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
-        self.style = Style(form, chosen, deg, precision, keep_sign)
+        self.style = Style(form, chosen, degrees=deg, precision=precision, keep_sign=keep_sign)
 
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""

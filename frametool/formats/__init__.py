@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
 
-
-class Row(NamedTuple):
+class Row:
     """A form of text: the module that has its `write_poses`, `write_points`, `write_tree`, and what it is."""
 
-    module: str
-    suffixes: tuple[str, ...]
-    summary: str
-    writes: tuple[str, ...]
+    __slots__ = ("module", "suffixes", "summary", "writes")
+
+    def __init__(self, module: str, suffixes: tuple[str, ...], summary: str, writes: tuple[str, ...]) -> None:
+        """Fill the row."""
+        self.module = module
+        self.suffixes = suffixes
+        self.summary = summary
+        self.writes = writes
 
 
 FORMATS = {

@@ -35,8 +35,8 @@ __all__ = [
 ]
 
 _BYTE_ORDER_MARK = "\ufeff"
-_TIGHT_COLON = re.compile(r"([\w./-]+):(?=[^\s:/])", re.UNICODE).match
-_EQUALS = re.compile(r"([\w./-]+) ?=").match
+_TIGHT_COLON = r"([\w./-]+):(?=[^\s:/])"
+_EQUALS = r"([\w./-]+) ?="
 
 
 class Document:
@@ -110,10 +110,10 @@ def format_error(
 
 def explain_scalar(text: str) -> str:
     """Say why a text stands where a mapping was meant: no blank after a colon, an invisible character; or ""."""
-    if match := _TIGHT_COLON(text):
+    if match := re.match(_TIGHT_COLON, text):
         return f"write a blank after '{match[1]}:'"
     if ":" in text and (odd := odd_characters(text)):
         return f"it has {odd}; use an ordinary blank"
-    if match := _EQUALS(text):
+    if match := re.match(_EQUALS, text):
         return f"write '{match[1]}: ' instead of '='"
     return ""

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from frametool.formats.places import Path, PlaceEvent
 
 _BLANKS = re.compile(r"[ \t\n\r]*")
-_TOKEN = re.compile(r'("[^"\\]*+(?:\\.[^"\\]*+)*+")|[{}\[\]]|[^\s{}\[\],:"]+')
-_ESCAPE = re.compile(r"\\(?:u([0-9a-fA-F]{4})|.)", re.DOTALL)
+_PIECE = r'("[^"\\]*+(?:\\.[^"\\]*+)*+")|[{}\[\]]|[^\s{}\[\],:"]+'
+_ESCAPE = r"(?s)\\(?:u([0-9a-fA-F]{4})|.)"
 _OPENING = {"{": MAP, "[": LIST}
 
 
@@ -115,7 +115,7 @@ def _place_events(text: str) -> Iterator[PlaceEvent[int]]:
     """Reduce JSON's tokens to what finding places needs; the marks are offsets."""
     from json import loads
 
-    for token in _TOKEN.finditer(text):
+    for token in re.finditer(_PIECE, text):
         word = token[0]
         if word in {"]", "}"}:
             yield END, "", token.start()
@@ -160,7 +160,7 @@ def _too_deep(source: Source) -> FormatError:
 def _check_escapes(source: Source) -> None:
     r"""Refuse \ud83d without its other half: a text that no file can hold."""
     high = None
-    for escape in _ESCAPE.finditer(source.text):
+    for escape in re.finditer(_ESCAPE, source.text):
         code = int(escape[1] or "0", 16)
         if high is not None and not (0xDC00 <= code < 0xE000 and escape.start() == high.end()):
             raise _half(source, high)

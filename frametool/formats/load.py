@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadTopology, FormatError, warn
+from frametool.formats.collector import paused_collector
 from frametool.formats.documents import Source, format_error, locate_many, parse_documents, read_text
 from frametool.formats.trees import read_edges
 from frametool.formats.values import Misfit, Reading
@@ -44,9 +45,10 @@ def load_sources(sources: Sequence[Source]) -> FrameTree:
     """Merge the frames of several texts into one tree; otherwise as `load`."""
     tree = FrameTree(", ".join(source.name for source in sources))
     first: dict[str, Found] = {}
-    for source in sources:
-        for found in edges_of(source):
-            _hang(tree, first, found)
+    with paused_collector():
+        for source in sources:
+            for found in edges_of(source):
+                _hang(tree, first, found)
     return tree
 
 
@@ -70,6 +72,8 @@ def edges_of(source: Source) -> Iterator[Found]:
 
 def _without_slashes(edge: Edge, reading: Reading) -> Edge:
     """Take one leading `/` off the names, which tf2 has given up, and say so."""
+    if edge.child[0] != "/" and (edge.parent or "")[:1] != "/":
+        return edge
     for name in (edge.child, edge.parent):
         if name is not None and name.startswith("/") and len(name) > 1:
             reading.here = edge.path

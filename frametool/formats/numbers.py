@@ -12,7 +12,6 @@ from frametool.errors import ValueInvalid
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from typing import TypeAlias
 
     Angle: TypeAlias = tuple[float, str | None]  # value; "deg", "rad", or None where the text does not say
@@ -22,9 +21,10 @@ _DECIMAL_CHARACTERS = "0123456789.-+eE"
 _strip = str.strip
 _INFINITE = float("inf")
 _DECIMAL = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-_WITH_UNIT = re.compile(rf"([-+]?{_DECIMAL}) ?(deg|rad|°)").fullmatch
-_MULTIPLE_OF_PI = re.compile(rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?").fullmatch
-_BARE_STAR = re.compile(r"[-+]? ?\*").match
+# patterns are compiled when first needed, not at start-up: most texts are plain numbers
+_WITH_UNIT = rf"([-+]?{_DECIMAL}) ?(deg|rad|°)"
+_MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
+_BARE_STAR = r"[-+]? ?\*"
 _UNITS = {"deg": "deg", "°": "deg", "rad": "rad"}
 _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 _LONGEST_SHOWN = 60
@@ -55,9 +55,9 @@ def parse_angle(text: str) -> Angle:
     """
     if not _strip(text, _DECIMAL_CHARACTERS):
         return parse_number(text), None
-    if match := _WITH_UNIT(text):
+    if match := re.fullmatch(_WITH_UNIT, text):
         return parse_number(match[1]), _UNITS[match[2]]
-    if (match := _MULTIPLE_OF_PI(text)) and not _BARE_STAR(text):
+    if (match := re.fullmatch(_MULTIPLE_OF_PI, text)) and not re.match(_BARE_STAR, text):
         return _degrees_of_pi(text, match[1], match[2], match[3]), "deg"
     raise ValueInvalid(explain_angle(text))
 
@@ -103,31 +103,27 @@ def _reason(text: str) -> str:
     """Find the first of the known mistakes in a text that is no number."""
     if odd := odd_characters(text):
         return f"has {odd}"
-    return next((reason for matches, reason in _MISTAKES if matches(text)), _UNKNOWN)
-
-
-def _pattern(expression: str) -> Callable[[str], object]:
-    """Give a test whether the whole text looks like the expression."""
-    return re.compile(expression, re.IGNORECASE | re.DOTALL).fullmatch
+    return next((reason for pattern, reason in _MISTAKES if re.fullmatch(pattern, text, _LOOSELY)), _UNKNOWN)
 
 
 _NOT_FINITE = "is not finite"
 _NOT_DECIMAL = "is not a decimal number"
+_LOOSELY = re.IGNORECASE | re.DOTALL
 _MISTAKES = (
-    (_pattern(r"\s*"), "is empty where a number is expected"),
-    (_pattern(r"[-+]?\.?(nan|inf|infinity)"), _NOT_FINITE),
-    (_pattern(rf"[-+]?{_DECIMAL}"), _NOT_FINITE),
-    (_pattern(r".*\$[({].*"), "is a xacro expression; expand it with xacro first"),
-    (_pattern(r"[-+]?[0-9]+,[0-9]+(e[-+]?[0-9]+)?"), "has a decimal comma; write a point"),
-    (_pattern(r"[-+]?0x[0-9a-f_]+|[-+]?0[ob][0-9_]+"), f"{_NOT_DECIMAL}; write it in base ten"),
-    (_pattern(r"[-+]?[0-9]+(:[0-9]+)+(\.[0-9]*)?"), f"{_NOT_DECIMAL}; base 60 is not read"),
-    (_pattern(r"[-+]?[0-9._]*_[0-9._]*(e[-+]?[0-9_]+)?"), f"{_NOT_DECIMAL}; leave out the underscores"),
-    (_pattern(rf"\s+[-+]?{_DECIMAL}\s*|[-+]?{_DECIMAL}\s+"), "has blanks around the number"),
-    (_pattern(rf"[-+]?{_DECIMAL}(\s+[-+]?{_DECIMAL})+"), "is several numbers where one is expected"),
-    (_pattern(r"true|false|yes|no|on|off"), "is a truth value where a number is expected"),
-    (_pattern(r"null|~"), "is empty where a number is expected"),
-    (_pattern(rf"[-+]?{_DECIMAL}e[-+]?"), _UNKNOWN),
-    (_pattern(rf"[-+]?{_DECIMAL}\s*[a-zµ°%\"'].*"), _UNIT),
+    (r"\s*", "is empty where a number is expected"),
+    (r"[-+]?\.?(nan|inf|infinity)", _NOT_FINITE),
+    (rf"[-+]?{_DECIMAL}", _NOT_FINITE),
+    (r".*\$[({].*", "is a xacro expression; expand it with xacro first"),
+    (r"[-+]?[0-9]+,[0-9]+(e[-+]?[0-9]+)?", "has a decimal comma; write a point"),
+    (r"[-+]?0x[0-9a-f_]+|[-+]?0[ob][0-9_]+", f"{_NOT_DECIMAL}; write it in base ten"),
+    (r"[-+]?[0-9]+(:[0-9]+)+(\.[0-9]*)?", f"{_NOT_DECIMAL}; base 60 is not read"),
+    (r"[-+]?[0-9._]*_[0-9._]*(e[-+]?[0-9_]+)?", f"{_NOT_DECIMAL}; leave out the underscores"),
+    (rf"\s+[-+]?{_DECIMAL}\s*|[-+]?{_DECIMAL}\s+", "has blanks around the number"),
+    (rf"[-+]?{_DECIMAL}(\s+[-+]?{_DECIMAL})+", "is several numbers where one is expected"),
+    (r"true|false|yes|no|on|off", "is a truth value where a number is expected"),
+    (r"null|~", "is empty where a number is expected"),
+    (rf"[-+]?{_DECIMAL}e[-+]?", _UNKNOWN),
+    (rf"[-+]?{_DECIMAL}\s*[a-zµ°%\"'].*", _UNIT),
 )
 
 

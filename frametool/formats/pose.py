@@ -12,22 +12,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean
-from frametool.formats.rotations import ROTATION_KEYS, read_rotation
+from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS, read_rotation
 from frametool.formats.values import Misfit, Reading, kind, read_numbers
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import REPRESENTATIONS
-from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from frametool.formats.values import Quaternion, Vector
     from frametool.geometry.kinds import Rigid
+    from frametool.geometry.transform import Transform
 
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001}
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", "stamp_ns", "distance", "angle", "angle_deg"))
 NAMES = frozenset(("name", "parent"))
-POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles"))
+POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", AXES_KEY))
 AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie apart
 
 
@@ -53,6 +53,8 @@ class Pose(NamedTuple):
     @property
     def transform(self) -> Transform:
         """Give parent_from_name."""
+        from frametool.geometry.transform import Transform
+
         return Transform.of(*self.components)
 
 
@@ -73,7 +75,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
         for key, value in mapping.items():
             if key in POSITION_KEYS:
                 position = _agreeing_position(position, read_position(value, POSITION_KEYS[key]))
-            elif key in ROTATION_KEYS:
+            elif key in ROTATION_KEYS or key == AXES_KEY:
                 moved, turned = read_rotation(key, value, reading)
                 rotation = turned if rotation is None else _agreeing_rotation(rotation, turned)
                 if moved is not None:
@@ -84,7 +86,10 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
         raise Misfit(str(error), (key,)) from None
     finally:
         reading.degrees = outer_degrees
-    pose = Pose(position, rotation, read_name(mapping, "name"), read_name(mapping, "parent"))
+    name, parent = mapping.get("name", ""), mapping.get("parent", "")
+    if not (name and parent and type(name) is type(parent) is str):
+        name, parent = read_name(mapping, "name"), read_name(mapping, "parent")
+    pose = Pose(position, rotation, name, parent)
     return inverted(pose) if "inverse" in mapping and _read_flag(mapping["inverse"]) else pose
 
 

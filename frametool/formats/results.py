@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.formats.pose import Pose
 from frametool.geometry import euler, floats, quaternion
@@ -22,14 +22,26 @@ KEPT = {
 }
 
 
-class Style(NamedTuple):
+class Style:
     """How results are written: form, representations, unit of bare angles, digits, sign of quaternions."""
 
-    form: str
-    notations: tuple[Notation, ...] = ()
-    degrees: bool = False
-    precision: int | None = None
-    keep_sign: bool = False
+    __slots__ = ("degrees", "form", "keep_sign", "notations", "precision")
+
+    def __init__(
+        self,
+        form: str,
+        notations: tuple[Notation, ...] = (),
+        *,
+        degrees: bool = False,
+        precision: int | None = None,
+        keep_sign: bool = False,
+    ) -> None:
+        """Keep what the options of a command say."""
+        self.form = form
+        self.notations = notations
+        self.degrees = degrees
+        self.precision = precision
+        self.keep_sign = keep_sign
 
     def number(self, value: float) -> str:
         """Write a number: shortest text that reads back to the same bits, or fixed decimals."""
@@ -40,11 +52,15 @@ class Style(NamedTuple):
         return self.degrees if form.degrees is None else form.degrees
 
 
-class Result(NamedTuple):
+class Result:
     """A pose and what else is known about it (distance, angle, ..)."""
 
-    pose: Pose
-    extras: dict[str, Any] = {}  # noqa: RUF012 - never changed
+    __slots__ = ("extras", "pose")
+
+    def __init__(self, pose: Pose, extras: dict[str, Any] | None = None) -> None:
+        """Keep the two together."""
+        self.pose = pose
+        self.extras = extras or {}
 
     def mapping(self, style: Style) -> dict[str, Any]:
         """Give the tree entry: name, parent, xyz, one key a representation, then what is only said."""

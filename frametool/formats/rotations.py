@@ -6,7 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, overheard
 from frametool.formats.numbers import parse_angle, parse_number
 from frametool.formats.values import INDICES, Misfit, NotARotation, Reading, kind, read_texts
 from frametool.geometry import floats
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     Shape = tuple[Notation, Sequence[Any], Sequence[Path]]  # what it is, one text a component, and where each stands
 
 ALIASES = {"rotation": "quaternion", "orientation": "quaternion"}  # as ROS messages name it
+AXES_KEY = "axes"  # a constant rotation by name instead of numbers
 TURN = 2.0 * math.pi
-NOT_FINITE = re.compile(r"[-+]?\.?(nan|inf|infinity)", re.IGNORECASE)
+NOT_FINITE = r"(?i)[-+]?\.?(nan|inf|infinity)"
 
 
 def _rotation_keys() -> dict[str, Notation]:
@@ -41,6 +42,8 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
 
     Raises Misfit or ValueInvalid: wrong shape, no number, no rotation.
     """
+    if key == AXES_KEY:
+        return None, _read_axes(value)
     form, texts, places = shape_of(key, value)
     if len(texts) == 16:
         return read_homogeneous(form, texts, places, reading)
@@ -49,21 +52,41 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
 
 def shape_of(key: str, value: Any) -> Shape:
     """Take the value of a rotation key apart: its notation, one text a component, and where each stands below it."""
+    if key == AXES_KEY:
+        return notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
     form = ROTATION_KEYS[key]
     return SHAPES.get(form.representation.name, _list_or_map)(form, value)
+
+
+def _read_axes(value: Any) -> Quaternion:
+    """Read the name of a change of axes: `optical`, `ned_from_enu`."""
+    from frametool.geometry.axes import named_rotation
+
+    if type(value) is not str:
+        raise Misfit(f"expected the name of axes like optical or ned_from_enu, found {kind(value)}")
+    rotation: Quaternion = named_rotation(value).components
+    return rotation
 
 
 def rotation_of(form: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
     """Turn one text a component into x, y, z, w, in the unit that applies, checked to be a rotation."""
     numbers, degrees = read_components(form, texts, places, reading)
+    if not form.representation.can_fail:
+        return form.to_quaternion(numbers, floats, degrees=degrees)
     return _checked(form, numbers, reading, degrees=degrees)
 
 
 def _checked(form: Notation, numbers: Sequence[float], reading: Reading, *, degrees: bool = False) -> Quaternion:
+    """Give the quaternion of numbers that make a rotation; what is odd about them is noted."""
     try:
-        return form.checked_quaternion(numbers, floats, degrees=degrees, normalize=reading.normalize)
+        rotation, odd = overheard(
+            form.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
+        )
     except ValueInvalid as error:
         raise NotARotation(str(error)) from None
+    for message in odd:
+        reading.note(message)
+    return rotation
 
 
 def read_components(
@@ -73,27 +96,34 @@ def read_components(
     reading: Reading,
 ) -> tuple[list[float], bool]:
     """Read the components of a rotation; returns them with the unit of the angles among them (True: degrees)."""
-    angles = form.representation.angles
     degrees = reading.degrees if form.degrees is None else form.degrees
+    try:
+        numbers = list(map(parse_number, texts))
+    except (ValueInvalid, TypeError):
+        return _read_one_by_one(form, texts, places, degrees=degrees)
+    if form.degrees is None and not degrees and form.representation.angles:
+        _note_degrees(form, numbers, places, reading)
+    return numbers, degrees
+
+
+def _read_one_by_one(
+    form: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool
+) -> tuple[list[float], bool]:
+    """Read components among which an angle says its own unit, or one is no number: then say where."""
+    angles = form.representation.angles
     numbers, units = [], []
     for index, text in enumerate(texts):
         try:
             if type(text) is not str:
                 raise Misfit(f"expected a number, found {kind(text)}")
+            number, unit = parse_angle(text) if index in angles else (parse_number(text), None)
             if index in angles:
-                number, unit = parse_angle(text)
                 units.append(_unit_for(unit, text, form))
-            else:
-                number = parse_number(text)
         except ValueInvalid as error:
-            misfit = NotARotation if type(text) is str and NOT_FINITE.fullmatch(text) else Misfit
+            misfit = NotARotation if type(text) is str and re.fullmatch(NOT_FINITE, text) else Misfit
             raise misfit(str(error), places[index]) from None
         numbers.append(number)
-    if any(units):
-        degrees = _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
-    elif angles and not degrees and form.degrees is None:
-        _note_degrees(form, numbers, places, reading)
-    return numbers, degrees
+    return numbers, _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
 
 
 def _unit_for(unit: str | None, text: str, form: Notation) -> str | None:

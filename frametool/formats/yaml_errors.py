@@ -19,6 +19,7 @@ _NEVER_FIRST = ("@", "`", "%")
 _LONGEST_SHOWN = 40
 _HINTS = {
     "mapping values are not allowed in this context": "; check the indentation, or quote a text that holds ': '",
+    "found unexpected ':'": "; write a blank after the colon",
     "could not find expected ':'": "; a key needs ': ' after it",
     "did not find expected key": "; check the indentation and the brackets above",
     "did not find expected '-' indicator": "; check the indentation",

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from typing import Any
 
 # begins with a letter, _ or /; then also digits . - and single blanks: no indicator, number or date looks so
-_PLAIN = re.compile(r"(?:[^\W\d]|/)[\w./-]*(?: [\w./-]+)*").fullmatch
+_PLAIN = r"(?:[^\W\d]|/)[\w./-]*(?: [\w./-]+)*"
 _WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null", "nan", "inf", "infinity"))
-_ESCAPED = re.compile(r'["\\]|[^ -~\xa1-\u1fff\u3001-\ud7ff\uf900-\ufdff\U00010000-\U0003ffff]')
+_ESCAPED = r'["\\]|[^ -~\xa1-\u1fff\u3001-\ud7ff\uf900-\ufdff\U00010000-\U0003ffff]'
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 _LONGEST_KEY = 200  # of 1024 bytes that a parser looks ahead for the colon
 _WIDEST_FLOW_MAP = 8
@@ -42,9 +42,12 @@ def dump(value: Any, number: Callable[[float], str] = repr) -> str:
 
 def quoted(text: str) -> str:
     """Write a text as it is where that is safe, else in double quotes with escapes."""
-    if len(text) <= _LONGEST_KEY and _PLAIN(text) and text.lower() not in _WORDS and text.isprintable():
+    if text.isascii() and text.isidentifier() and len(text) <= _LONGEST_KEY and text.lower() not in _WORDS:
+        return text  # most keys and names, before any pattern is compiled
+    plain = len(text) <= _LONGEST_KEY and re.fullmatch(_PLAIN, text)
+    if plain and text.lower() not in _WORDS and text.isprintable():
         return text
-    return f'"{_ESCAPED.sub(_escape, text)}"'
+    return f'"{re.sub(_ESCAPED, _escape, text)}"'
 
 
 def _key(key: str, beside: dict[str, Any]) -> str:

@@ -7,8 +7,8 @@ import re
 from frametool.errors import ValueInvalid
 
 BILLION = 1_000_000_000
-_SECONDS = re.compile(r"([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,3}))?", re.ASCII)
-_NANOSECONDS = re.compile(r"([-+]?\d{1,30})ns", re.ASCII)
+_SECONDS = r"(?a)([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,3}))?"
+_NANOSECONDS = r"(?a)([-+]?\d{1,30})ns"
 
 
 def parse_stamp(text: str) -> int:
@@ -16,9 +16,9 @@ def parse_stamp(text: str) -> int:
 
     Raises ValueInvalid.
     """
-    if match := _NANOSECONDS.fullmatch(text):
+    if match := re.fullmatch(_NANOSECONDS, text):
         return int(match[1])
-    match = _SECONDS.fullmatch(text)
+    match = re.fullmatch(_SECONDS, text)
     if match is None or not (match[2] or match[3]) or len(text) > 60:
         raise ValueInvalid(f"{text!r} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
     sign, whole, fraction, exponent = match[1], match[2], match[3] or "", int(match[4] or 0)

@@ -41,7 +41,7 @@ def first_nonzero(*values: Number) -> Number:
     found = values[0]
     for value in values[1:]:
         zero = found == 0.0
-        if not np.any(zero):
+        if not np.asarray(zero).any():
             break
         found = where(zero, value, found)
     return found
@@ -54,7 +54,7 @@ def negated_where(condition: Number, *values: Number) -> Components:
     """
     sign = 1.0 - 2.0 * condition
     return tuple(
-        where(condition, 0.0 - value, value) if np.any(value == 0.0) else value * sign for value in values
+        where(condition, 0.0 - value, value) if (value == 0.0).any() else value * sign for value in values
     )  # fmt: skip
 
 

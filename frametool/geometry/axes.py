@@ -33,7 +33,18 @@ def axes_change(target: str, source: str) -> Rotation:
     return (_named(target).inverse() @ _named(source)).canonical()
 
 
+def named_rotation(text: str) -> Rotation:
+    """Give the rotation that a text names: `optical` is flu_from_optical, `ned_from_enu` any two.
+
+    Raises:
+        ValueInvalid: unknown name; with the nearest and those there are.
+    """
+    target, joint, source = text.partition("_from_")
+    return axes_change(target, source) if joint else axes_change("flu", text)
+
+
 def _named(name: str) -> Rotation:
     if name not in AXES:
-        raise ValueInvalid(f"unknown axes {name!r}{did_you_mean(name, AXES)}; axes: {', '.join(AXES)}")
+        near = did_you_mean(name, AXES) or ";"
+        raise ValueInvalid(f"unknown axes {name!r}{near} axes: {', '.join(AXES)}")
     return AXES[name][0]

@@ -127,6 +127,8 @@ def second_moment(components: Components, heavy: Array | None) -> Array:
     from frametool.geometry import arrays
 
     flat = [part.reshape(-1) for part in components]
+    if not flat[0].size:
+        raise ValueInvalid("mean of no rotations; give at least one")
     mass = None if heavy is None else heavy.reshape(-1)
     total = np.zeros((4, 4))
     for start, stop in arrays.blocks(flat[0].size):

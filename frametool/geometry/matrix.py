@@ -116,7 +116,7 @@ def complaint(entries: Matrix, off: float, *, normalize: bool) -> str:
     """Say why a matrix that far from orthonormal is refused, or nothing."""
     if not all(abs(value) < float("inf") for value in entries):
         return f"matrix {_shown(entries)} is not finite; give nine finite numbers"
-    if not normalize and off > TOLERATED and not (off < 1.0 and determinant(*entries) < 0.0):
+    if not normalize and not off <= TOLERATED and not (off < 1.0 and determinant(*entries) < 0.0):
         return f"matrix is not a rotation: its rows are orthonormal only to {off:.2g} (normalize it with --normalize)"
     volume = relative_volume(*entries, floats)
     if volume < -SINGULAR:

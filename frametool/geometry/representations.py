@@ -43,6 +43,11 @@ class Representation:
         """Show the name."""
         return f"<representation {self.name}>"
 
+    @property
+    def can_fail(self) -> bool:
+        """Tell whether finite numbers may be no rotation: a norm, an axis, a matrix; three angles always are one."""
+        return self._check is not None
+
     def to_quaternion(
         self, components: Components, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
     ) -> Quaternion:
@@ -231,9 +236,9 @@ def checked_axes(axes: str) -> str:
     """Give the name of an Euler convention back if it is one; else raise ValueInvalid with those there are."""
     if axes in euler.AXES:
         return axes
-    near = did_you_mean(axes.lower(), euler.AXES)
+    near = did_you_mean(axes.lower(), euler.AXES) or ";"
     raise ValueInvalid(
-        f"unknown Euler axes {axes!r}{near}; s (static axes) or r (rotating axes) and three letters: "
+        f"unknown Euler axes {axes!r}{near} s (static axes) or r (rotating axes) and three letters: "
         f"{', '.join(sorted(euler.AXES))}"
     )
 

@@ -200,7 +200,7 @@ class Rotation:
         ours, theirs = self._components, other._components
         if type(ours[3]) is type(theirs[3]) is float:
             product = _new(Rotation)
-            product._components = quaternion.compose(*ours, *theirs)  # noqa: SLF001 - its own class
+            product._components = quaternion.compose(*ours, *theirs)
             return product
         return self._of_columns(batches.run(quaternion.compose, 4, (*ours, *theirs)))
 

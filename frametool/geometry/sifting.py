@@ -132,7 +132,7 @@ def _matrix_sifter(given: Components, name: str, *, normalize: bool) -> Kernel:
 
     def kernel(*block: Any) -> Components:
         entries: Matrix = block
-        rough = matrix.defect(*entries, arrays) > matrix.ORTHONORMAL
+        rough = ~(matrix.defect(*entries, arrays) <= matrix.ORTHONORMAL)
         return matrix.to_quaternion(*_projected(entries, rough), arrays)
 
     return kernel

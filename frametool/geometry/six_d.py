@@ -24,10 +24,10 @@ def to_quaternion(
     The second is cleared of the first twice: once leaves a residue where they are nearly parallel (Giraud 2005).
     """
     ax, ay, az = unit_vector(ax, ay, az, xp)
-    bx, by, bz = unit_vector(bx, by, bz, xp)
-    for _ in range(2):
-        along = ax * bx + ay * by + az * bz
-        bx, by, bz = unit_vector(bx - along * ax, by - along * ay, bz - along * az, xp)
+    along = ax * bx + ay * by + az * bz
+    bx, by, bz = unit_vector(bx - along * ax, by - along * ay, bz - along * az, xp)
+    rest = ax * bx + ay * by + az * bz
+    bx, by, bz = bx - rest * ax, by - rest * ay, bz - rest * az
     cx, cy, cz = cross(ax, ay, az, bx, by, bz)
     return matrix.to_quaternion(ax, bx, cx, ay, by, cy, az, bz, cz, xp)
 

@@ -140,7 +140,7 @@ class Transform:
         ours, theirs = self._components, other._components
         if type(ours[6]) is type(theirs[6]) is float:
             product = _new(Transform)
-            product._components = rigid.compose(*ours, *theirs)  # noqa: SLF001 - its own class
+            product._components = rigid.compose(*ours, *theirs)
             return product
         return self._of_columns(batches.run(rigid.compose, 7, (*ours, *theirs)))
 

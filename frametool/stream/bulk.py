@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.text.arrays import Ints
 
-MOST_KINDS = 64  # kinds of records kept in mind
+MOST_KINDS = 256  # kinds of records kept in mind
 MOST_TRIED = 8  # of them tried on whole blocks
 MOST_LOOKED = 1 << 16  # bytes in which the first record of what is left is looked for
 WORTH_CUTTING = 1 << 12  # bytes

@@ -170,7 +170,7 @@ def _with_rotation(value: Any, key: str, holder: Holder, below: Path, reading: R
 def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
     try:
         _at(value, place)
-    except (KeyError, IndexError):
+    except (KeyError, IndexError, TypeError):
         return None
     return (*path, *place)
 

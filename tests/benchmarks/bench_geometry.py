@@ -10,6 +10,7 @@ import platform
 import sys
 import time
 import tracemalloc
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,7 +61,8 @@ def rotation_cases(d: dict[str, Any]) -> list[Case]:
     return [
         ("Euler -> quaternion", 25, lambda: Rotation.from_euler("rzyx", d["angles"]).as_quaternion(),
          lambda: Peer.from_euler("ZYX", d["angles"]).as_quat()),
-        ("compose", 18, lambda: (ours(q) @ ours(r)).as_quaternion(), lambda: (theirs(q) * theirs(r)).as_quat()),
+        ("compose", 18, lambda: Rotation.as_quaternion(ours(q) @ ours(r)),
+         lambda: Peer.as_quat(theirs(q) * theirs(r))),
         ("quaternion -> rotation vector", 12, lambda: ours(q).as_rotvec(), lambda: theirs(q).as_rotvec()),
         ("quaternion -> Euler", 4, lambda: ours(q).as_euler("rzyx"), lambda: theirs(q).as_euler("ZYX")),
         ("matrix -> quaternion, validated", 3, lambda: Rotation.from_matrix(d["matrix"]).as_quaternion(),
@@ -97,8 +99,8 @@ def rigid_cases(d: dict[str, Any]) -> list[Case]:
         ("SE(3) log", 2, lambda: ours(t, q).log(), lambda: theirs(t, q).as_exp_coords()),
         ("SE(3) exp", 2, lambda: both(Transform.exp(d["twist"])),
          lambda: parts(RigidTransform.from_exp_coords(d["twist"]))),
-        ("SE(3) compose, 4x4", 1, lambda: (read(a) @ read(b)).as_matrix(),
-         lambda: (peer_read(a) * peer_read(b)).as_matrix()),
+        ("SE(3) compose, 4x4", 1, lambda: Transform.as_matrix(read(a) @ read(b)),
+         lambda: RigidTransform.as_matrix(peer_read(a) * peer_read(b))),
         ("SE(3) inverse, 4x4", 1, lambda: read(a).inverse().as_matrix(), lambda: peer_read(a).inv().as_matrix()),
         ("SE(3) log, 4x4", 1, lambda: read(a).log(), lambda: peer_read(a).as_exp_coords()),
         ("SE(3) exp, 4x4", 1, lambda: Transform.exp(d["twist"]).as_matrix(),
@@ -164,8 +166,8 @@ def scalar_cases() -> dict[str, Callable[[], Any]]:
     q = Rotation.from_rpy([0.1, 0.2, 0.3]).components
     for name, row in REPRESENTATIONS.items():
         parts = row.from_quaternion(*q, floats)
-        cases[f"{name} -> quaternion"] = lambda row=row, parts=parts: row.to_quaternion(parts, floats)
-        cases[f"quaternion -> {name}"] = lambda row=row: row.from_quaternion(*q, floats)
+        cases[f"{name} -> quaternion"] = partial(row.to_quaternion, parts, floats)
+        cases[f"quaternion -> {name}"] = partial(row.from_quaternion, *q, floats)
     return cases
 
 

@@ -146,6 +146,9 @@ def test_a_matrix_in_millimetres_becomes_its_rotation() -> None:
     assert Rotation.from_matrix(1000.0 * turned.as_matrix(), normalize=True).is_close(turned, angle=1e-15)
 
 
+FRACTIONS = [0.0, 1e-9, 0.3, 0.5, 0.99, 1.0, 1.5]
+
+
 def slerp_oracle(start: Sequence[float], end: Sequence[float], fraction: float) -> Any:
     """Turn by a part of the angle between two quaternions, about the axis of end * start^-1."""
     relative = oracles.matrix_of_quaternion(end) * oracles.matrix_of_quaternion(start).T
@@ -162,8 +165,8 @@ def slerp_oracle(start: Sequence[float], end: Sequence[float], fraction: float) 
 def test_slerp_is_right_on_small_and_large_arcs(arc: float) -> None:
     for start in samples.random_quaternions(4, seed=7):
         end = (Rotation.from_axis_angle([1.0, 2.0, -2.0], arc) @ Rotation.from_quaternion(start)).as_quaternion()
-        ours = Rotation.from_quaternion(start).slerp(Rotation.from_quaternion(end), [0.0, 1e-9, 0.3, 0.5, 0.99, 1.0, 1.5])
-        for fraction, found in zip((0.0, 1e-9, 0.3, 0.5, 0.99, 1.0, 1.5), ours, strict=True):
+        ours = Rotation.from_quaternion(start).slerp(Rotation.from_quaternion(end), FRACTIONS)
+        for fraction, found in zip(FRACTIONS, ours, strict=True):
             assert rotation_error(found, slerp_oracle(start, end.tolist(), fraction)) <= LIMIT
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -11,15 +12,19 @@ import samples
 from frametool.geometry import arrays, euler, floats, quaternion
 from frametool.geometry.representations import REPRESENTATIONS
 
+if TYPE_CHECKING:
+    from frametool.geometry.kinds import Quaternion, Vector
+
 EXACT = {0.0, 0.5, samples.SQRT_HALF, 1.0}
 TURNS = list(itertools.product((-270.0, -90.0, 0.0, 90.0, 180.0, 360.0), repeat=3))
 
 
 @pytest.mark.parametrize("axes", sorted(euler.AXES))
 def test_euler_angles_in_degrees_are_exact_both_ways(axes: str) -> None:
-    together = np.stack(euler.to_quaternion(*np.array(TURNS).T, axes, arrays, degrees=True), axis=-1)
-    for turns, row in zip(TURNS, together.tolist(), strict=True):
-        xyzw = euler.to_quaternion(*turns, axes, floats, degrees=True)
+    columns: Vector = tuple(np.array(TURNS).T)
+    together = np.stack(euler.to_quaternion(*columns, axes, arrays, degrees=True), axis=-1)
+    for (first, second, third), row in zip(TURNS, together.tolist(), strict=True):
+        xyzw = euler.to_quaternion(first, second, third, axes, floats, degrees=True)
         assert list(xyzw) == row
         assert {abs(part) for part in xyzw} <= EXACT
         assert {abs(entry) for entry in quaternion.to_matrix(*xyzw)} <= {0.0, 1.0}
@@ -27,7 +32,7 @@ def test_euler_angles_in_degrees_are_exact_both_ways(axes: str) -> None:
 
 
 def test_angles_back_from_arrays_are_exact() -> None:
-    columns = np.array(samples.LATTICE).T
+    columns: Quaternion = tuple(np.array(samples.LATTICE).T)
     for axes in euler.AXES:
         angles = np.stack(euler.from_quaternion(*columns, axes, arrays, degrees=True))
         straight = np.all(np.isin(np.abs(np.stack(quaternion.to_matrix(*columns))), (0.0, 1.0)), axis=0)
@@ -36,7 +41,7 @@ def test_angles_back_from_arrays_are_exact() -> None:
 
 @pytest.mark.parametrize("name", [name for name in REPRESENTATIONS if name not in ("mrp", "rotvec", "axis_angle")])
 @pytest.mark.parametrize("xyzw", samples.LATTICE)
-def test_the_lattice_of_right_angles_comes_back_to_the_bit(name: str, xyzw: tuple[float, ...]) -> None:
+def test_the_lattice_of_right_angles_comes_back_to_the_bit(name: str, xyzw: Quaternion) -> None:
     row = REPRESENTATIONS[name]
     back = row.to_quaternion(row.from_quaternion(*xyzw, floats, degrees=True), floats, degrees=True)
     assert quaternion.canonical(*back, floats) == quaternion.canonical(*xyzw, floats)
@@ -59,8 +64,8 @@ def test_products_of_right_angles_stay_on_the_lattice() -> None:
 
 
 def test_points_moved_by_right_angles_keep_their_digits() -> None:
-    for turns in TURNS:
-        xyzw = euler.to_quaternion(*turns, "sxyz", floats, degrees=True)
+    for first, second, third in TURNS:
+        xyzw = euler.to_quaternion(first, second, third, "sxyz", floats, degrees=True)
         assert sorted(abs(part) for part in quaternion.rotate(*xyzw, 0.1, 0.2, 0.3)) == [0.1, 0.2, 0.3]
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 import subprocess
 import sys
 import tracemalloc
@@ -87,7 +89,7 @@ def test_integers_are_numbers() -> None:
 
 @each_way
 def test_one_item_and_many_give_the_same_numbers(way: str) -> None:
-    there, back = WAYS[way]
+    there, _ = WAYS[way]
     rotation = batch((7,))
     for index, one in enumerate(rotation):
         alone, among = there(one), there(rotation)
@@ -138,16 +140,17 @@ def test_bad_matrices_are_refused_alone_and_among_others(entries: Any, message: 
 @pytest.mark.parametrize("entries", [np.zeros((3, 3)), np.ones((3, 3)), np.diag([1.0, 1.0, -1.0])])
 def test_normalising_helps_neither_singular_nor_mirrored_matrices(entries: Any) -> None:
     for given in (entries, entries[None]):
-        with pytest.raises(ValueInvalid, match="singular|mirrored"):
+        with pytest.raises(ValueInvalid, match=r"singular|mirrored"):
             Rotation.from_matrix(given, normalize=True)
 
 
 @pytest.mark.parametrize("off", [1e-7, 1e-4])
 def test_what_is_nearly_a_rotation_is_used_with_a_warning_beyond_1e_6(off: float) -> None:
     quaternions = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0 + off], [0.0, 1.0 + off, 0.0, 0.0]])
-    reads = [
+    matrices = np.eye(3)[None] * (1.0 + off)
+    reads: list[Callable[[], Rotation]] = [
         lambda: Rotation.from_quaternion(quaternions), lambda: Rotation.from_quaternion(quaternions[1]),
-        lambda: Rotation.from_matrix(np.eye(3)[None] * (1.0 + off)), lambda: Rotation.from_matrix(np.eye(3) * (1.0 + off)),
+        lambda: Rotation.from_matrix(matrices), lambda: Rotation.from_matrix(matrices[0]),
     ]  # fmt: skip
     for read in reads:
         if off > 1e-6:
@@ -164,11 +167,12 @@ def test_what_is_unit_to_4_eps_keeps_its_bits_and_printed_numbers_read_back() ->
     assert np.array_equal(Rotation.from_quaternion(once).as_quaternion(), once)
     products = (Rotation.from_quaternion(once) @ Rotation.from_quaternion(once[::-1])).as_quaternion()
     assert np.array_equal(Rotation.from_quaternion(products).as_quaternion(), products)
-    assert all(Rotation.from_quaternion(row.tolist()).as_quaternion().tolist() == row.tolist() for row in products[:200])
+    for row in products[:200].tolist():
+        assert Rotation.from_quaternion(row).as_quaternion().tolist() == row
 
 
 def test_the_sign_that_leaves_is_canonical() -> None:
-    rows = [[0, 0, 0, -1], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 0], [0.6, 0, 0, -0.8]]
+    rows: Any = [[0, 0, 0, -1], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 0], [0.6, 0, 0, -0.8]]
     expected = [[0, 0, 0, 1], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [-0.6, 0, 0, 0.8]]
     assert Rotation.from_quaternion(rows).as_quaternion().tolist() == expected
     assert [Rotation.from_quaternion(row).as_quaternion().tolist() for row in rows] == expected
@@ -177,23 +181,23 @@ def test_the_sign_that_leaves_is_canonical() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: Rotation.from_rotvec([[0, 0, 0], [0, math.nan, 0]]), r"rotvec\[1\]: 0 nan 0 is not finite"),
-        (lambda: Rotation.from_rotvec([[0, 0, 0], [1e200, 0, 0]]), r"rotvec\[1\]: rotation vector 1e\+200 0 0"),
+        (lambda: Rotation.from_rotvec([[0.0, 0.0, 0.0], [0.0, math.nan, 0.0]]), r"rotvec\[1\]: 0 nan 0 is not finite"),
+        (lambda: Rotation.from_rotvec([[0.0] * 3, [1e200, 0.0, 0.0]]), r"rotvec\[1\]: rotation vector 1e\+200 0 0"),
         (lambda: Rotation.from_rotvec([1e200, 0, 0]), r"rotation vector 1e\+200 0 0"),
         (lambda: Rotation.from_axis_angle([0, 0, 0], 1.0), r"axis 0 0 0 has no direction"),
         (lambda: Rotation.from_axis_angle([[1, 0, 0], [0, 0, 0]], 1.0), r"axis\[1\]: axis 0 0 0 has no direction"),
-        (lambda: Rotation.from_euler("rzyx", [[1, 2, 3], [1, math.inf, 3]]), r"angles\[1\]: 1 inf 3 is not finite"),
+        (lambda: Rotation.from_euler("rzyx", [[0.0] * 3, [1.0, math.inf, 3.0]]), r"angles\[1\]: 1 inf 3 is not finite"),
         (lambda: Rotation.from_euler("zyx", [1, 2, 3]), r"unknown Euler axes 'zyx'; did you mean"),
         (lambda: Rotation.from_six_d([1, 0, 0, 2, 0, 0]), r"parallel"),
         (lambda: Rotation.from_mrp([math.nan, 0, 0]), r"mrp: nan 0 0 is not finite"),
         (lambda: Rotation.between([0, 0, 0], [1, 0, 0]), r"no direction"),
-        (lambda: Rotation.identity().apply([[1, 2, 3], [1, 2, math.nan]]), r"vectors\[1\]: 1 2 nan is not finite"),
-        (lambda: batch((2,)).apply([[1, 2, 3], [1, 2, math.nan]]), r"vectors\[1\]: 1 2 nan is not finite"),
+        (lambda: Rotation.identity().apply([[0.0] * 3, [1.0, 2.0, math.nan]]), r"vectors\[1\]: 1 2 nan is not finite"),
+        (lambda: batch((2,)).apply([[0.0] * 3, [1.0, 2.0, math.nan]]), r"vectors\[1\]: 1 2 nan is not finite"),
         (lambda: Rotation.identity().apply([[1, 2]]), r"vectors: expected shape \(\.\.\., 3\), got \(1, 2\)"),
         (lambda: batch((2,)) @ batch((3,)), r"batch shapes \(2,\) and \(3,\) do not broadcast"),
         (lambda: Transform.from_matrix(np.ones((4, 4))), r"last row 1 1 1 1; expected 0 0 0 1"),
         (lambda: Transform.from_arrays(np.zeros((2, 3)), np.eye(4)[3:].repeat(3, 0)), r"do not broadcast"),
-        (lambda: Transform.from_arrays([[0, 0, math.inf]], [[0, 0, 0, 1]]), r"xyz\[0\]: 0 0 inf is not finite"),
+        (lambda: Transform.from_arrays([[0.0, 0.0, math.inf]], [[0, 0, 0, 1]]), r"xyz\[0\]: 0 0 inf is not finite"),
         (lambda: Rotation.identity().distance(1), r"expected a Rotation, got int"),  # type: ignore[arg-type]
         (lambda: Transform.identity().relative(Rotation.identity()), r"expected a Transform"),  # type: ignore[arg-type]
         (lambda: axes_change("opticl", "ned"), r"unknown axes 'opticl'; did you mean 'optical'"),
@@ -292,9 +296,38 @@ def test_weights_must_be_weights(weights: list[float]) -> None:
         batch((2,)).mean(weights)
 
 
+def test_nothing_has_no_mean() -> None:
+    with pytest.raises(ValueInvalid, match="mean of no rotations"):
+        batch((0,)).mean()
+
+
+def test_huge_and_flat_matrices_are_refused_or_normalised_never_believed() -> None:
+    turned = batch(())
+    huge = 1e200 * turned.as_matrix()
+    flat = turned.as_matrix() @ np.diag([1.0, 1.0, 1e-9])
+    for entries in (huge, flat):
+        for given in (entries, entries[None]):
+            with pytest.raises(ValueInvalid, match="orthonormal"):
+                Rotation.from_matrix(given)
+            assert np.all(Rotation.from_matrix(given, normalize=True).is_close(turned, angle=1e-6))
+
+
+def test_one_axis_takes_many_angles_and_one_direction_many_others() -> None:
+    turns = Rotation.from_axis_angle([0.0, 0.0, 2.0], [0.1, 0.2])
+    assert np.allclose(turns.as_rpy(), [[0.0, 0.0, 0.1], [0.0, 0.0, 0.2]], rtol=0.0, atol=1e-16)
+    ends = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    assert np.allclose(Rotation.between([1.0, 0.0, 0.0], ends).apply([1.0, 0.0, 0.0]), ends, rtol=0.0, atol=1e-15)
+
+
+def test_values_copy_and_pickle() -> None:
+    for value in (Transform.random(seed=1), Transform.random(3, seed=1)):
+        for again in (copy.copy(value), pickle.loads(pickle.dumps(value))):  # noqa: S301 - our own bytes
+            assert np.all(again.is_close(value, angle=0.0, distance=0.0))
+
+
 def test_axes_of_the_field_take_the_forward_direction_where_it_is() -> None:
     forward = {"flu": [1, 0, 0], "frd": [1, 0, 0], "optical": [0, 0, 1], "opengl": [0, 0, -1]}
-    up = {"flu": [0, 0, 1], "frd": [0, 0, -1], "optical": [0, -1, 0], "opengl": [0, 1, 0], "enu": [0, 0, 1], "ned": [0, 0, -1]}
+    up = {"flu": [0, 0, 1], "frd": [0, 0, -1], "optical": [0, -1, 0], "opengl": [0, 1, 0], "ned": [0, 0, -1]}
     for source, direction in forward.items():
         assert axes_change("flu", source).apply(direction).tolist() == [1.0, 0.0, 0.0]
     for source, direction in up.items():
@@ -328,7 +361,8 @@ def test_conversions_of_long_arrays_need_little_beyond_the_result() -> None:
 
 def test_one_item_loads_no_numpy() -> None:
     program = (
-        "import sys; from frametool.geometry.transform import Transform; from frametool.geometry.rotation import Rotation\n"
+        "import sys; from frametool.geometry.transform import Transform\n"
+        "from frametool.geometry.rotation import Rotation\n"
         "from frametool.geometry.axes import axes_change\n"
         "a = Transform(Rotation.from_rpy([0.1, 0.2, 0.3]), [1, 2, 3]); b = a @ a.inverse(); a.interpolate(b, 0.5)\n"
         "a.distance(b), a.is_close(b), a.relative(b), repr(a), a.rotation.slerp(b.rotation, 0.5), a.rotation.angle()\n"
