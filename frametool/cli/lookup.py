@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, result_options, rotation_options
+from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
+from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result
@@ -18,12 +20,14 @@ if TYPE_CHECKING:
 
 @click.command(cls=Command, name="lookup")
 @click.argument("tree", type=TEXT)
-@click.argument("target", type=FRAME)
-@click.argument("source", type=FRAME)
+@click.argument("target", type=FRAME, required=False)
+@click.argument("source", type=FRAME, required=False)
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
 @result_options("poses")
-def command(tree: str, target: str, source: str, more: Sequence[str], **options: Any) -> None:
+@column_options
+@stream_options
+def command(tree: str, target: str | None, source: str | None, more: Sequence[str], **options: Any) -> int:
     """Give the pose of SOURCE in TARGET: the transform that maps points in SOURCE to points in TARGET.
 
     \b
@@ -33,7 +37,13 @@ def command(tree: str, target: str, source: str, more: Sequence[str], **options:
     TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. --deg is about the angles of
     the result; the tree's own are what its file says.
     """
+    by_row, stream = RowFrames(options), Stream(options)
     output = Output("poses", **options)
     frames = load_tree(tree, more)
+    if by_row:
+        return by_row.run(stream, output, frames, target=target, source=source)
+    if target is None or source is None:
+        raise click.UsageError("name TARGET and SOURCE, or the columns that name them: --target-column, --source-column")
     target, source = frame_name(target, frames), frame_name(source, frames)
     output.poses([Result(Pose.of(frames.lookup(target, source).components, source, target))])
+    return 0

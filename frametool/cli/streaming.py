@@ -65,7 +65,7 @@ class Stream:
             raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
         return self.path is not None or argument in (None, "-")
 
-    def run(self, request: Request, output: Output) -> int | Source:
+    def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int | Source:
         """Run the stream and give its exit status; or give the text of a few records that are to be shown otherwise."""
         name = self.path or "stdin"
         with _opened(self.path) as stream:
@@ -73,6 +73,8 @@ class Stream:
             form, known_by = form_of(begin, self.path or "", told=self.options["input_form"] or _table_form(output))
             if self.options["verbose"] and known_by:
                 click.echo(f"frametool: {name}: read as {form} ({STREAMS[form]}), known by {known_by}", err=True)
+            if tables_only and form in RECORDS:
+                raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             if form in RECORDS and (output.told or form) != form:
                 return Source(name, decode(stream.read(), name))
             if form not in RECORDS and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):

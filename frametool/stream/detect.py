@@ -50,6 +50,8 @@ def _by_content(begin: bytes, name: str) -> str:
             return form
     if len(line.split()) > 1 or begin.lstrip().startswith(b"#"):
         return "columns"
+    if not begin.strip():
+        raise FormatError("nothing in it", source=name or "stdin")
     raise FormatError(f"cannot tell the form of {line[:60].decode('utf-8', 'replace')!r}; give --in {'|'.join(STREAMS)}", source=name or "stdin", line=1)
 
 

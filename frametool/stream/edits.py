@@ -134,7 +134,7 @@ class Editor:
         members = []
         for form, degrees in self.target.notations:
             position = SAMPLE[:3] if self.target.whole else None
-            style = Style("json", (form,), degrees)
+            style = Style("json", (form,), degrees=degrees)
             entry = Result(Pose(position, SAMPLE)).mapping(style)
             entry.pop("gimbal_lock", None)
             entry.pop("xyz", None)

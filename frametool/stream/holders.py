@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import did_you_mean
 from frametool.formats.pose import POSE_KEYS, read_angle_unit, read_name, read_position
-from frametool.formats.records import POINT_KEYS
-from frametool.formats.rotations import ROTATION_KEYS, read_rotation, shape_of
+from frametool.formats.points import POINT_KEYS
+from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS, read_rotation, shape_of
 from frametool.formats.values import INDICES, Misfit, Reading, kind, read_numbers, within
 from frametool.stream.shape import POINT, POSE, VECTOR, Shape
 
@@ -73,7 +73,11 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[P
 
 
 def _holds(key: str, value: Any) -> bool:
-    return (key in ROTATION_KEYS or key in POINT_KEYS) and value is not None and not (key == "point" and type(value) is str)
+    return (_is_rotation(key, value) or key in POINT_KEYS) and value is not None and not (key == "point" and type(value) is str)
+
+
+def _is_rotation(key: str, value: Any) -> bool:
+    return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
 
 
 def _holder(document: Any, path: Path, outer: tuple[Path, ...], request: Request, reading: Reading) -> Holder:
@@ -99,7 +103,7 @@ def _mapping(
     document: Any, value: dict[str, Any], path: Path, outer: tuple[Path, ...], request: Request, reading: Reading,
 ) -> Holder:
     positions = [key for key in value if key in POINT_KEYS]
-    rotations = [key for key in value if key in ROTATION_KEYS]
+    rotations = [key for key, each in value.items() if _is_rotation(key, each)]
     if len(positions) > 1:
         raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
     _refuse_typos(value, rotations)
