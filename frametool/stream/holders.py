@@ -165,6 +165,8 @@ def _with_rotation(value: Any, key: str, holder: Holder, below: Path, reading: R
 
     values, degrees = read_components(form, texts, places, reading)
     paths = tuple(_path_if_there(value, (*holder.path, *below), place) for place in places[: len(texts)])
+    if degrees != (reading.degrees if form.degrees is None else form.degrees):
+        paths = (None,) * len(paths)  # the numbers say another unit than their key: the member is written anew
     shape = holder.shape._replace(kind=POSE, notation=form, degrees=degrees, whole=whole)
     if request.poses != 1:
         raise Misfit("a record holds one pose; two in a row are for tables")
