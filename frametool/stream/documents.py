@@ -24,6 +24,7 @@ NULLS = {"json": b"null\n", "yaml": b"null\n---\n"}
 _DOCUMENT_END = re.compile(rb"^---[ \t]*\r?\n", re.MULTILINE)
 _ARRAY = re.compile(rb"\s*\[\s*(?:\{|$)")
 _TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|[{}\[\]]', re.DOTALL)
+_SEVERAL = re.compile(rb"\}\s*,?\s*\{")
 _LINE = re.compile(rb"[^\n]*\n|[^\n]+\Z")
 _AFTER_RECORD = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
 _NO_DOCUMENT = re.compile(rb"(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|---)\s*)?")
@@ -96,7 +97,15 @@ class Splitter:
             self.whole(text)
         if not self.lines:
             return self._pretty(text)[0]
-        return [span for found in _LINE.finditer(text) if (span := _trimmed(text, found.start(), found.end()))]
+        return [span for found in _LINE.finditer(text) for span in self._in_line(text, found.start(), found.end())]
+
+    def _in_line(self, text: bytes, start: int, end: int) -> list[tuple[int, int]]:
+        """Give the records of a line: one, unless an array has several there."""
+        span = _trimmed(text, start, end)
+        if span is None or not _SEVERAL.search(text, *span):
+            return [span] if span else []
+        found, stop = self._pretty(text[span[0] : span[1]])
+        return [(span[0] + a, span[0] + b) for a, b in found] if stop == span[1] - span[0] else [span]
 
     def _pretty(self, text: bytes) -> tuple[list[tuple[int, int]], int]:
         """Find objects that span lines, by their brackets."""

@@ -155,6 +155,8 @@ class Editor:
             parent, name = request.rename(parent, name)
         elif request.operation.moves:
             parent = request.told
+        if self._has_swapped(name, parent):
+            return
         first = self._first_key()
         keys = ("name", "parent") if holder.shape.kind == POSE else ("name", "frame")
         for key, new, (old, path) in zip(keys, (name, parent), (holder.name, holder.parent), strict=True):
@@ -167,6 +169,18 @@ class Editor:
             else:
                 node = self.root.at(path)
                 self.edits.append(Edit(node.start, node.end, (Const(self._text(new or "").encode()),)))
+
+    def _has_swapped(self, name: str | None, parent: str | None) -> bool:
+        """Call the one frame there is by the other key, where that is all that changes."""
+        old, new = (self.holder.name[0], self.holder.parent[0]), (name, parent)
+        if new != old[::-1] or None not in new or new == old:
+            return False
+        key = "name" if old[1] is None else "parent"
+        if key not in self.node.value:
+            return False
+        node = self.node.value[key][0]
+        self.edits.append(Edit(node.start, node.end, (Const(self._text("parent" if key == "name" else "name").encode()),)))
+        return True
 
     def _text(self, value: str) -> str:
         return self._dumped(value).rstrip("\n")
