@@ -36,7 +36,13 @@ CHOICES = ("point", "vector", "pose")
 @rotation_options
 @pose_options
 @result_options("points")
-@click.option("--frame-column", "frame_column", type=TEXT, metavar="NAME", help="without SOURCE, the column that names each row's frame")
+@click.option(
+    "--frame-column",
+    "frame_column",
+    type=TEXT,
+    metavar="NAME",
+    help="without SOURCE, the column that names each row's frame",
+)
 @stream_options
 def command(
     arguments: tuple[str, ...],

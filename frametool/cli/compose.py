@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,6 +17,13 @@ from frametool.formats.results import Result
 from frametool.geometry import rigid
 from frametool.stream.operation import Operation
 from frametool.stream.request import Request
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.formats.source import Source
+
+    Rename = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
 
 @click.command(cls=Command, name="compose")

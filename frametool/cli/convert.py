@@ -68,7 +68,9 @@ def command(
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
         operation = Operation(right=None if turn is None else (0.0, 0.0, 0.0, *turn))
         forms = output.notations or (notation("quaternion"),)
-        outcome = stream.run(Request(operation, 1, "", one_notation(given), deg, normalize, forms, unwrap=unwrap), output)
+        outcome = stream.run(
+            Request(operation, 1, "", one_notation(given), deg, normalize, forms, unwrap=unwrap), output
+        )
         if isinstance(outcome, int):
             return outcome
         poses = poses_from(outcome, degrees=deg, normalize=normalize)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,6 +14,9 @@ from frametool.formats.pose import inverted
 from frametool.formats.results import Result
 from frametool.stream.operation import Operation
 from frametool.stream.request import Request
+
+if TYPE_CHECKING:
+    from frametool.formats.source import Source
 
 
 @click.command(cls=Command, name="invert")
@@ -31,10 +34,13 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
 
     POSE is a mapping, a file, or - for standard input, also with several poses.
     """
-    stream, source = Stream(options), pose
+    stream = Stream(options)
+    source: str | Source = pose
     output = Output("poses", deg=deg, **options)
     if stream.is_wanted(pose):
-        wishes = Request(Operation(inverse=True), degrees=deg, normalize=normalize, rename=lambda parent, name: (name, parent))
+        wishes = Request(
+            Operation(inverse=True), degrees=deg, normalize=normalize, rename=lambda parent, name: (name, parent)
+        )
         outcome = stream.run(wishes, output)
         if isinstance(outcome, int):
             return outcome

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 @click.command(cls=Command, name="lookup")
 @click.argument("tree", type=TEXT)
-@click.argument("target", type=FRAME, required=False)
-@click.argument("source", type=FRAME, required=False)
+@click.argument("target", type=FRAME, required=False, metavar="TARGET")
+@click.argument("source", type=FRAME, required=False, metavar="SOURCE")
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
 @result_options("poses")
@@ -39,11 +39,11 @@ def command(tree: str, target: str | None, source: str | None, more: Sequence[st
     """
     by_row, stream = RowFrames(options), Stream(options)
     output = Output("poses", **options)
+    if not by_row and (target is None or source is None):
+        raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     frames = load_tree(tree, more)
-    if by_row:
+    if by_row or target is None or source is None:
         return by_row.run(stream, output, frames, target=target, source=source)
-    if target is None or source is None:
-        raise click.UsageError("name TARGET and SOURCE, or the columns that name them: --target-column, --source-column")
     target, source = frame_name(target, frames), frame_name(source, frames)
     output.poses([Result(Pose.of(frames.lookup(target, source).components, source, target))])
     return 0

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 @rotation_options
 @pose_options
 @result_options("poses")
-@click.option("--consecutive", is_flag=True, help="of a stream, each row seen from the row before; the first is the identity")
+@click.option(
+    "--consecutive", is_flag=True, help="of a stream, each row seen from the row before; the first is the identity"
+)
 @stream_options
 def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutive: bool, **options: Any) -> int:
     """Give B seen from A, inverse(A) B, with the distance and the angle between them.
@@ -62,23 +64,23 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
 
 def _wishes(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, normalize: bool) -> Request:
     """Say what a stream's rows are compared with: a fixed A or B, the row before, or the row's own second pose."""
-    reading = {"degrees": degrees, "normalize": normalize}
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
         of = "previous" if consecutive else "pair"
-        return Request(Operation(of=of), poses=1 if consecutive else 2, **reading)
+        return Request(Operation(of=of), poses=1 if consecutive else 2, degrees=degrees, normalize=normalize)
     if a == b == "-":
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     first = a != "-"
-    fixed = one_pose(str(a if first else b), **reading)
+    fixed = one_pose(str(a if first else b), degrees=degrees, normalize=normalize)
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         own = Pose(name=name, parent=parent)
         result = _relative(*((fixed, own) if first else (own, fixed))).pose
         return result.parent, result.name
 
-    return Request(Operation(of="first" if first else "second", fixed=fixed.components), rename=rename, **reading)
+    operation = Operation(of="first" if first else "second", fixed=fixed.components)
+    return Request(operation, rename=rename, degrees=degrees, normalize=normalize)
 
 
 def _relative(a: Pose, b: Pose) -> Result:

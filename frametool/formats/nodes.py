@@ -33,9 +33,11 @@ class Node(NamedTuple):
 
     def at(self, path: tuple[str | int, ...]) -> Node:
         """Give the node further down."""
-        node = self
+        node: Node = self
         for step in path:
-            node = node.value[step] if type(node.value) is list else node.value[step][1]
+            inner: Any = node.value
+            index: Any = step
+            node = inner[index] if type(inner) is list else inner[index][1]
         return node
 
     def leaves(self) -> Iterator[Node]:

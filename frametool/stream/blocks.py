@@ -11,8 +11,8 @@ from frametool.errors import FrametoolError, ValueInvalid
 from frametool.formats.numbers import explain_angle, explain_number, parse_angle
 from frametool.geometry import arrays, rigid
 from frametool.stream.faults import NULL, STOP, Fault
-from frametool.stream.rotations import read_rotations
 from frametool.stream.pieces import Const, Out
+from frametool.stream.rotations import read_rotations
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
 from frametool.stream.shape import IDENTITY, POSE, TURN, pose_of
 from frametool.text.parse import parse_floats
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.stream.pieces import Piece
     from frametool.stream.rows import Block
     from frametool.stream.shape import Shape, Target
-    from frametool.text.arrays import Floats, Ints
+    from frametool.text.arrays import Flags, Floats, Ints
     from frametool.text.spans import Spans
 
 NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
@@ -36,7 +36,8 @@ class Plan(NamedTuple):
 
     shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
     pieces: the text of a result; null: what stands for each number of a row without one
-    edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape; yaml: numbers need a point before the exponent
+    edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
+    yaml: numbers need a point before the exponent
     """
 
     shapes: tuple[Shape, ...]
@@ -111,9 +112,9 @@ class Run:
     def _unit_of(self, column: int) -> bool | None:
         """Tell whether a number is in degrees; None if it is no angle."""
         for shape in self.plan.shapes:
-            if column < shape.count:
+            if column < shape.size:
                 return shape.degrees if column in shape.angles_at else None
-            column -= shape.count
+            column -= shape.size
         return None
 
     def _edges(self, edge_of: Callable[[str], Rigid]) -> Rigid:
@@ -136,16 +137,16 @@ class Run:
         poses: list[Rigid] = []
         first = 0
         for index, shape in enumerate(shapes):
-            numbers = columns[first : first + shape.count]
+            numbers = columns[first : first + shape.size]
             mover = edge if edge is not None else self.plan.edges[index] if self.plan.edges else None
             if shape.kind != POSE:
-                moved.append(operation.point(shape.kind, *shape.position(numbers), mover))
+                moved.append(operation.point(shape.kind, shape.position(numbers), mover))
             else:
                 pose = pose_of(shape.position(numbers), self._rotation(shape, numbers, first))
                 poses.append(rigid.inverse(*pose) if shape.inverse else pose)
                 if len(self.plan.targets) > 1 or operation.of != "pair":
                     moved.append(operation.pose(self._with_previous(poses.pop(), state), mover, arrays))
-            first += shape.count
+            first += shape.size
         if poses or not shapes:
             moved.append(operation.pose(poses or [NOWHERE], edge, arrays))
         return moved
@@ -159,7 +160,7 @@ class Run:
         if shape.notation is None:
             return IDENTITY
         given = [numbers[index] for index in shape.rotation_at]
-        names = self.plan.names[first : first + shape.count]
+        names = self.plan.names[first : first + shape.size]
         if shape.whole:
             self._check_last_row(numbers[12:], names[12])
         found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
@@ -193,7 +194,7 @@ class Run:
                 self._blame(row, "", "the result is not finite: the numbers are too large")
         return results, locked
 
-    def _keep(self, kept: Ints) -> None:
+    def _keep(self, kept: Flags) -> None:
         self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
 
     def first_fault(self) -> int | None:
@@ -220,7 +221,9 @@ class Run:
             return []
         values = None
         if self.results.shape[1]:
-            values = number_spans(self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml)
+            values = number_spans(
+                self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml
+            )
         parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
         return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked))]
 
@@ -228,8 +231,12 @@ class Run:
         if self.plan.on_error != NULL or not self.reasons:
             return []
         rows = np.array(sorted(self.reasons), np.int64)
-        pieces = [Const(piece.between.join([self.plan.null] * (piece.last - piece.first))) if isinstance(piece, Out) else piece
-                  for piece in self.plan.pieces]
+        pieces = [
+            Const(piece.between.join([self.plan.null] * (piece.last - piece.first)))
+            if isinstance(piece, Out)
+            else piece
+            for piece in self.plan.pieces
+        ]
         parts = [chosen(part, rows) for part in self.block.parts]
         return [(self.block.places[rows], assemble(pieces, parts, None, np.zeros(len(rows), np.int64)))]
 
@@ -284,7 +291,7 @@ def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -
         for part, value in zip(earlier, state.previous, strict=True):
             part[: kept[0] + 1] = value
     state.previous = [float(part[kept[-1]]) for part in full]
-    return [tuple(earlier), tuple(full)]  # type: ignore[list-item]
+    return [tuple(earlier), tuple(full)]
 
 
 def _unwrap(results: Floats, angles: Sequence[tuple[int, float]], state: State) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,13 +10,13 @@ import numpy as np
 from frametool.stream.blocks import Plan, Run, State
 from frametool.stream.documents import NULLS, attempt, end_of_record
 from frametool.stream.faults import NULL, STOP, Fault
-from frametool.stream.pieces import Const, In
+from frametool.stream.pieces import In
 from frametool.stream.rows import Block, written
 from frametool.stream.run import Outcome
-from frametool.stream.shape import Target
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
+    import re
     from collections.abc import Sequence
 
     from frametool.stream.documents import Splitter
@@ -69,7 +68,11 @@ class Work:
     def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
         """Learn the kinds of the first records that are left, a few, and cut by them too."""
         for _ in range(MOST_TRIED):
-            spans = [(start, span) for start, end in rest[:1] for span in self.splitter.records(text[start : min(end, start + MOST_LOOKED)])[:1]]
+            spans = [
+                (start, span)
+                for start, end in rest[:1]
+                for span in self.splitter.records(text[start : min(end, start + MOST_LOOKED)])[:1]
+            ]
             if len(rest) > 1 or not spans or not rest or rest[0][1] - rest[0][0] < WORTH_CUTTING:
                 return rest
             start, (begin, stop) = spans[0]
@@ -84,7 +87,11 @@ class Work:
         return rest
 
     def _cut(
-        self, text: bytes, rest: list[tuple[int, int]], kinds: Sequence[Learned], cuts: list[Cut],
+        self,
+        text: bytes,
+        rest: list[tuple[int, int]],
+        kinds: Sequence[Learned],
+        cuts: list[Cut],
     ) -> list[tuple[int, int]]:
         """Cut what is left of a block by the kinds met before; give what is then left."""
         for learned in kinds:
@@ -98,7 +105,12 @@ class Work:
         return rest
 
     def _rest(
-        self, text: bytes, start: int, end: int, odd: list[tuple[int, bytes]], faults: list[tuple[int, Fault]],
+        self,
+        text: bytes,
+        start: int,
+        end: int,
+        odd: list[tuple[int, bytes]],
+        faults: list[tuple[int, Fault]],
         singles: dict[Learned, list[tuple[tuple[int, int], ...]]],
     ) -> None:
         """Take records one by one, learning new kinds; what stands between them passes."""
@@ -139,7 +151,12 @@ class Work:
         return b""
 
     def _outcome(
-        self, text: bytes, data: np.ndarray, cuts: Sequence[Cut], odd: list[tuple[int, bytes]], faults: list[tuple[int, Fault]],
+        self,
+        text: bytes,
+        data: np.ndarray,
+        cuts: Sequence[Cut],
+        odd: list[tuple[int, bytes]],
+        faults: list[tuple[int, Fault]],
     ) -> Outcome:
         """Run every kind's records, and put all of it in order."""
         groups, found, rows, mended = [], list(faults), len(faults), 0
@@ -152,7 +169,10 @@ class Work:
                 runs.append((run, cut))
                 mended += len(run.mended)
                 bad = [int(cut.starts[row, 0]) for row in run.reasons]
-                found += [(int(cut.starts[row, 0]), Fault(run.block.line_of(row), *reason)) for row, reason in run.reasons.items()]
+                found += [
+                    (int(cut.starts[row, 0]), Fault(run.block.line_of(row), *reason))
+                    for row, reason in run.reasons.items()
+                ]
                 doubted += [(run.block.line_of(row), angle) for row, angle in run.doubted[:1]]
                 if self.request.on_error == STOP and bad:
                     end = min(bad) if end is None else min(end, *bad)
@@ -184,10 +204,16 @@ class Work:
     def _plan(self, learned: Learned) -> Plan:
         request = self.request
         pieces = (*learned.pieces, In(len(learned.stretches)))
-        return Plan(
-            learned.shapes, tuple(entry.target for entry in learned.entries), request.operation, pieces, learned.names, b"null", None, request.normalize,
-            request.precision, request.on_error, request.unwrap, self.form == "yaml", tuple(entry.edge for entry in learned.entries),
-        )  # fmt: skip
+        targets = tuple(entry.target for entry in learned.entries)
+        edges = tuple(entry.edge for entry in learned.entries)
+        plan = Plan(learned.shapes, targets, request.operation, pieces, learned.names, b"null", edges=edges)
+        return plan._replace(
+            normalize=request.normalize,
+            precision=request.precision,
+            on_error=request.on_error,
+            unwrap=request.unwrap,
+            yaml=self.form == "yaml",
+        )
 
 
 def _cut_chunk(learned: Learned, chunk: bytes, offset: int) -> tuple[Cut | None, list[tuple[int, int]]]:

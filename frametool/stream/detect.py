@@ -52,7 +52,11 @@ def _by_content(begin: bytes, name: str) -> str:
         return "columns"
     if not begin.strip():
         raise FormatError("nothing in it", source=name or "stdin")
-    raise FormatError(f"cannot tell the form of {line[:60].decode('utf-8', 'replace')!r}; give --in {'|'.join(STREAMS)}", source=name or "stdin", line=1)
+    raise FormatError(
+        f"cannot tell the form of {line[:60].decode('utf-8', 'replace')!r}; give --in {'|'.join(STREAMS)}",
+        source=name or "stdin",
+        line=1,
+    )
 
 
 def _is_table(line: bytes) -> bool:
@@ -64,6 +68,11 @@ def _first_line(begin: bytes) -> bytes:
     """Give the first line that is no comment; a comment with commas or tabs is a header."""
     lines = [line.strip(b"\r") for line in begin.split(b"\n") if line.strip()]
     plain = [line for line in lines if not line.startswith(b"#")]
-    if lines and lines[0].startswith(b"#") and (b"," in lines[0] or b"\t" in lines[0]) and (not plain or b"," in plain[0] or b"\t" in plain[0]):
+    if (
+        lines
+        and lines[0].startswith(b"#")
+        and (b"," in lines[0] or b"\t" in lines[0])
+        and (not plain or b"," in plain[0] or b"\t" in plain[0])
+    ):
         return lines[0]
     return plain[0] if plain else b""

@@ -31,11 +31,13 @@ _NO_DOCUMENT = re.compile(rb"(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|--
 MARK = b"\xef\xbb\xbf"
 
 
-def run_records(stream: Source, form: str, request: Request, *, source: str, jobs: int = 1, size: int = 0) -> Iterator[Outcome]:
+def run_records(
+    stream: Source, form: str, request: Request, *, source: str, jobs: int = 1, size: int = 0
+) -> Iterator[Outcome]:
     """Give the outcomes of a stream of records."""
     options = {"size": size} if size else {}
     splitter = Splitter(form)
-    blocks = read_blocks(stream, whole=splitter.whole, **options)  # type: ignore[arg-type]
+    blocks = read_blocks(stream, whole=splitter.whole, **options)
     first = next(blocks, None)
     if first is None:
         return
@@ -47,7 +49,9 @@ def run_records(stream: Source, form: str, request: Request, *, source: str, job
     from frametool.stream.bulk import Work
 
     work = Work(splitter, form, request, source)
-    yield from mapped(work, _again(first, second, blocks), 1 if request.operation.of == "previous" or request.unwrap else jobs)
+    yield from mapped(
+        work, _again(first, second, blocks), 1 if request.operation.of == "previous" or request.unwrap else jobs
+    )
 
 
 def _again(first: bytes, second: bytes | None, blocks: Iterator[bytes]) -> Iterator[bytes]:
@@ -203,7 +207,9 @@ def end_of_record(text: bytes, end: int, form: str) -> int:
     return following.end() if following else end
 
 
-def attempt(text: bytes, form: str, request: Request, source: str, line: int, use: Callable[..., bytes]) -> bytes | Fault:
+def attempt(
+    text: bytes, form: str, request: Request, source: str, line: int, use: Callable[..., bytes]
+) -> bytes | Fault:
     """Learn from a record and use it, or say what is wrong with it; `line` counts from 0."""
     try:
         record = learn(_decoded(text, source, line), request, json=form == "json", source=source, line=line + 1)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.formats.pose import POSITION_KEYS, Pose
+from frametool.formats.pose import Pose
 from frametool.formats.results import Result, Style
 from frametool.geometry.representations import notation
 from frametool.stream.pieces import Const, IfLocked, Out
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.formats.nodes import Node
-    from frametool.geometry.representations import Notation
     from frametool.stream.holders import Holder
     from frametool.stream.pieces import Piece
     from frametool.stream.request import Request
@@ -48,7 +47,12 @@ def target_of(holder: Holder, request: Request) -> Target:
         forms = (notation("quaternion"),)
     placed = shape.whole or shape.unit is not None or product
     told = [(form, shape.degrees if not request.notations else request.in_degrees(form)) for form in forms]
-    whole = placed and len(forms) == 1 and forms[0].representation.name == "matrix" and (shape.whole or bool(request.notations))
+    whole = (
+        placed
+        and len(forms) == 1
+        and forms[0].representation.name == "matrix"
+        and (shape.whole or bool(request.notations))
+    )
     unit = (shape.unit or 1.0) if placed and not whole else None
     return Target(unit, tuple(told), request.keep_sign, whole)
 
@@ -56,7 +60,9 @@ def target_of(holder: Holder, request: Request) -> Target:
 class Editor:
     """The edits of one holder in a record; `first` numbers the results from there."""
 
-    def __init__(self, text: str, root: Node, holder: Holder, target: Target, request: Request, *, json: bool, first: int) -> None:
+    def __init__(
+        self, text: str, root: Node, holder: Holder, target: Target, request: Request, *, json: bool, first: int
+    ) -> None:
         """Know the text and what is wanted."""
         self.text = text
         self.root = root
@@ -94,7 +100,9 @@ class Editor:
             node = self.slots[slot]
             if node is not None:
                 out = self.first + first + index
-                self.edits.append(Edit(node.start + bool(node.quote), node.end - bool(node.quote), (Out(out, out + 1, b""),)))
+                self.edits.append(
+                    Edit(node.start + bool(node.quote), node.end - bool(node.quote), (Out(out, out + 1, b""),))
+                )
         return self.edits
 
     def _position(self) -> None:
@@ -123,7 +131,9 @@ class Editor:
             members = []
         elif rotation:
             self._replace(self.node.value[rotation], members.pop(0) if members else ())
-        count = first + sum(len(form.representation.columns) for form, _ in self.target.notations) + self.target.whole * 7
+        count = (
+            first + sum(len(form.representation.columns) for form, _ in self.target.notations) + self.target.whole * 7
+        )
         members += self._extras(count)
         after = self.node.value[rotation or self.holder.key][1] if (rotation or self.holder.key) else self._last_value()
         for member in members:
@@ -141,7 +151,11 @@ class Editor:
             members.append(self._member(entry, first))
             first += len(form.representation.columns)
         if any(axes_of(form) for form, _ in self.target.notations):
-            members.append(tuple(IfLocked(piece.text) for piece in self._member({"gimbal_lock": True}, 0) if isinstance(piece, Const)))
+            members.append(
+                tuple(
+                    IfLocked(piece.text) for piece in self._member({"gimbal_lock": True}, 0) if isinstance(piece, Const)
+                )
+            )
         return members
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
@@ -179,7 +193,9 @@ class Editor:
         if key not in self.node.value:
             return False
         node = self.node.value[key][0]
-        self.edits.append(Edit(node.start, node.end, (Const(self._text("parent" if key == "name" else "name").encode()),)))
+        self.edits.append(
+            Edit(node.start, node.end, (Const(self._text("parent" if key == "name" else "name").encode()),))
+        )
         return True
 
     def _text(self, value: str) -> str:
@@ -200,7 +216,9 @@ class Editor:
     def _member(self, entry: dict[str, Any], first: int) -> tuple[Piece, ...]:
         """Write members in the record's style, each number a piece."""
         if self.json:
-            text = ", ".join(f"{self._text(key)}: {'true' if value is True else self._dumped(value)}" for key, value in entry.items())
+            text = ", ".join(
+                f"{self._text(key)}: {'true' if value is True else self._dumped(value)}" for key, value in entry.items()
+            )
         elif self.node.flow:
             text = ", ".join(f"{self._text(key)}: {_flow(value, self._text)}" for key, value in entry.items())
         else:

@@ -69,8 +69,10 @@ def find_positions(names: Sequence[str]) -> list[Columns]:
 def find_quaternions(names: Sequence[str], *, bare: bool = False) -> list[Columns]:
     """Give quaternions written x y z w under a common prefix or suffix; without either only if `bare`."""
     form = notation("quaternion")
-    matches = _matches("x y z w".split(), names)
-    return [_columns(*match[:1], names, *match[1:])._replace(form=form) for match in matches if bare or match[1] or match[2]]
+    matches = _matches(["x", "y", "z", "w"], names)
+    return [
+        _columns(*match[:1], names, *match[1:])._replace(form=form) for match in matches if bare or match[1] or match[2]
+    ]
 
 
 def find_rotations(names: Sequence[str], given: Notation | None) -> list[Columns]:
@@ -80,8 +82,10 @@ def find_rotations(names: Sequence[str], given: Notation | None) -> list[Columns
     if "quaternion" in searched:
         found += find_quaternions(names, bare=given is not None)
     if "matrix" in searched:
-        found += [_columns(places, names, prefix, suffix)._replace(form=notation("matrix"), whole=True, unit=1.0)
-                  for places, prefix, suffix in _matches(WHOLE, names)]
+        found += [
+            _columns(places, names, prefix, suffix)._replace(form=notation("matrix"), whole=True, unit=1.0)
+            for places, prefix, suffix in _matches(WHOLE, names)
+        ]
     return found
 
 
@@ -126,20 +130,26 @@ def _columns(places: Sequence[int], names: Sequence[str], prefix: str = "", suff
 
 
 def find_poses(names: Sequence[str], given: Notation | None, count: int, source: str) -> list[Pose]:
-    """Find so many points or poses; raises FormatError that lists the candidates where there are more, or the columns."""
+    """Find so many points or poses; raises FormatError that lists the candidates, or the columns there are."""
     positions, rotations = find_positions(names), find_rotations(names, given)
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
         whole = rotations and rotations[0].whole
         pose = Pose(None if whole or not positions else positions[0], rotations[0] if rotations else None)
         if pose == (None, None):
-            raise FormatError(f"no columns of a point or pose among: {', '.join(names)}; name them with --columns", source=source, line=1)
+            raise FormatError(
+                f"no columns of a point or pose among: {', '.join(names)}; name them with --columns",
+                source=source,
+                line=1,
+            )
         return [pose]
     poses = _paired(positions, rotations)
     if len(poses) == count:
         return poses
     wanted = "one pose" if count == 1 else "two poses"
     candidates = "; ".join(each.shown for each in (*positions, *rotations)) or f"none among {', '.join(names)}"
-    raise FormatError(f"columns of {wanted} are wanted, found {candidates}; choose with --columns", source=source, line=1)
+    raise FormatError(
+        f"columns of {wanted} are wanted, found {candidates}; choose with --columns", source=source, line=1
+    )
 
 
 def _paired(positions: Sequence[Columns], rotations: Sequence[Columns]) -> list[Pose]:
@@ -196,7 +206,9 @@ def _form_of(places: Sequence[int], shown: Sequence[str], given: Notation | None
         size = len(given.representation.columns)
         if len(places) in (size, size + 3):
             return given, size
-        raise FormatError(f"--columns: {given.spec} takes {size} columns, or {size + 3} with x y z before them; found {len(places)}")
+        raise FormatError(
+            f"--columns: {given.spec} takes {size} columns, or {size + 3} with x y z before them; found {len(places)}"
+        )
     if len(places) == 7:
         return notation("xyzw"), 4
     raise FormatError(f"--columns: {len(places)} columns do not say what they are; add --from REP")

@@ -1,6 +1,6 @@
 """Find the points and poses inside a document: the mappings that hold a position or a rotation, however deep.
 
-    {"stamp": 1, "pose": {"position": {"x": ..}, "orientation": {"x": ..}}}     the holder is the value of `pose`
+{"stamp": 1, "pose": {"position": {"x": ..}, "orientation": {"x": ..}}}     the holder is the value of `pose`
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import did_you_mean
-from frametool.formats.pose import POSE_KEYS, read_angle_unit, read_name, read_position
 from frametool.formats.points import POINT_KEYS
+from frametool.formats.pose import POSE_KEYS, read_angle_unit, read_name, read_position
 from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS, read_rotation, shape_of
 from frametool.formats.values import INDICES, Misfit, Reading, kind, read_numbers, within
 from frametool.stream.shape import POINT, POSE, VECTOR, Shape
@@ -48,7 +48,10 @@ def find_holders(value: Any, request: Request, reading: Reading, path: Path = ()
     found = list(_search(value, (), ()))
     if not found:
         keys = f"the keys {', '.join(map(repr, value))}" if type(value) is dict else kind(value)
-        raise Misfit(f"expected a point like {{point: [x, y, z]}} or a pose like {{xyz: [..], rpy_deg: [..]}}, found {keys}", path)
+        raise Misfit(
+            f"expected a point like {{point: [x, y, z]}} or a pose like {{xyz: [..], rpy_deg: [..]}}, found {keys}",
+            path,
+        )
     for inner, outer in found:
         yield _holder(value, inner, outer, request, reading)
 
@@ -73,7 +76,11 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[P
 
 
 def _holds(key: str, value: Any) -> bool:
-    return (_is_rotation(key, value) or key in POINT_KEYS) and value is not None and not (key == "point" and type(value) is str)
+    return (
+        (_is_rotation(key, value) or key in POINT_KEYS)
+        and value is not None
+        and not (key == "point" and type(value) is str)
+    )
 
 
 def _is_rotation(key: str, value: Any) -> bool:
@@ -95,12 +102,21 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
     if type(value[0]) is list:
         return _with_rotation(value, "matrix", Holder(path, Shape(POSE, None), (), ()), (), reading, request)
     if len(value) != 3:
-        raise Misfit(f"a bare list of {len(value)} numbers does not say what it is; write {{rpy_deg: [..]}}, {{xyzw: [..]}}, ..")
-    return Holder(path, Shape(request.kind or POINT), tuple((*path, *each) for each in INDICES[:3]), read_position(value, 1.0))
+        raise Misfit(
+            f"a bare list of {len(value)} numbers does not say what it is; write {{rpy_deg: [..]}}, {{xyzw: [..]}}, .."
+        )
+    return Holder(
+        path, Shape(request.kind or POINT), tuple((*path, *each) for each in INDICES[:3]), read_position(value, 1.0)
+    )
 
 
 def _mapping(
-    document: Any, value: dict[str, Any], path: Path, outer: tuple[Path, ...], request: Request, reading: Reading,
+    document: Any,
+    value: dict[str, Any],
+    path: Path,
+    outer: tuple[Path, ...],
+    request: Request,
+    reading: Reading,
 ) -> Holder:
     positions = [key for key in value if key in POINT_KEYS]
     rotations = [key for key, each in value.items() if _is_rotation(key, each)]
@@ -126,7 +142,9 @@ def _mapping(
 def _refuse_typos(value: dict[str, Any], rotations: list[str]) -> None:
     """Stop at a key that is nearly a rotation's, where no other says the rotation."""
     for key in value:
-        near = "" if rotations or key in POSE_KEYS or key in POINT_KEYS else did_you_mean(key, ROTATION_KEYS, cutoff=0.75)
+        near = (
+            "" if rotations or key in POSE_KEYS or key in POINT_KEYS else did_you_mean(key, ROTATION_KEYS, cutoff=0.75)
+        )
         if near:
             raise Misfit(f"unknown key {key!r}{near}", (key,), key=True)
 
@@ -182,9 +200,14 @@ def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
 
 
 def _names(
-    document: Any, value: dict[str, Any], path: Path, outer: tuple[Path, ...], *, pose: bool,
+    document: Any,
+    value: dict[str, Any],
+    path: Path,
+    outer: tuple[Path, ...],
+    *,
+    pose: bool,
 ) -> tuple[tuple[str | None, Path], tuple[str | None, Path]]:
-    """Give the names of the frame posed and of the frame it is given in: the holder's own, or the message's around it."""
+    """Give the names of the frame posed and of the one it is given in: the holder's own, or the message's around it."""
     own = (read_name(value, "name"), (*path, "name"))
     given = (read_name(value, "parent"), (*path, "parent")) if pose else (read_name(value, "frame"), (*path, "frame"))
     for around in (path, *reversed(outer)):
@@ -192,7 +215,12 @@ def _names(
         header = message.get("header") if type(message) is dict else None
         if given[0] is None and type(header) is dict and type(header.get("frame_id")) is str and header["frame_id"]:
             given = header["frame_id"], (*around, "header", "frame_id")
-        if own[0] is None and type(message) is dict and type(message.get("child_frame_id")) is str and message["child_frame_id"]:
+        if (
+            own[0] is None
+            and type(message) is dict
+            and type(message.get("child_frame_id")) is str
+            and message["child_frame_id"]
+        ):
             own = message["child_frame_id"], (*around, "child_frame_id")
     return own, given
 

@@ -24,7 +24,7 @@ class Kept(NamedTuple):
 class New(NamedTuple):
     """A number of the result, under its name."""
 
-    index: int
+    number: int
     name: str
 
 
@@ -55,13 +55,18 @@ class Layout(NamedTuple):
 
     def header(self, raw: Sequence[bytes]) -> bytes:
         """Give the output's header, the kept names as they were written."""
-        cells = [quoted(column.name, self.delimiter) if isinstance(column, New) else raw[column.place] for column in self.columns]
+        cells = [
+            quoted(column.name, self.delimiter) if isinstance(column, New) else raw[column.place]
+            for column in self.columns
+        ]
         return (self.delimiter or b" ").join(cells)
 
     def null_row(self, cells: Sequence[bytes]) -> bytes:
         """Give a row without a result, as far as its cells go."""
         padded = [*cells, *[self.null] * len(self.columns)]
-        given = [padded[column.place] if isinstance(column, Kept) else _told(column, self.null) for column in self.columns]
+        given = [
+            padded[column.place] if isinstance(column, Kept) else _told(column, self.null) for column in self.columns
+        ]
         most = max((column.place for column in self.columns if not isinstance(column, New)), default=-1)
         return (self.delimiter or b" ").join([*given, *cells[max(most + 1, max(self.places, default=-1) + 1) :]])
 
@@ -78,7 +83,9 @@ def quoted(name: str, delimiter: bytes) -> bytes:
     return text
 
 
-def lay_out(columns: Sequence[Column], places: Sequence[int], frames: Sequence[int], width: int, delimiter: bytes) -> Layout:
+def lay_out(
+    columns: Sequence[Column], places: Sequence[int], frames: Sequence[int], width: int, delimiter: bytes
+) -> Layout:
     """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch."""
     between = delimiter or b" "
     pieces: list[Piece] = []
@@ -90,7 +97,9 @@ def lay_out(columns: Sequence[Column], places: Sequence[int], frames: Sequence[i
             begin, end = group[0].place, group[-1].place  # type: ignore[union-attr]
             follows = not last and not isinstance(groups[at + 1][0], Kept)
             ending = "line" if last and end == width - 1 else "gap" if follows and end < width - 1 else "cell"
-            stretches.append((begin, end, "line" if not at and not begin else "gap" if at and begin else "cell", ending))
+            stretches.append(
+                (begin, end, "line" if not at and not begin else "gap" if at and begin else "cell", ending)
+            )
             pieces.append(In(len(stretches) - 1))
             if follows and end == width - 1:
                 pieces.append(Const(between))
@@ -101,13 +110,21 @@ def lay_out(columns: Sequence[Column], places: Sequence[int], frames: Sequence[i
     if not stretches or stretches[-1][3] != "line":
         stretches.append((width - 1, width - 1, "end", "line"))
         pieces.append(In(len(stretches) - 1))
-    return Layout(tuple(columns), tuple(places), tuple(frames), tuple(pieces), tuple(stretches), delimiter, b"" if delimiter else b"nan")
+    return Layout(
+        tuple(columns),
+        tuple(places),
+        tuple(frames),
+        tuple(pieces),
+        tuple(stretches),
+        delimiter,
+        b"" if delimiter else b"nan",
+    )
 
 
 def _written(group: Sequence[Column], between: bytes, delimiter: bytes) -> list[Piece]:
     if isinstance(group[0], Told):
         return [Const(quoted(group[0].text, delimiter))]
-    first, last = group[0].index, group[-1].index  # type: ignore[union-attr]
+    first, last = group[0].number, group[-1].number  # type: ignore[union-attr]
     return [Out(first, last + 1, between)]
 
 
@@ -117,7 +134,7 @@ def _grouped(columns: Sequence[Column]) -> list[list[Column]]:
     for column in columns:
         before = groups[-1][-1] if groups else None
         if (isinstance(column, Kept) and isinstance(before, Kept) and column.place == before.place + 1) or (
-            isinstance(column, New) and isinstance(before, New) and column.index == before.index + 1
+            isinstance(column, New) and isinstance(before, New) and column.number == before.number + 1
         ):
             groups[-1].append(column)
         else:

@@ -37,9 +37,11 @@ JSON_TEXT = r'"[^"\\\x00-\x1f]*(?:\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4})[^"\\\x00-\x1
 # what may stand for a scalar that passes, by its quotes: never anything that could be read as more than one scalar
 YAML_PLAIN = r"(?:-(?! )|[A-Za-z0-9_./+])(?:[\w./+-]| (?=[\w./+(-])|:(?=[\w/]))*"
 FREE = {
-    (True, True): JSON_TEXT, (True, False): r"(?:-?(?!0[0-9])[0-9]++(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+|true|false|null)",
-    (False, True): r'"[^"\\\x00-\x1f]*"', (False, False): YAML_PLAIN,
-}  # fmt: skip
+    (True, True): JSON_TEXT,
+    (True, False): r"(?:-?(?!0[0-9])[0-9]++(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+|true|false|null)",
+    (False, True): r'"[^"\\\x00-\x1f]*"',
+    (False, False): YAML_PLAIN,
+}
 SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 
 
@@ -57,14 +59,17 @@ class Learned:
     segments: the stretches of its text; numbers: those that hold our numbers, in order; pieces: of the result
     """
 
-    def __init__(self, text: str, entries: Sequence[Entry], nodes: Sequence[Node], edits: Sequence[Edit], *, json: bool) -> None:
+    def __init__(
+        self, text: str, entries: Sequence[Entry], nodes: Sequence[Node], edits: Sequence[Edit], *, json: bool
+    ) -> None:
         """Cut the text where numbers and edits are."""
         self.text = text
         self.entries = tuple(entries)
         self.json = json
         self._nodes = nodes
         slots = _slots(entries, nodes)
-        self.regular = None not in slots and all(re.fullmatch(JSON_NUMBER if json else YAML_NUMBER, text[a:b]) for a, b in slots if slots)  # type: ignore[misc]
+        number = re.compile(JSON_NUMBER if json else YAML_NUMBER)
+        self.regular = all(slot is not None and number.fullmatch(text, *slot) for slot in slots)
         self.values = tuple(value for entry in entries for value in entry.holder.values)
         self.stretches, self.pieces = _cut(text, sorted({slot for slot in slots if slot is not None}), edits)
         self.numbers = tuple(self.stretches.index(slot) for slot in slots if slot is not None)
@@ -117,7 +122,11 @@ class Learned:
         parts, at = [], start
         for leaf in free:
             pattern = self._pattern(leaf)
-            if leaf.start < at or leaf.end > end or not re.fullmatch(pattern, self.text[leaf.start : leaf.end], re.ASCII):
+            if (
+                leaf.start < at
+                or leaf.end > end
+                or not re.fullmatch(pattern, self.text[leaf.start : leaf.end], re.ASCII)
+            ):
                 continue
             parts += [re.escape(self.text[at : leaf.start]), pattern]
             at = leaf.end
@@ -143,7 +152,13 @@ def _node(nodes: Sequence[Node], path: tuple[str | int, ...]) -> Node:
 
 def _fixed_places(entries: Sequence[Entry], nodes: Sequence[Node]) -> set[tuple[int, int]]:
     """Give the places of scalars that must be the same: our numbers, names of frames, what says units and axes."""
-    fixed = {(node.start, node.end) for entry in entries for path in entry.holder.numbers if path is not None for node in (_node(nodes, path),)}
+    fixed = {
+        (node.start, node.end)
+        for entry in entries
+        for path in entry.holder.numbers
+        if path is not None
+        for node in (_node(nodes, path),)
+    }
     for entry in entries:
         holder = entry.holder
         for _, path in (holder.name, holder.parent):
@@ -160,7 +175,9 @@ def _fixed_places(entries: Sequence[Entry], nodes: Sequence[Node]) -> set[tuple[
     return fixed
 
 
-def _cut(text: str, slots: Sequence[tuple[int, int]], edits: Sequence[Edit]) -> tuple[list[tuple[int, int]], list[Piece]]:
+def _cut(
+    text: str, slots: Sequence[tuple[int, int]], edits: Sequence[Edit]
+) -> tuple[list[tuple[int, int]], list[Piece]]:
     """Cut the text into stretches, each number one of its own; give them with the pieces of the result."""
     stretches: list[tuple[int, int]] = []
     pieces: list[Piece] = []
@@ -176,7 +193,13 @@ def _cut(text: str, slots: Sequence[tuple[int, int]], edits: Sequence[Edit]) -> 
 
 
 def _pass(
-    stretches: list[tuple[int, int]], pieces: list[Piece], slots: Sequence[tuple[int, int]], start: int, end: int, *, shown: bool,
+    stretches: list[tuple[int, int]],
+    pieces: list[Piece],
+    slots: Sequence[tuple[int, int]],
+    start: int,
+    end: int,
+    *,
+    shown: bool,
 ) -> None:
     """Add the stretches from start to end, numbers singly; they are pieces of the result if they are shown."""
     for slot in slots:
@@ -254,7 +277,7 @@ def _edits(text: str, entries: Sequence[Entry], nodes: Sequence[Node], request: 
         index = int(entry.holder.path[0])
         holder = _above_document(entry.holder)
         edits += Editor(text, nodes[index], holder, entry.target, request, json=json, first=first).run()
-        first += entry.target.count + len(request.operation.extras) * (entry.holder.shape.kind == "pose")
+        first += entry.target.size + len(request.operation.extras) * (entry.holder.shape.kind == "pose")
     return edits
 
 

@@ -43,11 +43,12 @@ class Operation(NamedTuple):
         """Tell whether rows only change their notation."""
         return self.left is self.right is None and not self.inverse and not self.of
 
-    def point(self, kind: str, x: object, y: object, z: object, edge: Rigid | None) -> Components:
+    def point(self, kind: str, position: Components, edge: Rigid | None) -> Components:
         """Move a point or a vector by `edge`, else by `left`."""
         mover = edge or self.left
         if mover is None:
-            return x, y, z
+            return position
+        x, y, z = position
         return quaternion.rotate(*mover[3:], x, y, z) if kind == VECTOR else rigid.apply(*mover, x, y, z)
 
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:

@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 class In(NamedTuple):
     """A stretch of the input, by its index among the spans a format found."""
 
-    index: int
+    part: int
 
 
 class Out(NamedTuple):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.kinds import Array, Components
     from frametool.geometry.representations import Notation
+    from frametool.text.arrays import Ints
 
 QUATERNIONS = frozenset(("quaternion", "xyzw", "wxyz"))
 LARGEST = 1e150  # numbers beyond, whose squares overflow, are looked at singly
@@ -30,7 +31,7 @@ class Rotations(NamedTuple):
 
     quaternions: Components
     reasons: dict[int, str]
-    mended: Array
+    mended: Ints
 
 
 def read_rotations(form: Notation, numbers: Sequence[Array], *, degrees: bool, normalize: bool) -> Rotations:
@@ -48,14 +49,15 @@ def read_rotations(form: Notation, numbers: Sequence[Array], *, degrees: bool, n
     return _settle_singly(form, numbers, Rotations(parts, {}, mended), doubtful, degrees=degrees, normalize=normalize)
 
 
-def _unit(parts: Components) -> tuple[Components, Array, Array]:
+def _unit(parts: Components) -> tuple[Components, Ints, Ints]:
     """Normalise rows near norm 1; give also the rows that are not, and those that were off beyond silence."""
-    squared = quaternion.squared_norm(*parts)
+    x, y, z, w = parts
+    squared = quaternion.squared_norm(x, y, z, w)
     none = np.zeros(0, np.int64)
     if arrays.largest(squared - 1.0) <= quaternion.UNIT:
         return parts, none, none
     off = abs(np.sqrt(squared) - 1.0)
-    unit = quaternion.unit(*parts, arrays)
+    unit = quaternion.unit(x, y, z, w, arrays)
     if off.max(initial=0.0) <= quaternion.SILENT:
         return unit, none, none
     doubtful = np.flatnonzero(~(off <= quaternion.TOLERATED))
@@ -63,20 +65,28 @@ def _unit(parts: Components) -> tuple[Components, Array, Array]:
     return unit, doubtful, mended
 
 
-def _orthonormal(entries: Components) -> tuple[Components, Array, Array]:
+def _orthonormal(entries: Components) -> tuple[Components, Ints, Ints]:
     """Convert matrices that are rotations to 1e-6; the others are doubtful."""
-    off = matrix.defect(*entries, arrays)
-    good = (off <= quaternion.SILENT) & (matrix.determinant(*entries) > 0.0)
+    a, b, c, d, e, f, g, h, i = entries
+    off = matrix.defect(a, b, c, d, e, f, g, h, i, arrays)
+    good = (off <= quaternion.SILENT) & (matrix.determinant(a, b, c, d, e, f, g, h, i) > 0.0)
     rough = np.flatnonzero(good & (off > matrix.ORTHONORMAL))
     if rough.size:
-        nearest = matrix.nearest(*matrix.scaled(*(entry[rough] for entry in entries), arrays), arrays)
-        entries = tuple(entry.copy() for entry in entries)
-        for column, values in zip(entries, nearest, strict=True):
-            column[rough] = values
-    return matrix.to_quaternion(*entries, arrays), np.flatnonzero(~good), np.zeros(0, np.int64)
+        _project(rough, columns := [np.array(entry) for entry in entries])
+        a, b, c, d, e, f, g, h, i = columns
+    return matrix.to_quaternion(a, b, c, d, e, f, g, h, i, arrays), np.flatnonzero(~good), np.zeros(0, np.int64)
 
 
-def _converted(form: Notation, numbers: Components, *, degrees: bool) -> tuple[Components, Array]:
+def _project(rows: Ints, columns: list[Array]) -> None:
+    """Replace some rows of matrices, in place, by their nearest rotations."""
+    a, b, c, d, e, f, g, h, i = (column[rows] for column in columns)
+    a, b, c, d, e, f, g, h, i = matrix.scaled(a, b, c, d, e, f, g, h, i, arrays)
+    nearest = matrix.nearest(a, b, c, d, e, f, g, h, i, arrays)
+    for column, values in zip(columns, nearest, strict=True):
+        column[rows] = values
+
+
+def _converted(form: Notation, numbers: Components, *, degrees: bool) -> tuple[Components, Ints]:
     """Convert by the notation's own kernel; rows without a finite result are doubtful, and those with huge numbers."""
     parts = form.to_quaternion(numbers, arrays, degrees=degrees)
     if form.representation.name in ALWAYS_SINGLE:
@@ -88,7 +98,13 @@ def _converted(form: Notation, numbers: Components, *, degrees: bool) -> tuple[C
 
 
 def _settle_singly(
-    form: Notation, numbers: Sequence[Array], found: Rotations, doubtful: Array, *, degrees: bool, normalize: bool,
+    form: Notation,
+    numbers: Sequence[Array],
+    found: Rotations,
+    doubtful: Ints,
+    *,
+    degrees: bool,
+    normalize: bool,
 ) -> Rotations:
     """Put doubtful rows to the rule for one rotation."""
     parts = tuple(np.array(part) for part in found.quaternions)

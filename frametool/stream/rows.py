@@ -63,7 +63,9 @@ def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
     odd = np.flatnonzero(((size < 1e-4) & (size > 0.0)) | (size >= 1e16))
     if not odd.size:
         return spans
-    texts = [repr(value) if "." in repr(value) else repr(value).replace("e", ".0e") for value in values.ravel()[odd].tolist()]
+    texts = [
+        repr(value) if "." in repr(value) else repr(value).replace("e", ".0e") for value in values.ravel()[odd].tolist()
+    ]
     after = [chr(separators[place % len(separators)]) for place in odd.tolist()]
     _, (added,) = texts_as_rows([(0, f"{text}{end}".encode()) for text, end in zip(texts, after, strict=True)])
     starts, ends = spans.starts.copy(), spans.ends.copy()
@@ -88,7 +90,7 @@ def assemble(pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | No
 
 def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, locked: Ints) -> Spans:
     if isinstance(piece, In):
-        return parts[piece.index]
+        return parts[piece.part]
     if isinstance(piece, Out) and values is not None:
         ends = values.ends[:, piece.first : piece.last].copy()
         ends[:, -1] -= 1

@@ -26,7 +26,9 @@ class Outcome(NamedTuple):
     size: int = 0
 
 
-def run(outcomes: Iterable[Outcome], write: Callable[[bytes], None], policy: Policy, advance: Callable[[int, int], None]) -> int:
+def run(
+    outcomes: Iterable[Outcome], write: Callable[[bytes], None], policy: Policy, advance: Callable[[int, int], None]
+) -> int:
     """Write what becomes of each block, tell of its faults, and give the exit status.
 
     advance: is told rows and bytes done after each block.  Raises Stopped at the first fault if that is the rule.
@@ -47,7 +49,8 @@ def run(outcomes: Iterable[Outcome], write: Callable[[bytes], None], policy: Pol
 
 
 def _wonder(source: str, line: int, doubted: tuple[int, str]) -> None:
-    warn(f"{source}:{line + doubted[0]}: {doubted[1]} is more than a full turn in radians; degrees? give --deg, or name the columns _deg")
+    remedy = "degrees? give --deg, or name the columns _deg"
+    warn(f"{source}:{line + doubted[0]}: {doubted[1]} is more than a full turn in radians; {remedy}")
 
 
 def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:

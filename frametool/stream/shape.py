@@ -37,7 +37,7 @@ class Shape(NamedTuple):
     inverse: bool = False
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """Count the numbers of a row."""
         rotation = len(self.notation.representation.columns) if self.notation else 0
         return 16 if self.whole else rotation + (self.unit is not None) * 3
@@ -47,7 +47,7 @@ class Shape(NamedTuple):
         """Give the indices of the rotation's numbers."""
         if self.whole:
             return (0, 1, 2, 4, 5, 6, 8, 9, 10)
-        return tuple(range(0 if self.unit is None else 3, self.count))
+        return tuple(range(0 if self.unit is None else 3, self.size))
 
     @property
     def angles_at(self) -> tuple[int, ...]:
@@ -91,14 +91,14 @@ class Target(NamedTuple):
         return _homogeneous(turned, parts[:3]) if self.whole else position + turned
 
     def _rotation(self, parts: Components, form: Notation, degrees: bool, xp: Namespace) -> Components:  # noqa: FBT001
-        x, y, z, w = quaternion.unit(*parts[3:7], xp)
+        x, y, z, w = parts[3:7]
+        x, y, z, w = quaternion.unit(x, y, z, w, xp)
         if self.keep_sign and form.representation.name in KEPT:
             return KEPT[form.representation.name](x, y, z, w)
         return form.from_quaternion(x, y, z, w, xp, degrees=degrees)
 
-
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """Count the numbers of a result."""
         if self.whole:
             return 16
@@ -115,7 +115,10 @@ class Target(NamedTuple):
     def locked(self, parts: Components) -> Any:
         """Tell whether Euler angles among the notations are not unique; None where there are none."""
         axes = next((axes for form, _ in self.notations if (axes := axes_of(form))), None)
-        return None if axes is None or len(parts) == 3 else euler.locked(*parts[3:7], axes)
+        if axes is None or len(parts) == 3:
+            return None
+        x, y, z, w = parts[3:7]
+        return euler.locked(x, y, z, w, axes)
 
 
 def _homogeneous(rows: Sequence[Any], position: Components) -> list[Any]:
@@ -127,4 +130,5 @@ def _homogeneous(rows: Sequence[Any], position: Components) -> list[Any]:
 def pose_of(position: Components, rotation: Components) -> Rigid:
     """Join position and quaternion."""
     x, y, z = position
-    return (x, y, z, *rotation)  # type: ignore[return-value]
+    qx, qy, qz, qw = rotation
+    return x, y, z, qx, qy, qz, qw

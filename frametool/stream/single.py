@@ -39,7 +39,7 @@ def result_of(record: Learned, request: Request) -> str:
 def _moved(entry: Entry, values: Sequence[float], request: Request) -> Components:
     shape = entry.holder.shape
     if shape.kind != POSE:
-        return request.operation.point(shape.kind, *shape.position(values), entry.edge)
+        return request.operation.point(shape.kind, shape.position(values), entry.edge)
     rotation: Components = IDENTITY
     if shape.notation is not None:
         given = shape.rotation(values)
@@ -67,7 +67,7 @@ def _text(record: Learned, numbers: Sequence[str], *, locked: bool) -> str:
     text = ""
     for piece in record.pieces:
         if isinstance(piece, In):
-            text += segments[piece.index]
+            text += segments[piece.part]
         elif isinstance(piece, Out):
             text += numbers[piece.first]
         elif isinstance(piece, Const) or locked:

@@ -28,7 +28,7 @@ class Sink:
         if not force and os.path.lexists(str(self.path)):
             raise FileProblem(f"{self.path}: exists; give --force to replace it")
         try:
-            return open(self._part, "xb")  # noqa: PTH123, SIM115 - closed in __exit__
+            return open(self._part, "xb")  # noqa: PTH123 - closed in __exit__
         except OSError as error:
             raise self._problem(error) from None
 
@@ -60,7 +60,9 @@ class Sink:
             raise KeyboardInterrupt
         self._interrupted = True
 
-    def __exit__(self, kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
+    ) -> None:
         """Put the file in its place if all went well, else leave nothing."""
         signal.signal(signal.SIGINT, self._before)
         if not self.path:

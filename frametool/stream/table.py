@@ -1,7 +1,7 @@
 """Tables as streams: CSV and TSV with a header, and columns between blanks; every byte that is not ours passes.
 
-    id,x,y,z,tag                            1305031102.1758 1.34 0.62 1.65 0.657 0.612 -0.295 -0.311
-    007,1.0,2.0,3.0,"a,b"                   (TUM: t x y z qx qy qz qw; s, m; the pose of the body in the world)
+id,x,y,z,tag                            1305031102.1758 1.34 0.62 1.65 0.657 0.612 -0.295 -0.311
+007,1.0,2.0,3.0,"a,b"                   (TUM: t x y z qx qy qz qw; s, m; the pose of the body in the world)
 """
 
 from __future__ import annotations
@@ -123,7 +123,9 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
     """Find the rows of a block, their numbers, and the stretches of text that pass."""
     cells = table.split(text)
     places = list(layout.places)
-    numbers = Spans(cells.data, np.ascontiguousarray(cells.starts[:, places]), np.ascontiguousarray(cells.ends[:, places]))
+    numbers = Spans(
+        cells.data, np.ascontiguousarray(cells.starts[:, places]), np.ascontiguousarray(cells.ends[:, places])
+    )
     if b'"' in text and places:
         numbers = without_quotes(numbers)
     parts = [_stretch(cells, *stretch) for stretch in layout.stretches]
@@ -144,10 +146,17 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
 
 def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans:
     """Give the span from one cell to another in every row, with what stands before or after as told."""
-    starts = {"cell": lambda: cells.starts[:, first], "line": lambda: cells.line_starts[cells.rows],
-              "gap": lambda: cells.ends[:, first - 1], "end": lambda: cells.ends[:, first]}[begin]()
-    ends = {"cell": lambda: cells.ends[:, last], "line": lambda: cells.line_ends[cells.rows],
-            "gap": lambda: cells.starts[:, last + 1]}[end]()
+    starts = {
+        "cell": lambda: cells.starts[:, first],
+        "line": lambda: cells.line_starts[cells.rows],
+        "gap": lambda: cells.ends[:, first - 1],
+        "end": lambda: cells.ends[:, first],
+    }[begin]()
+    ends = {
+        "cell": lambda: cells.ends[:, last],
+        "line": lambda: cells.line_ends[cells.rows],
+        "gap": lambda: cells.starts[:, last + 1],
+    }[end]()
     return Spans(cells.data, starts, ends)
 
 

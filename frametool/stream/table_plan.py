@@ -55,7 +55,9 @@ def _find(table: Table, request: Request, source: str) -> list[Pose]:
         return find_poses(table.names, request.given, request.poses, source)
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
         return [named_pose(spec, None, table.width, request.given)]
-    raise FormatError(f"{table.width} columns without names do not say what they are; give --columns", source=source, line=1)
+    raise FormatError(
+        f"{table.width} columns without names do not say what they are; give --columns", source=source, line=1
+    )
 
 
 def _by_width(width: int, given: Notation | None) -> str:
@@ -70,7 +72,11 @@ def _without_position(pose: Pose, request: Request, table: Table, source: str) -
     """Leave the position to pass as it is where only the rotation is rewritten."""
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.given is None else ""
-        raise FormatError(f"no columns of a rotation among: {', '.join(table.names or ('columns without names',))}{wanted}", source=source, line=1)
+        raise FormatError(
+            f"no columns of a rotation among: {', '.join(table.names or ('columns without names',))}{wanted}",
+            source=source,
+            line=1,
+        )
     return pose if _is_matrix(request.notations) or pose.rotation.whole else Pose(None, pose.rotation)
 
 
@@ -124,7 +130,9 @@ def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ..
         found = [name for name in names if name in FRAME_NAMES or name.endswith(("header.frame_id",))]
         if len(found) != 1:
             raise FormatError(
-                f"rows do not say their frame; name SOURCE, or give --frame-column; columns: {', '.join(names)}", source=source, line=1,
+                f"rows do not say their frame; name SOURCE, or give --frame-column; columns: {', '.join(names)}",
+                source=source,
+                line=1,
             )
         return (names.index(found[0]),)
     for name in request.frames:
@@ -135,7 +143,12 @@ def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ..
 
 
 def _columns(
-    table: Table, poses: Sequence[Pose], shapes: Sequence[Shape], target: Target, request: Request, frames: Sequence[int],
+    table: Table,
+    poses: Sequence[Pose],
+    shapes: Sequence[Shape],
+    target: Target,
+    request: Request,
+    frames: Sequence[int],
 ) -> list[Column]:
     """Put the results where they belong."""
     new = _new_columns(poses, target, request)
@@ -149,7 +162,9 @@ def _columns(
     position, rotation, extras = new
     pose = poses[0]
     if _in_place(pose, shapes[0], target, request):
-        for column, place in zip((*position, *rotation), (place for each in ours for place in each.places), strict=False):
+        for column, place in zip(
+            (*position, *rotation), (place for each in ours for place in each.places), strict=False
+        ):
             at[place].append(column)
         at[max(at)] += [*(position + rotation)[len(at) :], *extras]
     elif pose.position and pose.rotation and target.unit is not None and len(poses) == 1:
@@ -176,9 +191,10 @@ def _new_columns(poses: Sequence[Pose], target: Target, request: Request) -> lis
     rotation_names = [name for form, degrees in target.notations for name in _names(form, degrees=degrees)]
     if target.whole:
         rotation_names = [f"m{row}{column}" for row in "1234" for column in "1234"]
-    same = pose.rotation and pose.rotation.form and [form for form, _ in target.notations] == [pose.rotation.form]
-    if same and pose.rotation.whole == target.whole and not request.prefix and len(poses) == 1:
-        rotation_names = list(pose.rotation.names)
+    rotation = pose.rotation
+    same = rotation is not None and [form for form, _ in target.notations] == [rotation.form]
+    if rotation and same and rotation.whole == target.whole and not request.prefix and len(poses) == 1:
+        rotation_names = list(rotation.names)
     else:
         rotation_names = _affixed(rotation_names, pose.rotation, request, len(poses))
     names = ["x", "y", "z"] if target.unit is not None else []

@@ -27,12 +27,19 @@ DELIMITERS = {"csv": b",", "tsv": b"\t", "columns": b"", "tum": b""}
 
 
 def run_table(
-    stream: Source, form: str, request: Request, *, source: str, header: bool = True, jobs: int = 1, size: int = 0,
+    stream: Source,
+    form: str,
+    request: Request,
+    *,
+    source: str,
+    header: bool = True,
+    jobs: int = 1,
+    size: int = 0,
 ) -> Iterator[Outcome]:
     """Give the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
     delimiter = DELIMITERS[form]
     options = {"size": size} if size else {}
-    blocks = read_blocks(stream, whole=whole_records if delimiter else whole_lines, **options)  # type: ignore[arg-type]
+    blocks = read_blocks(stream, whole=whole_records if delimiter else whole_lines, **options)
     first = _first_rows(blocks, delimiter)
     if first is None:
         raise FormatError("nothing in it", source=source)
@@ -81,4 +88,6 @@ class Work:
         faults = run.faults()
         doubted = [(block.line_of(row), angle) for row, angle in run.doubted[:1]]
         rows = len(block.places) + len(block.broken)
-        return Outcome(written(run.groups(run.first_fault())), faults, rows, text.count(b"\n"), len(run.mended), doubted, len(text))
+        return Outcome(
+            written(run.groups(run.first_fault())), faults, rows, text.count(b"\n"), len(run.mended), doubted, len(text)
+        )

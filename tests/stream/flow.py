@@ -30,7 +30,9 @@ class Flow(NamedTuple):
     status: int
 
 
-def flow(text: bytes, request: Request, form: str = "csv", *, header: bool = True, size: int = 0, jobs: int = 1) -> Flow:
+def flow(
+    text: bytes, request: Request, form: str = "csv", *, header: bool = True, size: int = 0, jobs: int = 1
+) -> Flow:
     out = io.BytesIO()
     told: list[str] = []
     policy = Policy("in", request.on_error, tell=told.append)
@@ -39,7 +41,7 @@ def flow(text: bytes, request: Request, form: str = "csv", *, header: bool = Tru
             outcomes = run_records(io.BytesIO(text), form, request, source="in", size=size, jobs=jobs)
         else:
             outcomes = run_table(io.BytesIO(text), form, request, source="in", header=header, size=size, jobs=jobs)
-        status = run(outcomes, lambda block: out.write(block) and None, policy, lambda _rows, _size: None)
+        status = run(outcomes, lambda block: [out.write(block)].clear(), policy, lambda _rows, _size: None)
     except FrametoolError as error:
         told.append(str(error))
         status = error.exit_code

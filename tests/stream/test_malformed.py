@@ -16,7 +16,9 @@ GOOD = {
     "json": (b"", b'{"id": "007", "xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n'),
     "yaml": (b"", b"id: 007\nxyz: [1, 2, 3]\nquaternion: {x: 0, y: 0, z: 0, w: 1}\n---\n"),
 }
-BYTES = st.one_of(st.binary(max_size=40), st.text("{}[]:,\"'#-\\ \n\t\r0123456789.eEnaifxyzq\0é", max_size=40).map(str.encode))
+BYTES = st.one_of(
+    st.binary(max_size=40), st.text("{}[]:,\"'#-\\ \n\t\r0123456789.eEnaifxyzq\0é", max_size=40).map(str.encode)
+)
 
 
 @st.composite

@@ -57,7 +57,12 @@ def test_ros_messages_are_moved_where_they_hold_their_pose() -> None:
         "  orientation:\n    x: 0.0\n    y: 0.0\n    z: 0.0\n    w: 1.0\n---\n"
     )
     request = MOVE._replace(told="map")
-    wanted = record.replace("odom", "map").replace("x: 1.0", "x: -1.0").replace("y: 2.0", "y: 3.0").replace("z: 3.0", "z: 6.0")
+    wanted = (
+        record.replace("odom", "map")
+        .replace("x: 1.0", "x: -1.0")
+        .replace("y: 2.0", "y: 3.0")
+        .replace("z: 3.0", "z: 6.0")
+    )
     half = "0.7071067811865476"
     wanted = wanted.replace("z: 0.0\n    w: 1.0", f"z: {half}\n    w: {half}")
     assert flow(record.encode(), request, "yaml").text.decode() == wanted
@@ -65,7 +70,9 @@ def test_ros_messages_are_moved_where_they_hold_their_pose() -> None:
 
 
 def test_stamps_and_other_numbers_of_messages_may_differ_between_records() -> None:
-    records = [f'{{"id": {i}, "t": "n{i}", "x": {i}, "y": 0, "z": 0, "ok": {str(i % 2 == 0).lower()}}}\n' for i in range(MANY)]
+    records = [
+        f'{{"id": {i}, "t": "n{i}", "x": {i}, "y": 0, "z": 0, "ok": {str(i % 2 == 0).lower()}}}\n' for i in range(MANY)
+    ]
     result = flow("".join(records).encode(), MOVE, "json")
     for i, line in enumerate(result.text.splitlines()):
         assert json.loads(line) == {"id": i, "t": f"n{i}", "x": 1.0, "y": 2.0 + i, "z": 3.0, "ok": i % 2 == 0}
@@ -82,7 +89,9 @@ def test_arrays_stay_arrays(layout: str, record: str, count: int) -> None:
 
 @pytest.mark.parametrize("size", [1, 50, 333])
 def test_the_size_of_blocks_does_not_show_in_records(size: int) -> None:
-    text = "".join(f'{{"x": {i}, "y": 0, "z": 0}}\n' if i % 3 else f'{{"k": "{i}", "point": [{i}, 0, 0]}}\n' for i in range(90))
+    text = "".join(
+        f'{{"x": {i}, "y": 0, "z": 0}}\n' if i % 3 else f'{{"k": "{i}", "point": [{i}, 0, 0]}}\n' for i in range(90)
+    )
     assert flow(text.encode(), MOVE, "json", size=size) == flow(text.encode(), MOVE, "json")
 
 
@@ -92,7 +101,9 @@ def test_one_record_alone_gives_what_it_gives_among_many() -> None:
         assert flow(record.encode() * MANY, request, "json").text == flow(record.encode(), request, "json").text * MANY
 
 
-@pytest.mark.parametrize("spec", ["rpy", "rpy_deg", "euler:rzyx", "axis_angle", "rotvec", "matrix", "wxyz", "six_d", "mrp"])
+@pytest.mark.parametrize(
+    "spec", ["rpy", "rpy_deg", "euler:rzyx", "axis_angle", "rotvec", "matrix", "wxyz", "six_d", "mrp"]
+)
 @pytest.mark.parametrize("form", ["json", "yaml"])
 def test_records_go_to_every_representation_and_back(spec: str, form: str) -> None:
     record = {"json": '{"k": 1, "xyz": [1.0, 2.0, 3.0], "quaternion": {"x": 0.5, "y": 0.5, "z": -0.5, "w": 0.5}}\n',

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import random
+from itertools import pairwise
 
 import pytest
 from flow import INVERT, MOVE, convert, flow
@@ -8,7 +9,7 @@ from flow import INVERT, MOVE, convert, flow
 from frametool.stream.operation import Operation
 from frametool.stream.request import Request
 
-HOSTILE = ['007', '1.50', '1e3', '"a,b"', '"q""q"', '""', "", "é 🐢", "\0", "x" * 1_000_000, '" "', "-0.0", "nan", "5'"]
+HOSTILE = ["007", "1.50", "1e3", '"a,b"', '"q""q"', '""', "", "é 🐢", "\0", "x" * 1_000_000, '" "', "-0.0", "nan", "5'"]
 
 
 def moved(x: float, y: float, z: float) -> str:
@@ -18,7 +19,7 @@ def moved(x: float, y: float, z: float) -> str:
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"])
 @pytest.mark.parametrize("last", [True, False])
-def test_columns_that_are_not_ours_pass_byte_for_byte(end: str, mark: str, last: bool) -> None:
+def test_columns_that_are_not_ours_pass_byte_for_byte(end: str, mark: str, last: bool) -> None:  # noqa: FBT001
     rows = [(cell, index, index + 0.5, -index) for index, cell in enumerate(HOSTILE)]
     given = [f"id,x,y,z,{'tag'}", *(f"{cell},{x},{y},{z},{cell}" for cell, x, y, z in rows)]
     wanted = [given[0], *(f"{cell},{moved(x, y, z)},{cell}" for cell, x, y, z in rows)]
@@ -29,7 +30,7 @@ def test_columns_that_are_not_ours_pass_byte_for_byte(end: str, mark: str, last:
 @pytest.mark.parametrize("size", [1, 7, 100, 4096])
 @pytest.mark.parametrize("on_error", ["skip", "null"])
 def test_the_size_of_blocks_does_not_show(size: int, on_error: str) -> None:
-    rng = random.Random(5)
+    rng = random.Random(5)  # noqa: S311 - numbers to move, nothing to hide
     rows = [f'{i},{rng.uniform(-9, 9)},{rng.choice(["1", "foo", "2e-3"])},0,"t\n{i}"' for i in range(200)]
     text = ("id,x,y,z,tag\n" + "\n".join(rows)).encode()
     request = MOVE._replace(on_error=on_error)
@@ -79,7 +80,9 @@ def test_more_than_one_candidate_is_an_error_that_lists_them() -> None:
 
 def test_results_beside_their_source_need_other_names() -> None:
     text = b"qx,qy,qz,qw,t\n0,0,0,1,a\n"
-    assert flow(text, convert("rpy")._replace(keep=True)).text == b"qx,qy,qz,qw,t,roll,pitch,yaw\n0,0,0,1,a,0.0,0.0,0.0\n"
+    assert (
+        flow(text, convert("rpy")._replace(keep=True)).text == b"qx,qy,qz,qw,t,roll,pitch,yaw\n0,0,0,1,a,0.0,0.0,0.0\n"
+    )
     assert "--prefix" in flow(text, INVERT._replace(keep=True)).told[0]
     kept = flow(text, INVERT._replace(keep=True, prefix="inv_"))
     assert kept.text.splitlines()[0] == b"qx,qy,qz,qw,t,inv_qx,inv_qy,inv_qz,inv_qw"
@@ -106,7 +109,10 @@ def test_extreme_numbers_keep_their_bits(cell: str) -> None:
 
 
 def test_results_that_overflow_are_refused() -> None:
-    result = flow(b"x,y,z\n1e308,1e308,0\n", Request(Operation(left=(1e308, 0.0, 0.0, 0.0, 0.0, -0.7071067811865476, 0.7071067811865476), moves=True)))
+    result = flow(
+        b"x,y,z\n1e308,1e308,0\n",
+        Request(Operation(left=(1e308, 0.0, 0.0, 0.0, 0.0, -0.7071067811865476, 0.7071067811865476), moves=True)),
+    )
     assert (result.status, result.text) == (1, b"x,y,z\n")
 
 
@@ -156,7 +162,7 @@ def test_unwrapped_angles_never_jump(size: int) -> None:
     text = b"roll_deg,pitch_deg,yaw_deg\n" + b"".join(b"0,0,%d\n" % (turn * 100) for turn in range(-9, 20))
     result = flow(text, convert("rpy_deg")._replace(unwrap=True, precision=3), size=size)
     yaws = [float(line.split(b",")[2]) for line in result.text.splitlines()[1:]]
-    assert {round(after - before) for before, after in zip(yaws, yaws[1:], strict=False)} == {100}
+    assert {round(after - before) for before, after in pairwise(yaws)} == {100}
 
 
 def test_each_row_may_name_its_frame() -> None:
@@ -166,13 +172,17 @@ def test_each_row_may_name_its_frame() -> None:
     assert result.text == b"frame,x,y,z\nmap,1.0,0.0,0.0\nmap,2.0,0.0,0.0\n"
 
 
-@pytest.mark.parametrize("spec", ["rpy", "rpy_deg", "euler:rzyx", "axis_angle", "rotvec", "matrix", "wxyz", "mrp", "quaternion"])
+@pytest.mark.parametrize(
+    "spec", ["rpy", "rpy_deg", "euler:rzyx", "axis_angle", "rotvec", "matrix", "wxyz", "mrp", "quaternion"]
+)
 def test_every_representation_goes_there_and_back(spec: str) -> None:
     text = b"qx,qy,qz,qw\n0.1,-0.2,0.3,0.9273618495495703\n0.5,0.5,-0.5,0.5\n"
     there = flow(text, convert(spec))
     back = flow(there.text, convert("quaternion")._replace(given=convert(spec).notations[0]))
     for line, start in zip(back.text.splitlines()[1:], text.splitlines()[1:], strict=True):
-        assert [float(cell) for cell in line.split(b",")] == pytest.approx([float(cell) for cell in start.split(b",")], abs=1e-15)
+        assert [float(cell) for cell in line.split(b",")] == pytest.approx(
+            [float(cell) for cell in start.split(b",")], abs=1e-15
+        )
 
 
 def test_poses_as_whole_matrices_go_there_and_back() -> None:
