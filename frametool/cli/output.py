@@ -41,10 +41,7 @@ class Output:
         self.force = force
         self.told = format_name or _form_by_suffix(output, what)
         self.notations = notations or ()
-        form = (
-            self.told
-            or ("text" if output is None and sys.stdout.isatty() else "yaml")
-        )
+        form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
         self.style = Style(form, chosen, degrees=deg, precision=precision, keep_sign=keep_sign)
@@ -105,8 +102,11 @@ def write_whole(path: str, text: str, *, force: bool = False) -> None:
 
     Raises FileProblem when it exists and `force` is not given, or cannot be written.
     """
-    if not force and os.path.lexists(path):
+    if not force and os.path.isfile(path):  # noqa: PTH113
         raise FileProblem(f"{path}: exists; give --force to replace it")
+    if _is_special(path):
+        _write_directly(path, text)
+        return
     temporary = f"{path}.{os.getpid()}.part"
     try:
         with open(temporary, "x", encoding="utf-8", newline="") as stream:  # noqa: PTH123
@@ -115,4 +115,18 @@ def write_whole(path: str, text: str, *, force: bool = False) -> None:
     except OSError as error:
         if os.path.lexists(temporary):
             os.unlink(temporary)  # noqa: PTH108
+        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def _is_special(path: str) -> bool:
+    """Tell whether a path is there and no plain file: a device, a pipe, a link such as /dev/stdout."""
+    return os.path.lexists(path) and (os.path.islink(path) or not os.path.isfile(path))  # noqa: PTH113, PTH114
+
+
+def _write_directly(path: str, text: str) -> None:
+    """Write to what is no plain file as it is: a device must not be replaced by one."""
+    try:
+        with open(path, "w", encoding="utf-8", newline="") as stream:  # noqa: PTH123
+            stream.write(text)
+    except OSError as error:
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None

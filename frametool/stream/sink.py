@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from typing import BinaryIO, Self
 
 
+def is_special(path: str) -> bool:
+    """Tell whether a path is there and no plain file: a device, a pipe, a link such as /dev/stdout."""
+    return os.path.lexists(path) and (os.path.islink(path) or not os.path.isfile(path))  # noqa: PTH113, PTH114
+
+
 class Sink:
     """Take blocks of whole lines; Ctrl-C waits until a block is out, so that no line is cut."""
 
@@ -21,14 +26,24 @@ class Sink:
         """Write to a temporary file beside `path`, or to standard output; raises FileProblem if the file exists."""
         self.path = path
         self._part = f"{path}.{os.getpid()}.part"
+        self._in_place = path is not None and is_special(path)
         self._writing = self._interrupted = False
         self._stream = self._opened(force=force) if path else sys.stdout.buffer
 
     def _opened(self, *, force: bool) -> BinaryIO:
-        if not force and os.path.lexists(str(self.path)):
+        if not force and os.path.isfile(str(self.path)):  # noqa: PTH113
             raise FileProblem(f"{self.path}: exists; give --force to replace it")
+        if self._in_place:
+            return self._to_special()
         try:
             return open(self._part, "xb")  # noqa: PTH123 - closed in __exit__
+        except OSError as error:
+            raise self._problem(error) from None
+
+    def _to_special(self) -> BinaryIO:
+        """Open what is no plain file as it is: a device must not be replaced by one."""
+        try:
+            return open(str(self.path), "wb")  # noqa: PTH123 - closed in __exit__
         except OSError as error:
             raise self._problem(error) from None
 
@@ -68,6 +83,8 @@ class Sink:
         if not self.path:
             return
         self._stream.close()
+        if self._in_place:
+            return
         if kind is None:
             os.replace(self._part, self.path)  # noqa: PTH105
         else:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from frametool.errors import FormatError
 from frametool.stream.rows import Block, Broken
 from frametool.text.cells import split_blank, split_delimited, without_quotes
@@ -122,11 +120,9 @@ def _refuse_repeated(names: Sequence[str], source: str, line: int) -> None:
 def table_block(table: Table, layout: Layout, text: bytes) -> Block:
     """Find the rows of a block, their numbers, and the stretches of text that pass."""
     cells = table.split(text)
-    places = list(layout.places)
-    numbers = Spans(
-        cells.data, np.ascontiguousarray(cells.starts[:, places]), np.ascontiguousarray(cells.ends[:, places])
-    )
-    if b'"' in text and places:
+    columns = _as_slice(layout.places)
+    numbers = Spans(cells.data, cells.starts[:, columns], cells.ends[:, columns])
+    if b'"' in text and layout.places:
         numbers = without_quotes(numbers)
     parts = [_stretch(cells, *stretch) for stretch in layout.stretches]
     frames: Sequence[str] = ()
@@ -142,6 +138,13 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
             else:
                 broken.append(_broken(table, layout, cells, line, raw))
     return Block(numbers, parts, cells.rows, lambda row: cells.lines_before(int(cells.rows[row])), odd, broken, frames)
+
+
+def _as_slice(places: Sequence[int]) -> slice | list[int]:
+    """Give neighbouring columns as a slice, which copies nothing."""
+    if places and tuple(places) == tuple(range(places[0], places[0] + len(places))):
+        return slice(places[0], places[0] + len(places))
+    return list(places)
 
 
 def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans:
