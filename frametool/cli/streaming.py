@@ -16,7 +16,7 @@ from frametool.stream.detect import RECORDS, STREAMS, form_of
 from frametool.stream.faults import MOST, ON_ERROR, STOP, Policy
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator
     from typing import TypeVar
 
     from frametool.cli.output import Output
@@ -136,7 +136,7 @@ class Stream:
 
     def _run(self, stream: Any, form: str, request: Request, output: Output) -> int:
         from frametool.stream.run import run
-        from frametool.stream.sink import Sink
+        from frametool.stream.sink import Sink, die_of_closed_pipe
         from frametool.view.progress import Progress
 
         name = self.path or "stdin"
@@ -147,13 +147,19 @@ class Stream:
             tell=lambda text: click.echo(f"frametool: {text}", err=True),
         )
         progress = Progress(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"])  # noqa: PTH202
+        outcomes = self._outcomes(stream, form, request, name)
         try:
             with Sink(None if output.path == "-" else output.path, force=output.force) as sink:
-                return run(self._outcomes(stream, form, request, name), sink.write, policy, progress.advance)
+                return run(outcomes, sink.write, policy, progress.advance)
+        except BrokenPipeError:
+            outcomes.close()  # ends the processes of --jobs
+            die_of_closed_pipe()
+            raise
         finally:
             progress.stop()
+            outcomes.close()
 
-    def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Iterator[Outcome]:
+    def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
         if form in RECORDS:
             from frametool.stream.documents import run_records
 

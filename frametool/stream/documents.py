@@ -13,7 +13,7 @@ from frametool.stream.single import result_of
 from frametool.text.lines import read_blocks, whole_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator, Iterator
 
     from frametool.stream.request import Request
     from frametool.text.lines import Source
@@ -33,7 +33,7 @@ MARK = b"\xef\xbb\xbf"
 
 def run_records(
     stream: Source, form: str, request: Request, *, source: str, jobs: int = 1, size: int = 0
-) -> Iterator[Outcome]:
+) -> Generator[Outcome]:
     """Give the outcomes of a stream of records."""
     options = {"size": size} if size else {}
     splitter = Splitter(form)

@@ -14,6 +14,13 @@ if TYPE_CHECKING:
     from typing import BinaryIO, Self
 
 
+def die_of_closed_pipe() -> None:
+    """End as `cat` does when its reader is gone: killed by SIGPIPE, without a word."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered must not raise again
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    os.kill(os.getpid(), signal.SIGPIPE)
+
+
 def is_special(path: str) -> bool:
     """Tell whether a path is there and no plain file: a device, a pipe, a link such as /dev/stdout."""
     return os.path.lexists(path) and (os.path.islink(path) or not os.path.isfile(path))  # noqa: PTH113, PTH114

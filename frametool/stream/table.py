@@ -127,8 +127,8 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
     parts = [_stretch(cells, *stretch) for stretch in layout.stretches]
     frames: Sequence[str] = ()
     if layout.frames:
-        columns = [_texts(cells, place) for place in layout.frames]
-        frames = columns[0] if len(columns) == 1 else ["\0".join(pair) for pair in zip(*columns, strict=True)]
+        named = [_texts(cells, place) for place in layout.frames]
+        frames = ["\0".join(names) for names in zip(*named, strict=True)]
     odd, broken = [], []
     if len(cells.rows) < len(cells.counts):
         for line in cells.odd_lines().tolist():

@@ -15,7 +15,7 @@ from frametool.text.cells import whole_records
 from frametool.text.lines import read_blocks, whole_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator, Iterator
 
     from frametool.stream.blocks import Plan
     from frametool.stream.layout import Layout
@@ -35,7 +35,7 @@ def run_table(
     header: bool = True,
     jobs: int = 1,
     size: int = 0,
-) -> Iterator[Outcome]:
+) -> Generator[Outcome]:
     """Give the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
     delimiter = DELIMITERS[form]
     options = {"size": size} if size else {}
