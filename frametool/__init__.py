@@ -15,20 +15,48 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.formats.load import load as load
+    from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.tree import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
+    from frametool.sim.controllers import FollowController as FollowController
+    from frametool.sim.scene import tutorial as tutorial
+    from frametool.sim.simulate import simulate as simulate
+    from frametool.sim.sweep import simulate_many as simulate_many
+    from frametool.sim.turtle import Turtle as Turtle
+    from frametool.sim.turtle import Twist as Twist
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "FollowController": "frametool.sim.controllers",
     "FrameTree": "frametool.frames.tree",
     "FrametoolError": "frametool.errors",
     "Rotation": "frametool.geometry.rotation",
     "Transform": "frametool.geometry.transform",
+    "TransformBuffer": "frametool.frames.buffer",
+    "Turtle": "frametool.sim.turtle",
+    "Twist": "frametool.sim.turtle",
     "load": "frametool.formats.load",
+    "simulate": "frametool.sim.simulate",
+    "simulate_many": "frametool.sim.sweep",
+    "tutorial": "frametool.sim.scene",
 }
-__all__ = ["FrameTree", "FrametoolError", "Rotation", "Transform", "__version__", "load"]
+__all__ = [
+    "FollowController",
+    "FrameTree",
+    "FrametoolError",
+    "Rotation",
+    "Transform",
+    "TransformBuffer",
+    "Turtle",
+    "Twist",
+    "__version__",
+    "load",
+    "simulate",
+    "simulate_many",
+    "tutorial",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -62,6 +62,11 @@ class LookupFailed(FrametoolError, LookupError):
 
     exit_code = 4
 
+    def __init__(self, message: str, **fields: object) -> None:
+        """Keep what the message says as fields too, for those who do not read sentences."""
+        super().__init__(message)
+        self.fields = fields
+
 
 class UnknownFrame(LookupFailed):
     """Report a frame that is not in the tree, with the nearest names and those there are."""
@@ -71,7 +76,8 @@ class UnknownFrame(LookupFailed):
         self.name = name
         self.known = tuple(known)
         place = f" in {where}" if where else ""
-        super().__init__(f"unknown frame {name!r}{place}{alternatives(name, self.known, 'frames')}")
+        message = f"unknown frame {name!r}{place}{alternatives(name, self.known, 'frames')}"
+        super().__init__(message, frame=name, known=sorted(self.known)[:20])
 
 
 class NotConnected(LookupFailed):
@@ -102,6 +108,10 @@ class FileProblem(FrametoolError, OSError):
 
 class FrametoolWarning(UserWarning):
     """Mark what was read, used and is nevertheless worth a look."""
+
+
+class Tf2Warning(FrametoolWarning):
+    """Mark what tf2 would have logged, in its words."""
 
 
 _listeners: list[list[str]] = []

@@ -52,13 +52,15 @@ def test_an_example_in_a_help_runs(name: str, command: str, bin_folder: Path, tm
     robot = console.ROOT / "examples" / "robot.yaml"
     for file in ("robot.yaml", "arm.yaml", "gripper.yaml"):
         (tmp_path / file).write_text(robot.read_text() if file != "gripper.yaml" else "frames: {gripper: {finger: {xyz: [0, 0, 0]}}}")
+    (tmp_path / "drive.yaml").write_text((console.ROOT / "examples" / "drive.yaml").read_text())
     console.printed("true", bin_folder)
     command = re.sub(r"\| dot -Tsvg -o (\S+)", r"> \1", command)
     done = subprocess.run(
         ["bash", "-o", "pipefail", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False,
         stdin=subprocess.DEVNULL, env={"PATH": f"{bin_folder}:/usr/bin:/bin"},
     )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, ""), name
+    assert done.returncode == 0, name
+    assert name == "sim" or not done.stderr  # the turtles sum up there what they did
 
 
 def test_every_command_has_an_example_in_its_help_and_in_the_readme() -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool import __version__
 from frametool.cli.help import WithHelp
-from frametool.errors import FrametoolError, FrametoolWarning, alternatives
+from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, alternatives
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +27,7 @@ COMMANDS = {
     "lookup": ("frametool.cli.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
     "apply": ("frametool.cli.apply", "points, vectors and poses moved into another frame"),
     "tree": ("frametool.cli.tree", "the tree of frames, drawn or written in another form"),
+    "sim": ("frametool.cli.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 HELP = """The calculator for rigid-body frames.
 
@@ -40,18 +41,31 @@ points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
 """
 
 
+class ReaderGone(Exception):
+    """Say that nobody reads stdout any more."""
+
+
 class Group(WithHelp, click.Group):
-    """The commands of the table, each imported when it is called and not before."""
+    """The commands of a table, each imported when it is called and not before."""
+
+    table = COMMANDS
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; a closed pipe leaves as an error that click does not turn into status 1."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise ReaderGone from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Name the commands, in the table's order."""
-        return list(COMMANDS)
+        return list(self.table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         """Import one command."""
-        if cmd_name not in COMMANDS:
+        if cmd_name not in self.table:
             return None
-        command: click.Command = import_module(COMMANDS[cmd_name][0]).command
+        command: click.Command = import_module(self.table[cmd_name][0]).command
         return command
 
     def resolve_command(
@@ -60,20 +74,20 @@ class Group(WithHelp, click.Group):
         args: list[str],
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command, or say which ones there are."""
-        if args and args[0] not in COMMANDS:
-            raise click.UsageError(f"no command {args[0]!r}{alternatives(args[0], COMMANDS, 'commands')}", ctx)
+        if args and args[0] not in self.table:
+            raise click.UsageError(f"no command {args[0]!r}{alternatives(args[0], self.table, 'commands')}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands from the table, without importing any."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+            formatter.write_dl([(name, summary) for name, (_, summary) in self.table.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete command names from the table."""
         from click.shell_completion import CompletionItem
 
-        named = [CompletionItem(name, help=row[1]) for name, row in COMMANDS.items() if name.startswith(incomplete)]
+        named = [CompletionItem(name, help=row[1]) for name, row in self.table.items() if name.startswith(incomplete)]
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
@@ -112,8 +126,8 @@ def run(arguments: list[str]) -> int:
     except (click.Abort, KeyboardInterrupt):
         return 130
     except FrametoolError as error:
-        return _complain(_with_snippet(error), error.exit_code)
-    except BrokenPipeError:
+        return _report(error, arguments)
+    except (ReaderGone, BrokenPipeError):
         return _die_of_closed_pipe()
     except OSError as error:
         return _complain(f"{error.strerror or error}", 5)
@@ -132,6 +146,16 @@ def _usage(error: click.ClickException) -> str:
     return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
 
 
+def _report(error: FrametoolError, arguments: Sequence[str]) -> int:
+    """Say what went wrong: as a sentence, or as an object where JSON was asked for."""
+    from frametool.cli.failures import as_json, wants_json
+
+    if not wants_json(arguments):
+        return _complain(_with_snippet(error), error.exit_code)
+    print(as_json(error), file=sys.stderr)  # noqa: T201
+    return error.exit_code
+
+
 def _with_snippet(error: FrametoolError) -> str:
     snippet = getattr(error, "snippet", "")
     return f"{error}\n{snippet}" if snippet else str(error)
@@ -143,7 +167,8 @@ def _complain(message: str, status: int) -> int:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"frametool: warning: {message}", file=sys.stderr)  # noqa: T201 - this is where warnings become text
+    start = "" if isinstance(message, Tf2Warning) else "frametool: warning: "
+    print(f"{start}{message}", file=sys.stderr)  # noqa: T201 - this is where warnings become text
 
 
 def _die_of_closed_pipe() -> int:

@@ -116,12 +116,12 @@ def result_options(what: str) -> Callable[[Function], Function]:
         ),
         click.option("--force", is_flag=True, help="let --output replace an existing file"),
     ]
-    return lambda function: _decorated(function, options)
+    return lambda function: decorated(function, options)
 
 
 def rotation_options(function: Function) -> Function:
     """Give a command the options that choose how rotations are written."""
-    return _decorated(
+    return decorated(
         function,
         [
             click.option(
@@ -146,7 +146,8 @@ def pose_options(function: Function) -> Function:
     )(function)
 
 
-def _decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
+def decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
+    """Give a command several options, in this order in its help."""
     for option in reversed(options):
         function = option(function)
     return function

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
+    from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
     from frametool.geometry.kinds import Rigid
 
@@ -45,13 +46,22 @@ class RowFrames:
         """Tell whether rows are looked up."""
         return self.target is not None or self.source is not None
 
-    def run(self, stream: Stream, output: Output, tree: FrameTree, *, target: str | None, source: str | None) -> int:
+    def run(
+        self,
+        stream: Stream,
+        output: Output,
+        tree: FrameTree | TransformBuffer,
+        *,
+        target: str | None,
+        source: str | None,
+        at: int | None = None,
+    ) -> int:
         """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
         fixed_target, fixed_source = self._fixed(target, source)
 
         def edge_of(names: str) -> Rigid:
             first, _, second = names.partition("\0")
-            return tree.lookup(fixed_target or first, fixed_source or second or first).components
+            return tree.lookup(fixed_target or first, fixed_source or second or first, at).components
 
         fixed_target = fixed_target and frame_name(fixed_target, tree)
         fixed_source = fixed_source and frame_name(fixed_source, tree)

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import FileProblem
 from frametool.formats import FORMATS, writers
 from frametool.formats.pose import Pose
-from frametool.formats.results import Result, Style, is_locked
+from frametool.formats.results import Result, Style, is_locked, sample_results
+from frametool.frames.tree import FrameTree
 from frametool.geometry.representations import notation
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from frametool.formats.points import Point
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.representations import Notation
 
 
@@ -59,8 +60,11 @@ class Output:
                 [Result(each).mapping(self.style) if isinstance(each, Pose) else each.mapping() for each in records]
             )
 
-    def tree(self, tree: FrameTree) -> None:
-        """Write a tree; on a terminal, in colour."""
+    def tree(self, tree: FrameTree | TransformBuffer) -> None:
+        """Write a tree; on a terminal, in colour.  A form made of poses gets every sample of what moves."""
+        if not isinstance(tree, FrameTree) and "poses" in self._writes and self.style.form not in ("yaml", "json"):
+            self.poses(sample_results(tree))
+            return
         if self.style.form != "text":
             self.text(self._module("").write_tree(tree, self.style))
             return
@@ -79,6 +83,10 @@ class Output:
     def points(self, records: Iterable[dict[str, Any]]) -> None:
         """Write points."""
         self.text(self._module("frametool.view.pose_text").write_points(records, self.style))
+
+    @property
+    def _writes(self) -> tuple[str, ...]:
+        return FORMATS[self.style.form].writes if self.style.form in FORMATS else ()
 
     def _module(self, text_module: str) -> Any:
         return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)

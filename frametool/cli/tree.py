@@ -8,7 +8,9 @@ import click
 
 from frametool.cli.command import TEXT, Command, result_options, rotation_options
 from frametool.cli.output import Output
+from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import load_tree
+from frametool.frames.tree import FrameTree
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,17 +19,31 @@ if TYPE_CHECKING:
 @click.command(cls=Command, name="tree")
 @click.argument("tree", type=TEXT)
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
+@click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest of each edge]")
+@rules_options
 @rotation_options
 @result_options("tree")
-def command(tree: str, more: Sequence[str], **options: Any) -> None:
-    """Draw the frames of TREE, each with its pose in its parent.
+def command(
+    tree: str, more: Sequence[str], at: int | str | None, moving: bool, cache: int | None, tf2: str | None,
+    **options: Any,
+) -> None:  # fmt: skip
+    """Draw the frames of TREE, each with its pose in its parent; those that move with their rate and interval too.
 
     \b
       frametool tree robot.yaml
       frametool tree robot.yaml --format dot | dot -Tsvg -o robot.svg
       frametool tree arm.yaml --with gripper.yaml --format yaml --to rpy_deg
+      frametool tree drive.yaml --at 2.5
 
     TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. yaml and json are trees again
-    and read back.
+    and read back, frames that move with all their samples. dot draws what moves as ROS's view_frames does, tf2 is the
+    listing of tf2's all_frames_as_yaml. --at draws the tree as it stood at one time.
     """
-    Output("tree", **options).tree(load_tree(tree, more))
+    output = Output("tree", **options)
+    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
+    stamp = at_ns(at)
+    if stamp is not None and not isinstance(frames, FrameTree):
+        from frametool.frames.listing import tree_at
+
+        frames = tree_at(frames, stamp)
+    output.tree(frames)

@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
+    from frametool.formats.assembly import Rules
+    from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
 
-def load_tree(argument: str, more: Sequence[str] = ()) -> FrameTree:
+def load_tree(argument: str, more: Sequence[str] = (), rules: Rules | None = None) -> FrameTree | TransformBuffer:
     """Read the tree of an argument (a file, inline, `-`, or `.` for FRAMETOOL_TREE) and merge further files into it."""
-    return load_sources([source_of(_tree_file(each)) for each in (argument, *more)])
+    return load_sources([source_of(_tree_file(each)) for each in (argument, *more)], rules)
 
 
 def _tree_file(argument: str) -> str:
@@ -55,7 +57,7 @@ class Frame(Text):
 FRAME = Frame()
 
 
-def frame_name(name: str, tree: FrameTree) -> str:
+def frame_name(name: str, tree: FrameTree | TransformBuffer) -> str:
     """Give a frame's name without a leading `/`, which tf2 has given up, unless a frame is called so."""
     if name.startswith("/") and name not in tree.frames:
         warn(f"frame {name!r}: the leading / is no part of a name and was left out")

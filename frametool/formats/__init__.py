@@ -29,6 +29,7 @@ FORMATS = {
     "csv": Row("frametool.formats.csv_form", (".csv",), "CSV with a header", ("poses", "points")),
     "ros1": Row("frametool.formats.ros", (), "TransformStamped as `rostopic echo` prints it", ("poses", "tree")),
     "ros2": Row("frametool.formats.ros", (), "TransformStamped as `ros2 topic echo` prints it", ("poses", "tree")),
+    "tf2": Row("frametool.formats.tf2_listing", (), "the listing of tf2's all_frames_as_yaml", ("tree",)),
     "dot": Row("frametool.formats.dot", (".dot", ".gv"), "graphviz", ("tree",)),
     "mermaid": Row("frametool.formats.mermaid", (".mmd",), "a mermaid flowchart", ("tree",)),
 }

@@ -72,5 +72,7 @@ def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:
 
 def _cell(value: Any, style: Style) -> str:
     """Write one cell, quoted where a reader would split it."""
-    text = style.number(value) if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return style.number(value)
+    text = str(value)
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text

@@ -7,27 +7,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.formats.labels import edge_label
+from frametool.formats.labels import edge_label, graphviz
+from frametool.frames.tree import FrameTree
 
 if TYPE_CHECKING:
     from frametool.formats.results import Style
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.buffer import TransformBuffer
 
 
-def write_tree(tree: FrameTree, style: Style) -> str:
-    """Give a digraph; names are quoted, so that any text is a name."""
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+    """Give a digraph; names are quoted, so that any text is a name.  What moves is drawn as view_frames does."""
+    if not isinstance(tree, FrameTree):
+        from frametool.formats import view_frames
+
+        return view_frames.write_tree(tree)
     lines = ["digraph frames {", "  node [shape=ellipse];"]
     lines += [f"  {_quoted(frame)};" for frame in tree.frames]
     for parent, child, transform in tree.edges():
-        label = "\\n".join(_escaped(line) for line in edge_label(transform, style))
+        label = "\\n".join(graphviz(line) for line in edge_label(transform, style))
         lines.append(f'  {_quoted(parent)} -> {_quoted(child)} [label="{label}"];')
     return "\n".join([*lines, "}", ""])
 
 
 def _quoted(name: str) -> str:
-    return f'"{_escaped(name)}"'
-
-
-def _escaped(text: str) -> str:
-    """Write a text between double quotes; a backslash would begin one of graphviz's own escapes."""
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{graphviz(name)}"'

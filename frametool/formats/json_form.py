@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from frametool.formats.results import Result, Style
+    from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
 
@@ -26,7 +27,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     return "".join(f"{dump(record, style.number)}\n" for record in records)
 
 
-def write_tree(tree: FrameTree, style: Style) -> str:
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     """Give the tree in the list form, on one line."""
     return f"{dump({'frames': list(tree_entries(tree, style))}, style.number)}\n"
 

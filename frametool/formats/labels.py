@@ -28,6 +28,11 @@ def edge_label(transform: Transform, style: Style) -> tuple[str, str]:
     return f"xyz {position}", f"{form.spec} {_short(rotation_numbers(pose, form, style), decimals)}"
 
 
+def graphviz(text: str) -> str:
+    """Write a text as it stands between double quotes; a backslash would begin one of graphviz's own escapes."""
+    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+
+
 def _short(values: Iterable[float], decimals: int) -> str:
     """Round for reading; trailing zeros and minus zero say nothing."""
     return " ".join(

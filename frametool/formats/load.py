@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import BadTopology, FormatError, warn
+from frametool.errors import FormatError, warn
+from frametool.formats.assembly import Assembly, Rules
 from frametool.formats.collector import paused_collector
 from frametool.formats.documents import Source, format_error, locate_many, parse_documents, read_text
 from frametool.formats.trees import read_edges
 from frametool.formats.values import Misfit, Reading
-from frametool.frames.tree import FrameTree
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from os import PathLike
 
+    from frametool.formats.assembly import Place
     from frametool.formats.trees import Edge
     from frametool.formats.values import Path
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.tree import FrameTree
 
 
 class Found(NamedTuple):
@@ -31,37 +34,55 @@ class Found(NamedTuple):
         """Give the path that leads to it from the top of its source."""
         return (self.document, *self.edge.path)
 
+    def error(self, message: str, kind: type[FormatError]) -> FormatError:
+        """Make the error for its place."""
+        return format_error(self.source, self.path, message, error=kind)
 
-def load(*paths: str | PathLike[str]) -> FrameTree:
-    """Read one or several files of frames and merge them into one tree.
+    def seen_from(self, other: Place) -> str:
+        """Give `line 7`, or `other.yaml:7` beside a place in another source."""
+        line, _ = locate_many(self.source.text, [self.path])[0]
+        same = isinstance(other, Found) and other.source.name == self.source.name
+        return f"line {line}" if same else f"{self.source.name}:{line}"
+
+
+def load(
+    *paths: str | PathLike[str], moving: bool = False, policy: str = "frametool", keep_ns: int | None = None
+) -> FrameTree | TransformBuffer:
+    """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 
     paths: YAML or JSON in the forms of `frametool.formats.trees`; `-` is standard input.
+    moving: an edge with a single stamp answers only that instant; otherwise it counts as standing.
+    policy, keep_ns: as TransformBuffer has them.
     Raises FormatError and BadTopology with file, line and column; FileProblem.
     """
-    return load_sources([Source("stdin" if str(path) == "-" else str(path), read_text(path)) for path in paths])
+    sources = [Source("stdin" if str(path) == "-" else str(path), read_text(path)) for path in paths]
+    return load_sources(sources, Rules(moving=moving, policy=policy, keep_ns=keep_ns))
 
 
-def load_sources(sources: Sequence[Source]) -> FrameTree:
-    """Merge the frames of several texts into one tree; otherwise as `load`."""
-    tree = FrameTree(", ".join(source.name for source in sources))
-    first: dict[str, Found] = {}
+def load_sources(sources: Sequence[Source], rules: Rules | None = None) -> FrameTree | TransformBuffer:
+    """Merge the frames of several texts; otherwise as `load`."""
+    assembly = Assembly(", ".join(source.name for source in sources), rules)
     with paused_collector():
         for source in sources:
-            for found in edges_of(source):
-                _hang(tree, first, found)
-    return tree
+            for found in edges_of(source, raw=assembly.rules.policy != "frametool"):
+                edge = found.edge
+                if edge.parent is None:
+                    assembly.add_root(edge.child)
+                else:
+                    assembly.add(edge.parent, edge.child, edge.pose.components, edge.stamp_ns, found)
+        return assembly.finish()
 
 
-def edges_of(source: Source) -> Iterator[Found]:
-    """Read the edges of one text, then tell what was odd about it."""
+def edges_of(source: Source, *, raw: bool = False) -> Iterator[Found]:
+    """Read the edges of one text, then tell what was odd about it; raw: messages as tf2 receives them."""
     notes = []
     count = 0
     for document in parse_documents(source.text, source.name):
-        reading = Reading(source)
+        reading = Reading(source, raw=raw)
         try:
             for edge in read_edges(document.value, reading):
                 count += 1
-                yield Found(_without_slashes(edge, reading), source, document.index)
+                yield Found(edge if raw else _without_slashes(edge, reading), source, document.index)
         except Misfit as misfit:
             raise format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key) from None
         notes += [((document.index, *path), message) for path, message in reading.notes]
@@ -89,36 +110,3 @@ def tell(source: Source, notes: list[tuple[Path, str]], most: int = 10) -> None:
         warn(f"{source.name}:{line}:{column}: {message}")
     if len(notes) > most:
         warn(f"{source.name}: {len(notes) - most} more like these")
-
-
-def _hang(tree: FrameTree, first: dict[str, Found], found: Found) -> None:
-    """Add what was found to the tree, or say where it clashes with what was there."""
-    edge = found.edge
-    if edge.parent is None:
-        tree.add_root(edge.child)
-        return
-    earlier = first.setdefault(edge.child, found)
-    if earlier is not found and edge.stamp_ns != earlier.edge.stamp_ns and edge.parent == earlier.edge.parent:
-        message = f"frame {edge.child!r} moves: its stamps differ; only trees that stand still are read"
-        raise format_error(found.source, found.path, message)
-    try:
-        tree.add_components(edge.parent, edge.child, edge.pose.components)
-    except BadTopology as error:
-        message = str(error) if earlier is found else _clash(earlier, found)
-        raise format_error(found.source, found.path, message, error=BadTopology) from None
-
-
-def _clash(earlier: Found, found: Found) -> str:
-    """Say what two edges disagree about, and where each stands."""
-    child = earlier.edge.child
-    places = [_place(each, found.source) for each in (earlier, found)]
-    if earlier.edge.parent == found.edge.parent:
-        return f"frame {child!r} has two different poses in {earlier.edge.parent!r}: {places[0]} and {places[1]}"
-    parents = [f"{each.edge.parent!r} ({place})" for each, place in zip((earlier, found), places, strict=True)]
-    return f"frame {child!r} has two parents: {' and '.join(parents)}"
-
-
-def _place(found: Found, here: Source) -> str:
-    """Give `line 7`, or `other.yaml:7` in another source."""
-    line, _ = locate_many(found.source.text, [found.path])[0]
-    return f"line {line}" if found.source.name == here.name else f"{found.source.name}:{line}"

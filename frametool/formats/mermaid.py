@@ -11,10 +11,11 @@ from frametool.formats.labels import edge_label
 
 if TYPE_CHECKING:
     from frametool.formats.results import Style
+    from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
 
-def write_tree(tree: FrameTree, style: Style) -> str:
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     """Give a flowchart; nodes are numbered, because mermaid's ids take few characters, and labelled with the names."""
     ids = {frame: f"n{index}" for index, frame in enumerate(tree.frames)}
     lines = ["flowchart TD"]

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
 
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001}
-DESCRIPTIVE = frozenset(("frame", "gimbal_lock", "stamp_ns", "distance", "angle", "angle_deg"))
+TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
+DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg"))
 NAMES = frozenset(("name", "parent"))
 POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", AXES_KEY))
 AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie apart

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.formats.pose import Pose
+from frametool.frames.tree import FrameTree
 from frametool.geometry import euler, floats, quaternion
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.track import Track
     from frametool.geometry.representations import Notation
 
 
@@ -78,11 +80,30 @@ class Result:
         return entry | self.extras
 
 
-def tree_entries(tree: FrameTree, style: Style) -> Iterator[dict[str, Any]]:
-    """Give a tree as the entries of its list form: roots, then edges."""
+def tree_entries(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[dict[str, Any]]:
+    """Give a tree as the entries of its list form: roots, then edges; moving ones with their samples."""
     yield from ({"name": root} for root in tree.roots)
     for parent, child, transform in tree.edges():
-        yield Result(Pose.of(transform.components, child, parent)).mapping(style)
+        track = None if isinstance(tree, FrameTree) else tree.track(child)
+        if track is None or track.standing:
+            yield Result(Pose.of(transform.components, child, parent)).mapping(style)
+        else:
+            yield {"name": child, "parent": parent, "samples": list(_samples(track, parent, style))}
+
+
+def _samples(track: Track, parent: str, style: Style) -> Iterator[dict[str, Any]]:
+    """Give the samples of a moving frame; one under another parent than the newest names it."""
+    for stamp_ns, above, components in zip(track.stamps, track.parents, track.samples, strict=True):
+        pose = Pose.of(components, None, None if above == parent else above)
+        yield {"stamp_ns": stamp_ns} | Result(pose).mapping(style)
+
+
+def sample_results(buffer: TransformBuffer) -> Iterator[Result]:
+    """Give every sample as a result of its own, with its stamp."""
+    from frametool.frames.listing import samples
+
+    for parent, child, components, stamp_ns in samples(buffer):
+        yield Result(Pose.of(components, child, parent), {} if stamp_ns is None else {"stamp_ns": stamp_ns})
 
 
 def columns_of(form: Notation, style: Style) -> Sequence[str]:

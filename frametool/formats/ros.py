@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from frametool.frames.tree import FrameTree
 
 LISTS = ("transforms", "static_transforms")
+MARKS = frozenset(("child_frame_id", *LISTS))
 STALE = "euler_angles_degree"  # Apollo writes it beside the quaternion and does not keep it up to date
 STALE_DEGREES = 0.1
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))
@@ -35,7 +36,7 @@ _INTEGER = re.compile(r"[-+]?\d{1,25}", re.ASCII)
 
 def is_message(value: dict[str, Any]) -> bool:
     """Tell whether a mapping is a TransformStamped or a list of them."""
-    return "child_frame_id" in value or any(key in value for key in LISTS)
+    return not MARKS.isdisjoint(value)
 
 
 def messages(value: dict[str, Any], path: Path) -> Iterator[tuple[dict[str, Any], Path]]:

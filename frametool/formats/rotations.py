@@ -72,7 +72,7 @@ def rotation_of(form: Notation, texts: Sequence[Any], places: Sequence[Path], re
     """Turn one text a component into x, y, z, w, in the unit that applies, checked to be a rotation."""
     numbers, degrees = read_components(form, texts, places, reading)
     if not form.representation.can_fail:
-        return form.to_quaternion(numbers, floats, degrees=degrees)
+        return form.to_quaternion(tuple(numbers), floats, degrees=degrees)
     return _checked(form, numbers, reading, degrees=degrees)
 
 

@@ -3,6 +3,7 @@
     frames: {base: {lidar: {xyz: [0.9, 0, 2], rpy_deg: [0, 0, 90]}}}          nested: a root's keys are its children
     frames: [{name: lidar, parent: base, xyz: [0.9, 0, 2]}]                   list, any order
     {name: lidar, parent: base, xyz: [0.9, 0, 2]}                             one edge, as `lookup` prints it
+    {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a frame that moves; seconds
 
 Metres, radians unless said; every pose is that of the frame in its parent: parent_from_child.
 """
@@ -11,9 +12,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool.errors import ValueInvalid
 from frametool.formats import ros
 from frametool.formats.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
-from frametool.formats.values import Misfit, as_mapping
+from frametool.formats.values import Misfit, as_mapping, kind, within
+from frametool.frames.stamps import parse_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,8 +24,9 @@ if TYPE_CHECKING:
     from frametool.formats.values import Path, Reading
 
 TREE_KEYS = frozenset(("frames", "angles"))
-CHILDREN = frozenset(("children", "samples"))
-SAMPLES = frozenset(("samples",))
+STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
+TIMED = frozenset(("samples", *STAMP_KEYS))
+CHILDREN = frozenset(("children", *TIMED))
 
 
 class Edge(NamedTuple):
@@ -49,7 +53,7 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
     elif ros.is_message(value):
         yield from _messages(value, (), reading)
     elif "name" in value or "parent" in value:
-        yield _entry(value, (), reading)
+        yield from _entry(value, (), reading)
     else:
         raise Misfit(
             f"no frame tree: expected frames:, transforms: or an entry with name: and parent:; "
@@ -82,7 +86,7 @@ def _below_root(root: str, children: Any, reading: Reading) -> Iterator[Edge]:
         deeper = []
         for child, entry in _children(entries, path).items():
             here = (*path, child)
-            yield Edge(parent, child, _nested_pose(child, entry, here, reading), here)
+            yield from _nested(parent, child, entry, here, reading)
             if entry is not None and "children" in entry:
                 deeper.append((child, entry["children"], (*here, "children")))
         pending.extend(reversed(deeper))
@@ -95,7 +99,8 @@ def _children(entries: Any, path: Path) -> dict[str, Any]:
         raise misfit.below(*path) from None
 
 
-def _nested_pose(child: str, entry: Any, path: Path, reading: Reading) -> Pose:
+def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -> Iterator[Edge]:
+    """Give the edge of a nested entry, or its samples."""
     reading.here = path
     try:
         if entry is None:
@@ -109,11 +114,10 @@ def _nested_pose(child: str, entry: Any, path: Path, reading: Reading) -> Pose:
             if key in as_mapping(entry, f"the pose of frame {child!r}"):
                 raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)
         pose = read_pose(entry, reading, CHILDREN)
-        refuse_samples(entry, child)
+        edges = _edges(entry, pose, parent, child, path, reading)
     except Misfit as misfit:
         raise misfit.below(*path) from None
-    note_identity(pose, child, reading)
-    return pose
+    yield from edges
 
 
 def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]:
@@ -124,24 +128,31 @@ def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]
         if type(entry) is dict and ros.is_message(entry):
             yield from _messages(entry, here, reading)
         else:
-            yield _entry(entry, here, reading)
+            yield from _entry(entry, here, reading)
 
 
-def _entry(entry: Any, path: Path, reading: Reading) -> Edge:
-    """Read {name, parent, pose}; without parent and pose it only names a root."""
+def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
+    """Read {name, parent, pose} or {name, parent, samples}; without parent and pose it only names a root."""
     try:
-        pose = read_pose(as_mapping(entry, "an entry {name, parent, ..}"), reading, SAMPLES)
+        pose = read_pose(as_mapping(entry, "an entry {name, parent, ..}"), reading, TIMED)
         if pose.name is None:
             raise Misfit("missing name; an entry is {name: .., parent: .., xyz: [..], ..}")
-        refuse_samples(entry, pose.name)
-        if pose.parent is None:
-            if pose.position or pose.rotation:
-                raise Misfit(f"frame {pose.name!r} has a pose but no parent")
-            return Edge(None, pose.name, pose, path)
+        if pose.parent is None and (pose.position or pose.rotation):
+            raise Misfit(f"frame {pose.name!r} has a pose but no parent")
+        return _edges(entry, pose, pose.parent, pose.name, path, reading)
     except Misfit as misfit:
         raise misfit.below(*path) from None
-    note_identity(pose, pose.name, reading)
-    return Edge(pose.parent, pose.name, pose, path)
+
+
+def _edges(
+    entry: dict[str, Any] | None, pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
+) -> list[Edge]:
+    """Give what one entry says: an edge that stands still or has one stamp, or the samples of one that moves."""
+    if entry is not None and "samples" in entry:
+        return read_samples(entry, pose, parent, child, path, reading)
+    if parent is not None and pose.position is None and pose.rotation is None:
+        reading.note(f"frame {child!r} has neither position nor rotation: taken as the identity")
+    return [Edge(parent, child, pose, path, stamp_of(entry or {}))]
 
 
 def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[Edge]:
@@ -149,19 +160,68 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
     for message, here in ros.messages(value, path):
         reading.here = here
         try:
-            parent, child, position, rotation, stamp_ns = ros.read_transform(message, reading)
+            yield _message(message, here, reading)
         except Misfit as misfit:
             raise misfit.below(*here) from None
-        yield Edge(parent, child, Pose(position, rotation), here, stamp_ns)
 
 
-def refuse_samples(entry: dict[str, Any] | None, child: str) -> None:
-    """Refuse a moving frame: lookups in time are not built yet, and dropping it would be a wrong answer."""
-    if entry is not None and "samples" in entry:
-        raise Misfit(f"frame {child!r} moves (samples:); only trees that stand still are read", ("samples",), key=True)
+def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
+    """Read one TransformStamped, checked, or as tf2 receives it."""
+    if reading.raw:
+        from frametool.formats.as_received import read_transform
+
+        parent, child, components, stamp_ns = read_transform(message)
+        return Edge(parent, child, Pose.of(components), path, stamp_ns)
+    parent, child, position, rotation, stamp_ns = ros.read_transform(message, reading)
+    return Edge(parent, child, Pose(position, rotation), path, stamp_ns)
 
 
-def note_identity(pose: Pose, child: str, reading: Reading) -> None:
-    """Wonder about an entry without any numbers."""
-    if pose.position is None and pose.rotation is None:
-        reading.note(f"frame {child!r} has neither position nor rotation: taken as the identity")
+def read_samples(
+    entry: dict[str, Any], pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
+) -> list[Edge]:
+    """Read `samples: [{stamp: 0.0, xyz: [..]}, ..]`; a sample may name a parent of its own."""
+    if pose.position is not None or pose.rotation is not None or not STAMP_KEYS.isdisjoint(entry):
+        message = f"frame {child!r} has samples and a pose or a stamp beside them; put all into samples"
+        raise Misfit(message, ("samples",), key=True)
+    samples = entry["samples"]
+    if type(samples) is not list or not samples:
+        raise Misfit(f"expected samples as a list of {{stamp: .., xyz: [..], ..}}, found {kind(samples)}", ("samples",))
+    outer = reading.degrees
+    reading.degrees = read_angle_unit(entry["angles"]) if "angles" in entry else outer
+    edges = []
+    for index, sample in enumerate(samples):
+        reading.here = (*path, "samples", index)
+        moved, stamp_ns = within(("samples", index), _sample, sample, reading)
+        above = moved.parent or parent
+        if above is None:
+            raise Misfit(f"frame {child!r} moves but has no parent", ("samples", index))
+        edges.append(Edge(above, child, moved, reading.here, stamp_ns))
+    reading.degrees = outer
+    return edges
+
+
+def _sample(sample: Any, reading: Reading) -> tuple[Pose, int]:
+    """Read one pose with its stamp."""
+    pose = read_pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
+    if pose.name is not None:
+        raise Misfit("name is given by the entry; leave it out", ("name",), key=True)
+    stamp_ns = stamp_of(sample)
+    if stamp_ns is None:
+        raise Misfit("missing stamp; a sample is {stamp: 12.5, xyz: [..], ..}, in seconds")
+    return pose, stamp_ns
+
+
+def stamp_of(entry: dict[str, Any]) -> int | None:
+    """Read `stamp: 12.5` in seconds or `stamp_ns: 12500000000`, exactly; None where there is neither."""
+    if STAMP_KEYS.isdisjoint(entry):
+        return None
+    keys = [key for key in ("stamp", "stamp_ns") if key in entry]
+    if len(keys) > 1:
+        raise Misfit("stamp and stamp_ns in one entry; keep one", ("stamp",), key=True)
+    text = entry[keys[0]]
+    if type(text) is not str:
+        raise Misfit(f"expected a time, found {kind(text)}", (keys[0],))
+    try:
+        return parse_stamp(text if keys[0] == "stamp" else f"{text}ns")
+    except ValueInvalid as error:
+        raise Misfit(str(error), (keys[0],)) from None

@@ -41,13 +41,17 @@ class NotARotation(Misfit):
 class Reading:
     """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
 
-    __slots__ = ("degrees", "here", "normalize", "notes", "source")
+    __slots__ = ("degrees", "here", "normalize", "notes", "raw", "source")
 
-    def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False) -> None:
-        """Begin at the top of a document of `source`; `notes` collects (path, message)."""
+    def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False) -> None:
+        """Begin at the top of a document of `source`; `notes` collects (path, message).
+
+        raw: take messages as they are; whoever gets them judges.
+        """
         self.source = source
         self.degrees = degrees
         self.normalize = normalize
+        self.raw = raw
         self.here: Path = ()
         self.notes: list[tuple[Path, str]] = []
 

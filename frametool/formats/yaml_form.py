@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frametool.formats.results import Result, Style
+    from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
 
@@ -30,7 +31,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     return "---\n".join(dump(record, style.number) for record in records)
 
 
-def write_tree(tree: FrameTree, style: Style) -> str:
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     """Give the tree in the list form, roots first."""
     entries = "".join(f"  - {_flow(entry, style)}\n" for entry in tree_entries(tree, style))
     return f"frames:\n{entries}"

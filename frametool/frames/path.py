@@ -42,7 +42,8 @@ def edges_between(target: str, source: str, parent_of: Callable[[str], str | Non
         raise NotConnected(
             f"{target!r} and {source!r} are not connected: {target!r} hangs from root {target_line[-1]!r}, "
             f"{source!r} from root {source_line[-1]!r}",
-        )
+            target=target, source=source, target_root=target_line[-1], source_root=source_line[-1],
+        )  # fmt: skip
     while target_line and source_line and target_line[-1] == source_line[-1]:
         target_line.pop()
         source_line.pop()

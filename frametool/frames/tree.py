@@ -11,9 +11,11 @@ from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+    from typing import Any
 
     from frametool.geometry.kinds import Rigid
 
+MOST_KEPT = 1 << 14  # answers
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -32,6 +34,7 @@ class FrameTree:
         self.name = name
         self._edges: dict[str, tuple[str, Rigid]] = {}
         self._frames: dict[str, None] = {}
+        self._kept: dict[tuple[str, str], Rigid] = {}  # (target, source) -> the answer, until an edge is added
         self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
 
     def add(self, parent: str, child: str, transform: Transform) -> None:
@@ -56,6 +59,7 @@ class FrameTree:
         self._frames[parent] = None
         self._frames[child] = None
         self._edges[child] = (parent, components)
+        self._kept.clear()
         self._upward[child] = parent
 
     def add_root(self, frame: str) -> None:
@@ -108,12 +112,37 @@ class FrameTree:
         at_ns: any time, or None; frames that stand still answer all alike.
         Raises UnknownFrame (also for a frame against itself), NotConnected.
         """
+        found = self._kept.get((target, source))
+        if found is None:
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
+            found = self._kept[target, source] = self._lookup(target, source)
+        return Transform.of(*found)
+
+    def _lookup(self, target: str, source: str) -> Rigid:
+        """Find the way and compose what lies on it."""
         down, up = self._between(target, source)
         target_from_top: Rigid = rigid.inverse(*self._product(down)) if down else IDENTITY
         if not up:
-            return Transform.of(*target_from_top)
+            return target_from_top
         top_from_source = self._product(reversed(up))
-        return Transform.of(*(rigid.compose(*target_from_top, *top_from_source) if down else top_from_source))
+        return rigid.compose(*target_from_top, *top_from_source) if down else top_from_source
+
+    def latest(self, target: str, source: str) -> None:
+        """Give no stamp, as nothing moves; raises UnknownFrame, NotConnected."""
+        self._between(target, source)
+
+    def lookup_across(
+        self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str
+    ) -> Transform:
+        """Give target_from_source by way of a fixed frame, as TransformBuffer does; any times are alike."""
+        return self.lookup(target, fixed, target_at_ns) @ self.lookup(fixed, source, source_at_ns)
+
+    def lookup_many(self, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
+        """Give target_from_source for each of many times, all alike; see TransformBuffer.lookup_many."""
+        from frametool.frames.batch import lookup_still
+
+        return lookup_still(self, target, source, at_ns, missing=missing)
 
     def _product(self, children: Iterable[str]) -> Rigid:
         """Compose the edges of the named children, topmost first."""

@@ -6,8 +6,6 @@ and three axis letters in the order of the rotations. Angles stand in the order 
 
 from __future__ import annotations
 
-from math import pi, tau
-
 from frametool.geometry.quaternion import EPS, settled
 
 TYPE_CHECKING = False
@@ -71,20 +69,18 @@ def from_quaternion(
 
     The middle angle lies in [-pi/2, pi/2], or in [0, pi] where the outer axes are the same; the others in (-pi, pi].
     At gimbal lock the third is 0.  Degrees are exact at multiples of 90.
-    Source: Bernardes & Viollet 2022; the middle angle from its sine, so that small ones keep their digits.
+    Source: Bernardes & Viollet 2022, sum and difference of two angles taken as directions, by a complex product;
+    the middle angle from its sine, so that small ones keep their digits.
     """
     i, j, k, parity, symmetric, static = AXES[axes]
     a, b, c, d = _pairs((x, y, z), w, i, j, k, parity, symmetric)
     squared_sum, squared_difference = a * a + b * b, c * c + d * d
     middle = _middle((x, y, z), w, i, j, k, parity, symmetric, squared_sum, squared_difference, xp)
-    half_sum, half_difference = xp.bearing(b, a), xp.bearing(d, c)
-    limit = LOCK * (squared_sum + squared_difference)
-    no_sum, no_difference = squared_sum <= limit, squared_difference <= limit
-    if xp.some(no_sum | no_difference):
-        third_away = 0.0 - half_sum if static else half_sum
-        half_sum = xp.where(no_sum, 0.0 - half_difference if static else half_difference, half_sum)
-        half_difference = xp.where(no_difference, third_away, half_difference)
-    outer, inner = _wrapped(half_sum + half_difference, xp), _wrapped(half_sum - half_difference, xp)
+    radius = xp.sqrt(squared_sum * squared_difference)
+    if xp.some(xp.minimum(squared_sum, squared_difference) <= LOCK * (squared_sum + squared_difference)):
+        a, b, c, d, radius = _without_third(a, b, c, d, squared_sum, squared_difference, radius, static, xp)
+    ac, bd, ad, bc = a * c, b * d, a * d, b * c
+    outer, inner = xp.bearing(bc + ad + 0.0, ac - bd, radius), xp.bearing(bc - ad + 0.0, ac + bd, radius)
     first, third = (inner, outer) if static else (outer, inner)
     return (xp.degrees(first), xp.degrees(middle), xp.degrees(third)) if degrees else (first, middle, third)
 
@@ -120,6 +116,19 @@ def _middle(
     return xp.incline(sine, xp.sqrt(squared_sum * squared_difference))
 
 
-def _wrapped(angle: Number, xp: Namespace) -> Number:
-    """Bring an angle between -2 pi and 2 pi into (-pi, pi]."""
-    return xp.minimum(angle - tau * xp.ceil(angle / tau - 0.5), pi)
+def _without_third(
+    a: Number, b: Number, c: Number, d: Number, squared_sum: Number, squared_difference: Number, radius: Number,
+    static: bool, xp: Namespace,  # noqa: FBT001
+) -> tuple[Number, Number, Number, Number, Number]:  # fmt: skip
+    """Give the pairs, and the product of their lengths, with the pair that vanished at lock set to the other.
+
+    To its mirror image where the axes are static: so the third angle becomes 0.
+    """
+    limit = LOCK * (squared_sum + squared_difference)
+    no_sum, no_difference = squared_sum <= limit, squared_difference <= limit
+    mirrored_b, mirrored_d = (0.0 - b, 0.0 - d) if static else (b, d)
+    radius = xp.where(no_sum, squared_difference, xp.where(no_difference, squared_sum, radius))
+    return (
+        xp.where(no_sum, c, a), xp.where(no_sum, mirrored_d, b),
+        xp.where(no_difference, a, c), xp.where(no_difference, mirrored_b, d), radius,
+    )  # fmt: skip

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from math import atan2, cbrt, ceil, copysign, cos, degrees, fmod, frexp, ldexp, radians, sin, sqrt
+from math import atan2, cbrt, copysign, cos, degrees, fmod, frexp, ldexp, radians, sin, sqrt
 from math import hypot as length
 
 __all__ = [
-    "bearing", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
-    "incline", "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
+    "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos",
+    "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some", "sqrt",
+    "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 SQRT_HALF = sqrt(0.5)
 maximum, minimum = max, min
-bearing = incline = atan2
+incline = atan2
 largest = abs
 some = bool
 
@@ -26,9 +27,16 @@ def where(condition: bool, yes: float, no: float) -> float:  # noqa: FBT001 - nu
     return yes if condition else no
 
 
-def negated_where(condition: bool, *values: float) -> tuple[float, ...]:  # noqa: FBT001 - as `where`
-    """Give the values negated if the condition holds, zeros as +0; else as they are."""
-    return tuple([0.0 - value for value in values]) if condition else values
+def canonical_sign(x: float, y: float, z: float, w: float) -> tuple[float, float, float, float]:
+    """Give q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0."""
+    if (w or x or y or z) < 0.0:
+        return 0.0 - x, 0.0 - y, 0.0 - z, 0.0 - w
+    return x, y, z, w
+
+
+def bearing(y: float, x: float, _radius: float) -> float:
+    """Give the angle of a direction in [-pi, pi]; arrays profit from knowing its length."""
+    return atan2(y, x)
 
 
 def first_nonzero(*values: float) -> float:

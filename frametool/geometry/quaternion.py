@@ -90,7 +90,7 @@ def normalized(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Qua
 
 def canonical(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
     """Choose between q and -q: w > 0, or w == 0 and the first non-zero of x, y, z positive."""
-    quaternion: Quaternion = xp.negated_where(xp.first_nonzero(w, x, y, z) < 0.0, x, y, z, w)
+    quaternion: Quaternion = xp.canonical_sign(x, y, z, w)
     return quaternion
 
 
@@ -113,8 +113,7 @@ def arc(
     """
     apart = xp.sqrt(squared_norm(bx - ax, by - ay, bz - az, bw - aw))
     along = xp.sqrt(squared_norm(bx + ax, by + ay, bz + az, bw + aw))
-    nearer = apart <= along
-    return 2.0 * xp.incline(xp.where(nearer, apart, along), xp.where(nearer, along, apart))
+    return 2.0 * xp.incline(0.5 * xp.minimum(apart, along), 0.5 * xp.maximum(apart, along))
 
 
 def distance(

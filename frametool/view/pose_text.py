@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.formats.results import is_locked, rotation_entry, rotation_numbers
+from frametool.frames.stamps import format_stamp
 from frametool.geometry.representations import notation
 
 if TYPE_CHECKING:
@@ -60,14 +61,19 @@ def _describe(result: Result, style: Style) -> str:
         for form in style.notations or tuple(map(notation, EVERYTHING)):
             lines += _rotation_lines(pose, form, style)
     lines += [Line(*extra) for extra in _extra_lines(result)]
-    return _heading(pose) + _layout(lines, style)
+    return _heading(result) + _layout(lines, style)
 
 
-def _heading(pose: Pose) -> str:
-    """Say in words which frame is seen from which."""
+def _heading(result: Result) -> str:
+    """Say in words which frame is seen from which, and when."""
+    pose = result.pose
     if pose.name is None or pose.parent is None:
         return ""
-    return f"{pose.name} seen from {pose.parent}  (maps points in {pose.name} to points in {pose.parent})\n"
+    at, source_at, fixed = (result.extras.get(key) for key in ("stamp_ns", "source_stamp_ns", "fixed"))
+    source = pose.name if source_at is None else f"{pose.name} at {format_stamp(source_at)}"
+    target = pose.parent if at is None else f"{pose.parent} at {format_stamp(at)}"
+    across = "" if fixed is None else f" with {fixed} standing still"
+    return f"{source} seen from {target}{across}  (maps points in {pose.name} to points in {pose.parent})\n"
 
 
 def _rotation_lines(pose: Pose, form: Notation, style: Style) -> Iterator[Line]:

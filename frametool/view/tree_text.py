@@ -6,12 +6,13 @@ import sys
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.formats.labels import edge_label
+from frametool.frames.tree import FrameTree
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.formats.results import Style
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.transform import Transform
 
 
@@ -23,14 +24,14 @@ class Line(NamedTuple):
     label: tuple[str, ...]
 
 
-def write_tree(tree: FrameTree, style: Style) -> str:
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     """Draw a tree with plain lines: each frame below its parent, its pose beside it."""
     return "".join(
         f"{line.branch}{line.frame}{pad}{'  '.join(line.label)}".rstrip() + "\n" for line, pad in _padded(tree, style)
     )
 
 
-def print_tree(tree: FrameTree, style: Style) -> None:
+def print_tree(tree: FrameTree | TransformBuffer, style: Style) -> None:
     """Draw a tree on the terminal, in colour where it has any."""
     from rich.console import Console
     from rich.text import Text
@@ -41,7 +42,18 @@ def print_tree(tree: FrameTree, style: Style) -> None:
         console.print(Text.assemble((line.branch, "dim"), (line.frame, name), pad, ("  ".join(line.label), "cyan")))
 
 
-def _padded(tree: FrameTree, style: Style) -> Iterator[tuple[Line, str]]:
+def _label(tree: FrameTree | TransformBuffer, child: str, transform: Transform, style: Style) -> tuple[str, ...]:
+    """Give the pose of an edge, and how it moves: its newest pose then."""
+    label = edge_label(transform, style)
+    if isinstance(tree, FrameTree):
+        return label
+    from frametool.frames.listing import motion
+
+    track = tree.track(child)
+    return label if track is None or track.standing else (*label, motion(track))
+
+
+def _padded(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[tuple[Line, str]]:
     """Give the lines with the blanks that bring their poses below one another."""
     lines = list(_lines(tree, style))
     width = max((len(line.branch) + len(line.frame) for line in lines), default=0)
@@ -51,15 +63,15 @@ def _padded(tree: FrameTree, style: Style) -> Iterator[tuple[Line, str]]:
         yield line._replace(label=label), " " * bool(label) * (width - len(line.branch) - len(line.frame) + 2)
 
 
-def _lines(tree: FrameTree, style: Style) -> Iterator[Line]:
+def _lines(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[Line]:
     """Walk the tree from its roots, children in the order they were added; a stack, so that no tree is too deep."""
-    children: dict[str, list[tuple[str, Transform]]] = {}
+    children: dict[str, list[tuple[str, tuple[str, ...]]]] = {}
     for parent, child, transform in tree.edges():
-        children.setdefault(parent, []).append((child, transform))
-    pending: list[tuple[str, Transform | None, str, str]] = [(root, None, "", "") for root in reversed(tree.roots)]
+        children.setdefault(parent, []).append((child, _label(tree, child, transform, style)))
+    pending: list[tuple[str, tuple[str, ...], str, str]] = [(root, (), "", "") for root in reversed(tree.roots)]
     while pending:
-        frame, pose, branch, below = pending.pop()
-        yield Line(branch, frame, edge_label(pose, style) if pose is not None else ())
+        frame, label, branch, below = pending.pop()
+        yield Line(branch, frame, label)
         inner = children.get(frame, ())
         for at in range(len(inner) - 1, -1, -1):
             last = at == len(inner) - 1

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool import load
+from frametool import FrameTree, load
 from frametool.errors import BadTopology, FormatError
 from frametool.formats.records import read_poses
 from frametool.formats.source import Source
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from frametool import FrameTree
 
 NESTED = """\
 angles: deg
@@ -70,7 +68,9 @@ def tree_of(tmp_path: Path, *texts: str | bytes) -> FrameTree:
     paths = [tmp_path / f"{number}.yaml" for number in range(len(texts))]
     for path, text in zip(paths, texts, strict=True):
         path.write_bytes(text.encode() if isinstance(text, str) else text)
-    return load(*paths)
+    tree = load(*paths)
+    assert isinstance(tree, FrameTree)
+    return tree
 
 
 def refusal(tmp_path: Path, *texts: str | bytes) -> str:

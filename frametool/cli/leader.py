@@ -1,0 +1,42 @@
+"""Leaders from the command line: a built-in name, a file, standard input."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+from frametool.errors import alternatives
+from frametool.formats.source import Source, read_text
+from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
+from frametool.sim.twists import read_script, read_twists, stdin_lines
+
+if TYPE_CHECKING:
+    from frametool.sim.leaders import MakeLeader
+
+
+def leader_of(argument: str, seed: int, *, paced: bool) -> MakeLeader:
+    """Give the leader of an argument; `paced`: what comes from standard input acts when it arrives.
+
+    Raises FormatError; FileProblem; click.UsageError for a name that is neither a leader nor a file.
+    """
+    if argument in LEADERS:
+        return built_in(argument, seed)
+    if argument == "-":
+        return _from_stdin(paced=paced)
+    if not os.path.exists(argument) and not os.path.splitext(argument)[1]:  # noqa: PTH110, PTH122 - pathlib costs 6 ms
+        raise click.UsageError(f"no leader {argument!r}{alternatives(argument, LEADERS, 'leaders')}, or a file")
+    return scripted(read_script(Source(argument, read_text(argument))))
+
+
+def _from_stdin(*, paced: bool) -> MakeLeader:
+    """Read commands as they come: by their times, or in real time whenever they arrive."""
+    if sys.stdin.isatty():
+        raise click.UsageError("standard input is a terminal; pipe commands in, or see frametool sim teleop")
+    if not paced:
+        return scripted(read_twists(stdin_lines(), "stdin"))
+    mailbox = Mailbox()
+    mailbox.fill_from(read_twists(stdin_lines(), "stdin", period_ns=0))
+    return lambda: mailbox

@@ -1,0 +1,205 @@
+"""Edges put together: a FrameTree while everything stands still, a TransformBuffer once something moves.
+
+Knows nothing of text: whoever reads says where each edge stood.
+"""
+
+from __future__ import annotations
+
+from frametool.errors import BadTopology, FormatError, ValueInvalid, warn
+from frametool.frames.tree import FrameTree
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Protocol
+
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.track import Track
+    from frametool.geometry.kinds import Rigid
+
+    class Place(Protocol):
+        """Where an edge was read."""
+
+        def error(self, message: str, kind: type[FormatError]) -> FormatError:
+            """Make the error for this place."""
+
+        def seen_from(self, other: Place) -> str:
+            """Name this place beside another one: `line 7`, or `other.yaml:7` in another source."""
+
+
+class Rules:
+    """How moving frames are taken."""
+
+    __slots__ = ("keep_ns", "moving", "policy")
+
+    def __init__(self, *, moving: bool = False, policy: str = "frametool", keep_ns: int | None = None) -> None:
+        """Keep the rules.
+
+        moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still.
+        policy, keep_ns: as TransformBuffer has them.
+        """
+        self.moving = moving
+        self.policy = policy
+        self.keep_ns = keep_ns
+
+
+class Replaced:
+    """A sample that took the place of another one at the same stamp."""
+
+    __slots__ = ("child", "earlier", "later", "parent", "stamp_ns")
+
+    def __init__(self, parent: str, child: str, stamp_ns: int, earlier: Place, later: Place) -> None:
+        """Keep what was said last, and where the two stood."""
+        self.parent = parent
+        self.child = child
+        self.stamp_ns = stamp_ns
+        self.earlier = earlier
+        self.later = later
+
+    @property
+    def places(self) -> str:
+        """Name both places."""
+        return f"{self.earlier.seen_from(self.later)} and {self.later.seen_from(self.later)}"
+
+
+class Assembly:
+    """What has been read so far, and where the first word on each frame stood."""
+
+    def __init__(self, name: str, rules: Rules | None = None) -> None:
+        """Begin with no frames; `name` says in messages where they come from."""
+        self.name = name
+        self.rules = rules or Rules()
+        self.tree = FrameTree(name)
+        self.buffer: TransformBuffer | None = None
+        self._first: dict[str, tuple[str, Rigid, Place]] = {}  # child -> what was said first
+        self._places: dict[str, dict[int, Place]] = {}  # child -> stamp -> where that sample stood
+        self._replaced: list[Replaced] = []
+        self._stamps: dict[str, int] = {}  # child -> its one stamp, while it has no other
+        self._moves: set[str] = set()
+
+    def add_root(self, frame: str) -> None:
+        """Make a frame known that has no parent (yet)."""
+        (self.tree if self.buffer is None else self.buffer).add_root(frame)
+
+    def add(self, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: Place) -> None:
+        """Add one edge, or one sample of it.
+
+        Raises BadTopology and FormatError with the place; where tf2 would log and drop, that is a warning in its words.
+        """
+        try:
+            if self.buffer is None and stamp_ns is None and self.rules.policy == "frametool":
+                self._hang(parent, child, components, place)
+            else:
+                self._record(self._moving(), parent, child, components, stamp_ns, place)
+        except BadTopology as error:
+            if error.source:
+                raise
+            raise place.error(self._explained(error, parent, child, place), BadTopology) from None
+        except ValueInvalid as error:
+            if lines := getattr(error, "lines", None):
+                tell_rejected(lines)
+            else:
+                raise place.error(str(error), FormatError) from None
+
+    def finish(self) -> FrameTree | TransformBuffer:
+        """Give the tree, or the buffer if anything moves."""
+        if self.buffer is None:
+            return self.tree
+        standing = [] if self.rules.moving else [track for track in self.buffer.tracks() if self._stands(track)]
+        for track in standing:
+            self.buffer.make_stand(track.child)
+        self._tell_replaced({track.child for track in standing})
+        self._check_standing(self.buffer)
+        everything_stands = all(track.standing for track in self.buffer.tracks())
+        return self.tree if everything_stands and self.rules.policy == "frametool" else self.buffer
+
+    def _hang(self, parent: str, child: str, components: Rigid, place: Place) -> None:
+        """Add an edge that stands still."""
+        self._first.setdefault(child, (parent, components, place))
+        self.tree.add_components(parent, child, components)
+
+    def _moving(self) -> TransformBuffer:
+        """Give the buffer; at the first stamp it takes over what stands still."""
+        if self.buffer is None:
+            from frametool.frames.buffer import TransformBuffer
+
+            self.buffer = TransformBuffer(keep_ns=self.rules.keep_ns, policy=self.rules.policy, name=self.name)
+            for frame in self.tree.frames:
+                self.buffer.add_root(frame)
+            for child, (parent, components, _) in self._first.items():
+                self.buffer.insert_components(parent, child, components)
+        return self.buffer
+
+    def _record(
+        self, buffer: TransformBuffer, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: Place
+    ) -> None:
+        """Add a sample, or a standing edge beside samples."""
+        track = buffer.track(child)
+        settled = track is not None and child not in self._moves and (track.standing or stamp_ns is None)
+        if track is not None and settled and (track.parent, track.samples[-1]) == (parent, components):
+            return  # said again, once with and once without a stamp
+        self._first.setdefault(child, (parent, components, place))
+        if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
+            self._moves.add(child)
+        elif stamp_ns is not None and track is not None and self.rules.policy != "frametool":
+            self._moves.add(child)  # tf2 takes no stamp twice: what comes twice was not latched
+        replaced = buffer.insert_components(parent, child, components, stamp_ns)
+        if stamp_ns is not None:
+            places = self._places.setdefault(child, {})
+            if replaced:
+                self._replaced.append(Replaced(parent, child, stamp_ns, places.get(stamp_ns, place), place))
+            places[stamp_ns] = place
+
+    def _stands(self, track: Track) -> bool:
+        """Say whether a track whose samples carry one stamp is that of a standing frame."""
+        return not track.standing and track.child not in self._moves
+
+    def _tell_replaced(self, standing: set[str], most: int = 10) -> None:
+        """Refuse standing frames with two values; warn of moving ones with two poses at one stamp."""
+        from frametool.frames.stamps import format_stamp
+
+        for each in self._replaced:
+            if each.child in standing:
+                message = self._explained(BadTopology(""), each.parent, each.child, each.later)
+                raise each.later.error(message, BadTopology)
+        for each in self._replaced[:most]:
+            what = f"frame {each.child!r} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
+            warn(f"{self.name}: {what}; the last one holds")
+        if len(self._replaced) > most:
+            warn(f"{self.name}: {len(self._replaced) - most} more frames with two poses at one stamp")
+
+    def _check_standing(self, buffer: TransformBuffer) -> None:
+        """Hold all that stands still to a tree's rules."""
+        if self.rules.policy != "frametool":
+            return
+        self.tree = FrameTree(self.name)
+        for frame in buffer.frames:
+            self.tree.add_root(frame)
+        for track in buffer.tracks():
+            if track.standing:
+                try:
+                    self.tree.add_components(track.parent, track.child, track.samples[0])
+                except BadTopology as error:
+                    raise self._first[track.child][2].error(str(error), BadTopology) from None
+
+    def _explained(self, error: BadTopology, parent: str, child: str, place: Place) -> str:
+        """Say where the other word on a frame stood."""
+        known = self._first.get(child)
+        if known is None or known[2] is place:
+            return str(error)
+        known_parent, _, earlier = known
+        places = earlier.seen_from(place), place.seen_from(place)
+        if known_parent != parent:
+            return f"frame {child!r} has two parents: {known_parent!r} ({places[0]}) and {parent!r} ({places[1]})"
+        if "moves" in str(error):
+            return f"{error}: {places[0]} and {places[1]}"
+        return f"frame {child!r} has two different poses in {parent!r}: {places[0]} and {places[1]}"
+
+
+def tell_rejected(lines: list[str]) -> None:
+    """Tell what tf2 would have logged of a transform it drops."""
+    import warnings
+
+    from frametool.errors import Tf2Warning
+
+    for line in lines:
+        warnings.warn(line, Tf2Warning, stacklevel=4)

@@ -1,0 +1,69 @@
+"""The follower's law: from where the target is, seen by the turtle, to a velocity command."""
+
+from __future__ import annotations
+
+import math
+
+from frametool.errors import ValueInvalid
+from frametool.frames.stamps import BILLION
+from frametool.sim.turtle import Twist
+
+# law -> rate in Hz, linear gain in 1/s, angular gain in 1/s: turtle_tf2_listener of each ROS
+LAWS = {"ros1": (10.0, 0.5, 4.0), "ros2": (1.0, 0.5, 1.0)}
+SLOWEST, FASTEST = 1e-6, 1e6  # Hz; two steps must not fall on one nanosecond
+ARRIVED = 2e-6  # metres: positions near 11 m are float32, 1e-6 apart; a bearing between neighbours is rounding
+
+
+class FollowController:
+    """Drive towards a target: linear = gain * distance, angular = gain * bearing; each limited if told.
+
+        FollowController().command(1.0, 1.0)         # Twist(linear_x=0.707.., angular_z=3.14159..)
+
+    law: "ros1" or "ros2", for whatever is None.  rate in Hz, gains in 1/s, limits in m/s and rad/s (None: no limit).
+    At distance zero (below ARRIVED) the command is zero: the bearing is rounding noise there and makes turtles spin.
+    """
+
+    def __init__(
+        self, law: str = "ros1", *, rate: float | None = None, gain_linear: float | None = None,
+        gain_angular: float | None = None, max_linear: float | None = None, max_angular: float | None = None,
+    ) -> None:
+        """Take what is given and the law's own numbers for the rest.
+
+        Raises:
+            ValueInvalid: unknown law, impossible rate, negative limit, a gain that is not finite.
+        """
+        if law not in LAWS:
+            raise ValueInvalid(f"no law {law!r}; laws: {', '.join(LAWS)}")
+        own_rate, own_linear, own_angular = LAWS[law]
+        self.rate = _checked("rate", own_rate if rate is None else rate, SLOWEST, FASTEST)
+        self.gain_linear = _checked("gain_linear", own_linear if gain_linear is None else gain_linear)
+        self.gain_angular = _checked("gain_angular", own_angular if gain_angular is None else gain_angular)
+        self.max_linear = math.inf if max_linear is None else _checked("max_linear", max_linear, 0.0)
+        self.max_angular = math.inf if max_angular is None else _checked("max_angular", max_angular, 0.0)
+
+    def command(self, x: float, y: float) -> Twist:
+        """Give the command for a target seen at x ahead, y to the left (metres)."""
+        distance = math.sqrt(x * x + y * y)
+        if distance < ARRIVED:
+            return Twist(0.0, 0.0)
+        linear = self.gain_linear * distance
+        angular = self.gain_angular * math.atan2(y, x)
+        return Twist(_limited(linear, self.max_linear), _limited(angular, self.max_angular))
+
+    def due_ns(self, count: int) -> int:
+        """Give the time of the control step of that number, from 0; rounded once, so that no rate drifts."""
+        return round(count * BILLION / self.rate)
+
+
+def _limited(value: float, most: float) -> float:
+    return max(-most, min(most, value))
+
+
+def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:
+    """Give a number back if it is finite and within its bounds."""
+    if not math.isfinite(value):
+        raise ValueInvalid(f"{name} must be finite, found {value}")
+    if not least <= value <= most:
+        bounds = f"{least:g} or more" if most == math.inf else f"{least:g} .. {most:g} Hz"
+        raise ValueInvalid(f"{name} must be {bounds}, found {value:g}")
+    return float(value)

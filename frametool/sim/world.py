@@ -1,0 +1,165 @@
+"""turtlesim's world: turtles by name, its clock's ticks, its services with their refusals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import ValueInvalid
+from frametool.sim.turtle import CENTRE, Pen, Turtle, single
+
+if TYPE_CHECKING:
+    from frametool.sim.turtle import State
+
+VARIANTS = ("ros1", "ros2")
+# service -> its arguments and what they are when left out (None: must be given)
+SERVICES: dict[str, dict[str, float | str | None]] = {
+    "spawn": {"x": None, "y": None, "theta": 0.0, "name": ""},
+    "kill": {"name": None},
+    "reset": {},
+    "clear": {},
+    "teleport_absolute": {"turtle": None, "x": None, "y": None, "theta": 0.0},
+    "teleport_relative": {"turtle": None, "linear": 0.0, "angular": 0.0},
+    "rotate_absolute": {"turtle": None, "theta": None},
+    "set_pen": {"turtle": None, "r": 0.0, "g": 0.0, "b": 0.0, "width": 0.0, "off": 0.0},
+}
+
+
+class ServiceRefused(ValueInvalid):
+    """Report a service call that turtlesim refuses, in its own words."""
+
+
+class WallHit(NamedTuple):
+    """A tick at which a turtle was put back to the wall; `place` is where it would have been, y up."""
+
+    t_ns: int
+    turtle: str
+    place: State
+
+    def __str__(self) -> str:
+        """Warn as turtlesim does, with y up."""
+        return f"{self.turtle}: Oh no! I hit the wall! (Clamping from [x={self.place.x:f}, y={self.place.y:f}])"
+
+
+class World:
+    """Hold the turtles and move them all, in the order of their names, at every tick.
+
+        world = World()
+        world.spawn(4.0, 2.0, 0.0, "turtle2")
+        world.tick(16_000_000)
+
+    variant: "ros1" or "ros2"; they differ in wording, in `rotate_absolute`, and in `holonomic`, which ROS 1 always is.
+    """
+
+    def __init__(self, variant: str = "ros1", *, holonomic: bool = False) -> None:
+        """Begin an empty world; `reset` gives it turtle1, as the node does when it starts."""
+        if variant not in VARIANTS:
+            raise ValueInvalid(f"no turtlesim {variant!r}; there are {', '.join(VARIANTS)}")
+        self.variant = variant
+        self.holonomic = holonomic or variant == "ros1"
+        self.turtles: dict[str, Turtle] = {}
+        self.clears = 0  # how often the drawing was cleared
+        self._count = 0
+
+    def spawn(self, x: float = CENTRE, y: float = CENTRE, theta: float = 0.0, name: str = "") -> str:
+        """Put a turtle into the world; without a name it gets the next free turtleN. Returns its name.
+
+        Raises ServiceRefused when the name is taken.
+        """
+        if name in self.turtles:
+            article = "turtled" if self.variant == "ros1" else "turtle"
+            raise ServiceRefused(f"A {article} named [{name}] already exists")
+        while not name or name in self.turtles:
+            self._count += 1
+            name = f"turtle{self._count}"
+        self.turtles[name] = Turtle(x, y, theta, name=name, holonomic=self.holonomic)
+        self.turtles = dict(sorted(self.turtles.items()))
+        return name
+
+    def kill(self, name: str) -> None:
+        """Take a turtle out of the world.
+
+        Raises ServiceRefused when there is none of that name.
+        """
+        if name not in self.turtles:
+            raise ServiceRefused(f"Tried to kill turtle [{name}], which does not exist")
+        self.turtles = {each: turtle for each, turtle in self.turtles.items() if each != name}
+
+    def reset(self) -> None:
+        """Take all turtles out, begin to count anew, and put turtle1 in the centre; the drawing is cleared."""
+        self.turtles = {}
+        self._count = 0
+        self.clear()
+        self.spawn()
+
+    def clear(self) -> None:
+        """Clear the drawing."""
+        self.clears += 1
+
+    def turtle(self, name: str) -> Turtle:
+        """Give a turtle by name.
+
+        Raises ServiceRefused when there is none: its services went with it.
+        """
+        if name not in self.turtles:
+            raise ServiceRefused(f"no turtle [{name}] to call; turtles: {', '.join(self.turtles) or 'none'}")
+        return self.turtles[name]
+
+    def call(self, service: str, **arguments: float | str) -> str:
+        """Call a service of the table SERVICES by name; what is left out takes the table's value.
+
+        Returns what turtlesim logs of it, or "".
+        Raises ServiceRefused; ValueInvalid for an unknown service or a wrong argument.
+        """
+        given = complete(service, arguments)
+        if self.variant == "ros1" and service == "rotate_absolute":
+            raise ServiceRefused("rotate_absolute is an action of the ROS 2 turtlesim; add turtlesim: ros2")
+        answer = getattr(self, f"_{service}")(**given)
+        return str(answer or "")
+
+    def _spawn(self, x: float, y: float, theta: float, name: str) -> str:
+        name = self.spawn(x, y, theta, name)
+        return f"Spawning turtle [{name}] at x=[{single(x):f}], y=[{single(y):f}], theta=[{single(theta):f}]"
+
+    def _kill(self, name: str) -> None:
+        self.kill(name)
+
+    def _reset(self) -> str:
+        self.reset()
+        return "Resetting turtlesim."
+
+    def _clear(self) -> str:
+        self.clear()
+        return "Clearing turtlesim."
+
+    def _teleport_absolute(self, turtle: str, x: float, y: float, theta: float) -> None:
+        self.turtle(turtle).teleport_absolute(x, y, theta)
+
+    def _teleport_relative(self, turtle: str, linear: float, angular: float) -> None:
+        self.turtle(turtle).teleport_relative(linear, angular)
+
+    def _rotate_absolute(self, turtle: str, theta: float) -> None:
+        self.turtle(turtle).rotate_absolute(theta)
+
+    def _set_pen(self, turtle: str, r: float, g: float, b: float, width: float, off: float) -> None:
+        self.turtle(turtle).pen = Pen(int(r), int(g), int(b), int(width), bool(off))
+
+    def tick(self, now_ns: int) -> list[WallHit]:
+        """Move every turtle by one tick; returns those that hit a wall."""
+        outside = ((name, turtle.update(now_ns)) for name, turtle in self.turtles.items())
+        return [WallHit(now_ns, name, place) for name, place in outside if place is not None]
+
+
+def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float | str]:
+    """Give a service's arguments with the defaults of the table.
+
+    Raises ValueInvalid for a service or argument that does not exist, or one that is missing.
+    """
+    if service not in SERVICES:
+        raise ValueInvalid(f"no service {service!r}; services: {', '.join(SERVICES)}")
+    expected = SERVICES[service]
+    if unknown := [name for name in arguments if name not in expected]:
+        raise ValueInvalid(f"{service} has no {unknown[0]!r}; expected {', '.join(expected) or 'nothing'}")
+    given = {name: arguments.get(name, default) for name, default in expected.items()}
+    if missing := [name for name, value in given.items() if value is None]:
+        raise ValueInvalid(f"{service} needs {', '.join(missing)}")
+    return {name: value for name, value in given.items() if value is not None}

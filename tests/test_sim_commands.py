@@ -1,0 +1,241 @@
+"""`frametool sim` from outside: streams, pipes, files, interrupts, pictures."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+import console
+import pytest
+import yaml
+
+from frametool.cli.sim import SUBCOMMANDS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Outcome
+
+    Run = Callable[..., Outcome]
+
+SVG = "{http://www.w3.org/2000/svg}"
+TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
+SCENE = "turtles:\n  turtle1: {leader: square}\n  turtle2: {spawn: [4, 2], follow: turtle1}\nduration: 1\n"
+HELP_EXAMPLES = [
+    line.strip()
+    for module, _ in SUBCOMMANDS.values()
+    for line in (import_module(module).command.help or "").splitlines()
+    if line.strip().startswith("frametool ") and "teleop" not in line
+]
+
+
+def test_the_default_run_is_the_tutorial(run: Run) -> None:
+    outcome = run("sim", "follow")
+    documents = [each for each in yaml.safe_load_all(outcome.out) if each]
+    assert (outcome.status, len(documents)) == (0, 201)
+    assert documents[0]["linear"]["x"] == pytest.approx(1.933158, abs=1e-6)
+    assert documents[0]["angular"] == {"x": 0.0, "y": 0.0, "z": pytest.approx(4.639467, abs=1e-6)}
+    assert "final distance to turtle1 0.0001 m; within 0.5 m after 4.064 s" in outcome.err
+
+
+def test_an_up_key_from_standard_input_moves_the_leader(run: Run) -> None:
+    outcome = run("sim", "follow", "--leader", "-", "--emit", "poses", "-f", "csv", "--duration", "2", stdin="up\n")
+    rows = [line.split(",") for line in outcome.out.splitlines() if ",turtle1," in line]
+    assert float(rows[-1][2]) == pytest.approx(7.560444, abs=1e-6)
+    assert sum(float(row[5]) > 0.0 for row in rows) == 63
+
+
+def test_transforms_go_through_lookup_and_apply(run: Run) -> None:
+    stream = run("sim", "follow", "--spawn", "1,1,0", "--duration", "1", "--emit", "tf").out
+    found = yaml.safe_load(run("lookup", "-", "turtle2", "turtle1", "--at", "0", stdin=stream).out)
+    assert found["xyz"] == pytest.approx([4.544445, 4.544445, 0.0], abs=1e-6)
+    pose = run("lookup", "-", "world", "turtle2", "--at", "0", "-f", "json", stdin=stream).out
+    moved = json.loads(run("apply", "--transform", pose.strip(), "-f", "json", "0", "2", "0").out)
+    assert moved["point"] == [1.0, 3.0, 0.0]
+
+
+def test_walls_are_told_of_once_a_contact_and_counted_every_tick(run: Run) -> None:
+    keys = "t,linear,angular\n" + "".join(f"{t},2,0\n" for t in (0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5))
+    outcome = run("sim", "follow", "--followers", "0", "--leader", "k.csv", "--duration", "4", files={"k.csv": keys})
+    assert outcome.err.count("Oh no! I hit the wall!") == 1
+    assert outcome.err.endswith("4 s simulated; wall hits: 77 (turtle1 77)\n")
+
+
+def test_a_scene_is_run_with_its_duration_or_another(run: Run) -> None:
+    lengths = []
+    for more in ((), ("--duration", "0.5")):
+        outcome = run("sim", "run", "s.yaml", "-f", "csv", *more, files={"s.yaml": SCENE})
+        lengths.append(len(outcome.out.splitlines()))
+    assert lengths == [12, 7]
+    assert run("sim", "run", "-", "-f", "csv", stdin=SCENE).out.count("\n") == 12
+
+
+def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> None:
+    outcome = run("sim", "run", str(console.ROOT / "examples" / "turtles.yaml"), "-f", "csv")
+    assert outcome.status == 0
+    assert len(re.findall(r"within 0.5 m after [\d.]+ s", outcome.err)) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (("follow", "--leader", "circel"), 2, "did you mean 'circle'? leaders: "),
+        (("follow", "--leader", "missing.csv"), 5, "missing.csv: no such file"),
+        (("follow", "--spawn", "1"), 2, "expected X,Y,THETA"),
+        (("follow", "--rate", "0"), 2, "rate must be"),
+        (("follow", "--gain-linear", "nan"), 2, "is not finite"),
+        (("follow", "--duration", "-1"), 2, "expected 0 or more"),
+        (("follow", "--reach", "-1"), 2, "--reach must be 0 or more"),
+        (("follow", "--live"), 2, "--live draws in a terminal"),
+        (("follow", "--plot", "a.gif"), 2, "--plot takes .svg, .html, .png"),
+        (("follow", "--plot", "taken.svg"), 5, "taken.svg: exists; give --force"),
+        (("follow", "-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
+        (("folow",), 2, "did you mean 'follow'?"),
+        (("run", "bad.yaml"), 1, "bad.yaml:1:23: "),
+        (("run", "{turtles: {a: {folow: b}}}"), 2, "unknown key 'folow'"),
+        (("teleop",), 2, "standard input is no terminal"),
+        (("sweep", "--gain-linear", "1:2"), 2, "expected START:STOP:COUNT"),
+        (("sweep", "--gain-linear", "1:2:0"), 2, "COUNT must be 1"),
+        (("sweep", "--duration", "inf"), 2, "duration must be finite"),
+    ],
+)
+def test_what_cannot_be_is_one_line_on_stderr(run: Run, arguments: tuple[str, ...], status: int, message: str) -> None:
+    files = {"taken.svg": "kept", "bad.yaml": "turtles: {a: {leader: {}}}\n"}
+    outcome = run("sim", *arguments, files=files)
+    assert (outcome.status, outcome.out) == (status, "")
+    assert outcome.err.startswith("frametool: ")
+    assert message in outcome.err.splitlines()[0]
+
+
+def test_files_are_written_whole_in_the_form_of_their_suffix(run: Run, tmp_path: Path) -> None:
+    run("sim", "follow", "--duration", "0.2", "-o", "out.csv", "--plot", "out.html")
+    assert (tmp_path / "out.csv").read_text().startswith("t,turtle,linear_x,")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.csv", "out.html"]
+    run("sim", "follow", "--leader", "torn.csv", "-o", "new.csv", files={"torn.csv": "t,linear,angular\nx,1,1\n"})
+    assert not (tmp_path / "new.csv").exists()
+
+
+def test_a_plot_shows_the_world_the_trails_and_three_curves(run: Run, tmp_path: Path) -> None:
+    run("sim", "follow", "--leader", "square", "--followers", "2", "--duration", "3", "--plot", "run.svg", "-f", "csv")
+    root = ET.fromstring((tmp_path / "run.svg").read_text())  # noqa: S314 - our own
+    lines = root.findall(f".//{SVG}polyline")
+    words = [text.text for text in root.iter(f"{SVG}text")]
+    assert len(lines) == 3 + 3 * 2
+    assert {"distance (m)", "linear.x (m/s)", "angular.z (rad/s)", "turtle1", "turtle3"} <= set(words)
+    assert root.find(f".//{SVG}rect[@fill='#4556ff']") is not None
+
+
+@pytest.mark.parametrize("arguments", [("follow", "--duration", "1"), ("sweep", "--gain-linear", "1", "--duration", "1")])
+def test_a_png_needs_matplotlib_and_says_so(run: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    outcome = run("sim", *arguments, "--plot", "run.png")
+    if find_spec("matplotlib"):
+        assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+    else:
+        assert outcome.status == 1
+        assert "pip install 'frametool[plot]'" in outcome.err
+
+
+def test_a_sweep_has_a_row_for_every_pair_and_a_heat_map(run: Run, tmp_path: Path) -> None:
+    arguments = ("--gain-linear", "0.1:2:3", "--gain-angular", "1,4", "-f", "csv", "--plot", "map.svg")
+    outcome = run("sim", "sweep", *arguments)
+    rows = [line.split(",") for line in outcome.out.splitlines()]
+    assert rows[0] == ["gain_linear", "gain_angular", "time_to_reach", "overshoot", "final_distance", "wall_hits"]
+    assert [row[0] for row in rows[1:]] == ["0.1", "0.1", "1.05", "1.05", "2.0", "2.0"]
+    titles = ET.fromstring((tmp_path / "map.svg").read_text()).findall(f".//{SVG}title")  # noqa: S314 - our own
+    assert len(titles) == 12
+
+
+@pytest.mark.parametrize("example", HELP_EXAMPLES)
+def test_an_example_in_a_subcommands_help_runs(example: str, tmp_path: Path) -> None:
+    (tmp_path / "turtles.yaml").write_text(SCENE)
+    arguments = example.split()[1:]
+    done = subprocess.run(
+        [*TOOL, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(console.ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", SUBCOMMANDS)
+def test_every_subcommand_has_help_with_exit_codes(run: Run, name: str) -> None:
+    outcome = run("sim", name, "--help")
+    assert outcome.out.index(f"    frametool sim {name}") < outcome.out.index("Options:")
+    assert "Exit codes: 0 done" in outcome.out
+
+
+@pytest.mark.parametrize("arguments", [["follow"], ["run", "{turtles: {turtle1: }}"]])
+def test_a_run_loads_no_numpy_and_no_rich(arguments: list[str]) -> None:
+    code = f"import sys; from frametool.cli import run; run({['sim', *arguments]!r}); print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=console.ROOT)
+    assert not {"numpy", "rich", "dataclasses"} & set(done.stderr.split())
+
+
+def test_a_closed_pipe_ends_an_endless_run_quietly() -> None:
+    tool = subprocess.Popen(
+        [*TOOL, "sim", "follow", "--duration", "inf", "-f", "csv"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=console.ROOT,
+    )  # fmt: skip
+    assert tool.stdout is not None
+    assert tool.stderr is not None
+    with tool:
+        assert tool.stdout.readline().startswith("t,turtle")
+        tool.stdout.close()
+        assert (tool.wait(20), tool.stderr.read()) == (-signal.SIGPIPE, "")
+
+
+def test_an_interrupt_prints_the_summary_and_exits_130() -> None:
+    tool = subprocess.Popen(
+        [*TOOL, "sim", "follow", "--duration", "inf", "--realtime", "-f", "csv"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=console.ROOT,
+    )  # fmt: skip
+    assert tool.stdout is not None
+    with tool:
+        for _ in range(3):
+            tool.stdout.readline()
+        tool.send_signal(signal.SIGINT)
+        _, err = tool.communicate(timeout=20)
+    assert tool.returncode == 130
+    assert "final distance to turtle1" in err
+    assert "Traceback" not in err
+
+
+def test_keys_drive_the_turtle_in_a_terminal_and_commands_go_to_stdout() -> None:
+    ours, theirs = pty.openpty()
+    tool = subprocess.Popen(
+        [*TOOL, "sim", "teleop", "-f", "json"], stdin=theirs, stderr=theirs, stdout=subprocess.PIPE, text=True,
+        cwd=console.ROOT, env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "LINES": "24"},
+    )  # fmt: skip
+    os.close(theirs)
+    assert tool.stdout is not None
+    with tool:
+        first = json.loads(tool.stdout.readline())
+        os.write(ours, b"\x1b[A")
+        lines = [json.loads(tool.stdout.readline()) for _ in range(4)]
+        os.write(ours, b"q")
+        drawn = b""
+        while chunk := _read(ours):
+            drawn += chunk
+        assert tool.wait(20) == 0
+    os.close(ours)
+    assert first["turtle"] == "turtle2"
+    assert any(each["turtle"] == "turtle1" and each["linear"]["x"] == 2.0 for each in lines)
+    assert "→" in drawn.decode()
+    assert b"\x1b[?25h" in drawn  # the cursor is back
+
+
+def _read(terminal: int) -> bytes:
+    """Read what a terminal got; nothing once the other side is closed."""
+    try:
+        return os.read(terminal, 1 << 16)
+    except OSError:
+        return b""
