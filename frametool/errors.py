@@ -68,7 +68,7 @@ class UnknownFrame(LookupFailed):
         self.name = name
         self.known = tuple(known)
         place = f" in {where}" if where else ""
-        super().__init__(f"unknown frame {name!r}{place}{did_you_mean(name, self.known)}; frames: {listing(self.known)}")
+        super().__init__(f"unknown frame {name!r}{place}{alternatives(name, self.known, 'frames')}")
 
 
 class NotConnected(LookupFailed):
@@ -112,6 +112,12 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
 
     near = get_close_matches(name, list(known), n=1, cutoff=cutoff)
     return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def alternatives(name: str, known: Iterable[str], label: str) -> str:
+    """Give `; did you mean 'x'? frames: a, b`, or only what there is."""
+    names = list(known)
+    return f"{did_you_mean(name, names) or ';'} {label}: {listing(names)}"
 
 
 def listing(names: Iterable[str], most: int = 20) -> str:

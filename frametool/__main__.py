@@ -1,0 +1,5 @@
+"""`python -m frametool`, where the console script is not on the path."""
+
+from frametool.cli import main
+
+main()

@@ -1,0 +1,149 @@
+"""The command line: one file a command, one table of them; the edge where errors become lines on stderr."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+import click
+
+from frametool import __version__
+from frametool.errors import FrametoolError, FrametoolWarning, alternatives
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from click.shell_completion import CompletionItem
+
+# name -> (module, what it does); help, completion and the README's check are derived from this table
+COMMANDS = {
+    "convert": ("frametool.cli.convert", "one rotation or pose in other representations"),
+    "compose": ("frametool.cli.compose", "product of poses, left to right: a_from_b, b_from_c -> a_from_c"),
+    "invert": ("frametool.cli.invert", "the inverse of a pose: a_from_b -> b_from_a"),
+    "relative": ("frametool.cli.relative", "the pose of B seen from A, with distance and angle"),
+    "interpolate": ("frametool.cli.interpolate", "poses between A and B at fractions of the way"),
+    "lookup": ("frametool.cli.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
+    "apply": ("frametool.cli.apply", "points, vectors and poses moved into another frame"),
+    "tree": ("frametool.cli.tree", "the tree of frames, drawn or written in another form"),
+}
+HELP = """The calculator for rigid-body frames.
+
+\b
+  frametool lookup robot.yaml map camera_optical
+  frametool convert --from rpy_deg --to quaternion 0 0 90
+  frametool compose '{xyz: [1, 2, 3]}' '{rpy_deg: [0, 0, 90]}'
+
+Arguments are in the order TARGET SOURCE; the answer is the pose of SOURCE in TARGET, which maps points in SOURCE to
+points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
+"""
+
+
+class Group(click.Group):
+    """The commands of the table, each imported when it is called and not before."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Name the commands, in the table's order."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import one command."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(COMMANDS[cmd_name][0]).command
+        return command
+
+    def resolve_command(
+        self,
+        ctx: click.Context,
+        args: list[str],
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, or say which ones there are."""
+        if args and args[0] not in COMMANDS:
+            raise click.UsageError(f"no command {args[0]!r}{alternatives(args[0], COMMANDS, 'commands')}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands from the table, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete command names from the table."""
+        from click.shell_completion import CompletionItem
+
+        named = [CompletionItem(name, help=row[1]) for name, row in COMMANDS.items() if name.startswith(incomplete)]
+        return named + click.Command.shell_complete(self, ctx, incomplete)
+
+
+@click.command(cls=Group, help=HELP, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=True)
+@click.version_option(__version__, "--version", prog_name="frametool", message="%(prog)s %(version)s")
+def group() -> None:
+    """Hold the commands."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit with its status."""
+    sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
+    import warnings
+
+    warnings.simplefilter("always", FrametoolWarning)
+    warnings.showwarning = _show_warning
+    try:
+        status = group.main(arguments, prog_name="frametool", standalone_mode=False)
+        sys.stdout.flush()
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.ctx.get_help() if error.ctx else "")
+        return 0
+    except click.ClickException as error:
+        return _complain(_usage(error), 2)
+    except (click.Abort, KeyboardInterrupt):
+        return 130
+    except FrametoolError as error:
+        return _complain(_with_snippet(error), error.exit_code)
+    except BrokenPipeError:
+        return _die_of_closed_pipe()
+    except OSError as error:
+        return _complain(f"{error.strerror or error}", 5)
+    return status if isinstance(status, int) else 0
+
+
+def _usage(error: click.ClickException) -> str:
+    """Put a usage error on one line, with how the command is called."""
+    ctx = getattr(error, "ctx", None)
+    message = error.format_message().replace("\n", " ").rstrip(".")
+    if message[1:2].islower():
+        message = message[0].lower() + message[1:]
+    if ctx is None or ctx.parent is None:
+        return message
+    pieces = " ".join(ctx.command.collect_usage_pieces(ctx))
+    return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
+
+
+def _with_snippet(error: FrametoolError) -> str:
+    snippet = getattr(error, "snippet", "")
+    return f"{error}\n{snippet}" if snippet else str(error)
+
+
+def _complain(message: str, status: int) -> int:
+    print(f"frametool: {message}", file=sys.stderr)  # noqa: T201 - this is where errors become text
+    return status
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    print(f"frametool: warning: {message}", file=sys.stderr)  # noqa: T201 - this is where warnings become text
+
+
+def _die_of_closed_pipe() -> int:
+    """End as `cat` does when its reader is gone: killed by SIGPIPE, without a word."""
+    import os
+    import signal
+
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered must not raise again
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    os.kill(os.getpid(), signal.SIGPIPE)
+    return 141

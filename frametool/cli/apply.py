@@ -1,0 +1,178 @@
+"""`frametool apply`: points, vectors and poses moved into another frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.poses import is_inline, poses_from, source_of, usage_if_inline
+from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.errors import FormatError, ValueInvalid
+from frametool.formats.numbers import parse_number
+from frametool.formats.pose import Pose
+from frametool.formats.records import Point, read_moveables
+from frametool.geometry import quaternion, rigid
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from frametool.geometry.kinds import Rigid
+
+CHOICES = ("point", "vector", "pose")
+
+
+@click.command(cls=Command, name="apply")
+@click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
+@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
+@click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
+@click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
+@rotation_options
+@pose_options
+@result_options("points")
+def command(
+    arguments: tuple[str, ...],
+    pose: str | None,
+    more: Sequence[str],
+    deg: bool,
+    normalize: bool,
+    kind: str | None,
+    **options: Any,
+) -> None:
+    """Move points, vectors and poses from SOURCE into TARGET.
+
+    \b
+      frametool apply robot.yaml map camera_optical 0 0 1
+      frametool apply --transform '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' 1 0 0
+      frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
+
+    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
+    each record says its own frame; without records standard input is read.
+    """
+    output = Output("points", deg=deg, **options)
+    if pose is None:
+        way, rest = _way_by_tree(arguments, more)
+    else:
+        way, rest = _way_by_pose(_one_pose(pose, degrees=deg, normalize=normalize)), arguments
+    records = _records(rest, kind, degrees=deg, normalize=normalize)
+    output.moved([move(record, way.from_frame(own_frame(record)), way.target) for record in records])
+
+
+class Way(NamedTuple):
+    """Where records go: the target, and the transform that takes them there from the frame they are given in."""
+
+    target: str | None
+    from_frame: Callable[[str | None], Rigid]
+
+
+def move(record: Pose | Point, target_from_source: Rigid, target: str | None) -> Pose | Point:
+    """Give a record as seen from the target: points shift and rotate, vectors rotate, poses compose."""
+    if isinstance(record, Pose):
+        return Pose.of(rigid.compose(*target_from_source, *record.components), record.name, target)
+    if record.is_vector:
+        x, y, z = quaternion.rotate(*target_from_source[3:], *record.position)
+    else:
+        x, y, z = rigid.apply(*target_from_source, *record.position)
+    return record._replace(position=(x, y, z), frame=target)
+
+
+def _way_by_tree(arguments: Sequence[str], more: Sequence[str]) -> tuple[Way, Sequence[str]]:
+    """Take tree, target and, if one is named, source from the arguments; the rest are records."""
+    if len(arguments) < 2:
+        raise click.UsageError("name TREE and TARGET, or give --transform")
+    tree = load_tree(arguments[0], more)
+    target, rest = frame_name(arguments[1], tree), arguments[2:]
+    source = None
+    if rest and not is_record(rest[0]):
+        source, rest = frame_name(rest[0], tree), rest[1:]
+
+    def from_frame(own: str | None) -> Rigid:
+        start = _settled(own, source)
+        if start is None:
+            raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
+        return tree.lookup(target, start).components
+
+    return Way(target, from_frame), rest
+
+
+def _way_by_pose(pose: Pose) -> Way:
+    """Move everything by one pose; where it names its frames, records must be given in its name."""
+
+    def from_frame(own: str | None) -> Rigid:
+        _settled(own, pose.name)
+        return pose.components
+
+    return Way(pose.parent, from_frame)
+
+
+def own_frame(record: Pose | Point) -> str | None:
+    """Give the frame a record says it is given in."""
+    return record.parent if isinstance(record, Pose) else record.frame
+
+
+def _settled(own: str | None, source: str | None) -> str | None:
+    """Settle which frame a record is given in: where both it and the command say, they must agree."""
+    if own is not None and source is not None and own != source:
+        raise ValueInvalid(
+            f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame"
+        )
+    return own or source
+
+
+def is_record(argument: str) -> bool:
+    """Tell a record from a frame's name."""
+    return argument == "-" or is_inline(argument)
+
+
+def _one_pose(argument: str, *, degrees: bool, normalize: bool) -> Pose:
+    poses = poses_from(argument, degrees=degrees, normalize=normalize)
+    if len(poses) != 1:
+        raise click.UsageError(f"--transform takes one pose, {argument} holds {len(poses)}")
+    return poses[0]
+
+
+def _records(arguments: Sequence[str], kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
+    """Read the records: bare numbers in threes, mappings, standard input."""
+    pending: list[str] = []
+    for argument in arguments or ("-",):
+        if not is_record(argument):
+            pending.append(argument)
+            continue
+        yield from _points(pending, kind)
+        pending = []
+        yield from _read(argument, kind, degrees=degrees, normalize=normalize)
+    yield from _points(pending, kind)
+
+
+def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
+    """Take bare numbers three at a time."""
+    if kind == "pose" and texts:
+        raise click.UsageError("a pose is a mapping, e.g. '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'")
+    try:
+        numbers = [parse_number(text) for text in texts]
+    except ValueInvalid as error:
+        raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
+    if len(numbers) % 3:
+        raise click.UsageError(f"points are three numbers each, found {len(numbers)}")
+    for at in range(0, len(numbers), 3):
+        x, y, z = numbers[at : at + 3]
+        yield Point((x, y, z), kind or "point")
+
+
+def _read(argument: str, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
+    """Read records from a mapping or from standard input, and take them for what --as says."""
+    try:
+        records = read_moveables(source_of(argument), degrees=degrees, normalize=normalize)
+    except FormatError as error:
+        raise usage_if_inline(error) from None
+    for record in records:
+        if kind == "pose" and isinstance(record, Point):
+            yield Pose(record.position, None, record.name, record.frame)
+        elif kind in ("point", "vector") and isinstance(record, Pose):
+            raise ValueInvalid(f"a record has a rotation and cannot be taken for a {kind}")
+        elif kind == "vector" and isinstance(record, Point):
+            yield record._replace(key="vector")
+        else:
+            yield record

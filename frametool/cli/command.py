@@ -1,0 +1,151 @@
+"""What all commands share: negative numbers as arguments, the options of every result, where it is written."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from frametool.errors import ValueInvalid
+from frametool.formats import writers
+from frametool.formats.numbers import parse_number
+from frametool.geometry.representations import REPRESENTATIONS, notation
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.representations import Notation
+
+    Function = TypeVar("Function", bound=Callable[..., Any])
+
+# an argument that begins like this is a number, whatever short options there are
+NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
+SPELLINGS = [f"{name}:AXES" if name == "euler" else name for name in REPRESENTATIONS]
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 4 lookup failed, 5 file problem."
+
+
+class Command(click.Command):
+    """A command whose arguments may be negative numbers.
+
+    click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
+    own check of misspelled options; `Text` takes the blank off again.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Shield negative numbers, then parse."""
+        return super().parse_args(ctx, [f" {each}" if NEGATIVE.match(each) else each for each in args])
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """End every help with the exit codes."""
+        super().format_epilog(ctx, formatter)
+        formatter.write_paragraph()
+        formatter.write_text(EXIT_CODES)
+
+
+class Text(click.ParamType[str]):
+    """A text argument, without the blank that shields negative numbers."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+        """Take the shield off."""
+        return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
+
+
+class Number(Text):
+    """A finite number."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read it as documents read theirs."""
+        try:
+            return parse_number(super().convert(value, param, ctx)) if isinstance(value, str) else value
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+
+
+class Notations(click.ParamType["tuple[Notation, ...]"]):
+    """Names of representations, separated by commas."""
+
+    name = "rep[,rep..]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Notation, ...]:
+        """Look each name up."""
+        if not isinstance(value, str):
+            return tuple(value)
+        try:
+            chosen = tuple(notation(spec.strip()) for spec in value.split(","))
+            for form in chosen:
+                form.bound_axes()  # euler without its axes is refused before any work
+            return chosen
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Complete the last name of the list."""
+        from click.shell_completion import CompletionItem
+
+        done, comma, begun = incomplete.rpartition(",")
+        return [CompletionItem(done + comma + name) for name in REPRESENTATIONS if name.startswith(begun)]
+
+
+TEXT = Text()
+
+
+def result_options(what: str) -> Callable[[Function], Function]:
+    """Give a command the options that shape and place its result; `what` it writes decides the formats."""
+    options = [
+        click.option(
+            "-f",
+            "--format",
+            "format_name",
+            type=click.Choice(("text", *writers(what))),
+            help="form of the result  [default: text on a terminal, yaml otherwise]",
+        ),
+        click.option(
+            "--precision",
+            type=click.IntRange(0, 30),
+            metavar="N",
+            help="digits after the point  [default: the shortest text that reads back to the same bits]",
+        ),
+        click.option(
+            "-o", "--output", type=TEXT, metavar="FILE", help="write there instead of stdout, whole or not at all"
+        ),
+        click.option("--force", is_flag=True, help="let --output replace an existing file"),
+    ]
+    return lambda function: _decorated(function, options)
+
+
+def rotation_options(function: Function) -> Function:
+    """Give a command the options that choose how rotations are written."""
+    return _decorated(
+        function,
+        [
+            click.option(
+                "--to",
+                "notations",
+                type=Notations(),
+                metavar="REP[,REP..]",
+                help=f"representations of the result: {', '.join(SPELLINGS)}; angles take _deg  [default: quaternion]",
+            ),
+            click.option("--deg", is_flag=True, help="angles in degrees"),
+            click.option(
+                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out instead of w >= 0"
+            ),
+        ],
+    )
+
+
+def pose_options(function: Function) -> Function:
+    """Give a command the options that say how poses are read; they come beside `rotation_options`."""
+    return click.option(
+        "--normalize", is_flag=True, help="accept any non-zero quaternion and any matrix near a rotation"
+    )(function)
+
+
+def _decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
+    for option in reversed(options):
+        function = option(function)
+    return function

@@ -1,0 +1,35 @@
+"""`frametool invert`: the inverse of a pose."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.poses import poses_from
+from frametool.formats.pose import inverted
+from frametool.formats.results import Result
+
+
+@click.command(cls=Command, name="invert")
+@click.argument("pose", type=TEXT, default="-")
+@rotation_options
+@pose_options
+@result_options("poses")
+def command(pose: str, deg: bool, normalize: bool, **options: Any) -> None:
+    """Turn poses around: a_from_b -> b_from_a; named frames change places.
+
+    \b
+      frametool invert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'
+      frametool lookup robot.yaml map base_link | frametool invert -
+
+    POSE is a mapping, a file, or - for standard input, also with several poses.
+    """
+    output = Output("poses", deg=deg, **options)
+    inverses = [
+        inverted(each)._replace(name=each.parent, parent=each.name)
+        for each in poses_from(pose, degrees=deg, normalize=normalize)
+    ]
+    output.poses(Result(each) for each in inverses)

@@ -1,0 +1,117 @@
+"""Results on their way out: which form, and to where."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import FileProblem
+from frametool.formats import FORMATS, writers
+from frametool.formats.pose import Pose
+from frametool.formats.results import Result, Style, is_locked
+from frametool.geometry.representations import notation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from frametool.formats.records import Point
+    from frametool.frames.tree import FrameTree
+    from frametool.geometry.representations import Notation
+
+
+class Output:
+    """Where results go and how they look: what the options of a command say."""
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        format_name: str | None = None,
+        precision: int | None = None,
+        output: str | None = None,
+        force: bool = False,
+        notations: tuple[Notation, ...] | None = None,
+        deg: bool = False,
+        keep_sign: bool = False,
+    ) -> None:
+        """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+        self.path = output
+        self.force = force
+        form = (
+            format_name
+            or _form_by_suffix(output, what)
+            or ("text" if output is None and sys.stdout.isatty() else "yaml")
+        )
+        machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
+        chosen = notations or ((notation("quaternion"),) if machine else ())
+        self.style = Style(form, chosen, deg, precision, keep_sign)
+
+    def poses(self, results: Iterable[Result]) -> None:
+        """Write poses."""
+        self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))
+
+    def moved(self, records: Sequence[Pose | Point]) -> None:
+        """Write moved records: poses as poses, whatever else there is as it was spelled."""
+        if all(isinstance(each, Pose) for each in records):
+            self.poses([Result(each) for each in records if isinstance(each, Pose)])
+        else:
+            self.points(
+                [Result(each).mapping(self.style) if isinstance(each, Pose) else each.mapping() for each in records]
+            )
+
+    def tree(self, tree: FrameTree) -> None:
+        """Write a tree; on a terminal, in colour."""
+        if self.style.form != "text":
+            self.text(self._module("").write_tree(tree, self.style))
+            return
+        from frametool.view.tree_text import print_tree, write_tree
+
+        if self.path is None and sys.stdout.isatty():
+            print_tree(tree, self.style)
+        else:
+            self.text(write_tree(tree, self.style))
+
+    def tell_of_lock(self, poses: Sequence[Pose]) -> None:
+        """Say of a single result that its Euler angles are not unique."""
+        if len(poses) == 1 and any(is_locked(poses[0], form) for form in self.style.notations):
+            print("frametool: note: gimbal lock: the angles are not unique; the third was set to 0", file=sys.stderr)  # noqa: T201
+
+    def points(self, records: Iterable[dict[str, Any]]) -> None:
+        """Write points."""
+        self.text(self._module("frametool.view.pose_text").write_points(records, self.style))
+
+    def _module(self, text_module: str) -> Any:
+        return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)
+
+    def text(self, text: str) -> None:
+        """Write text to stdout, or to the file whole or not at all."""
+        if self.path is None or self.path == "-":
+            sys.stdout.write(text)
+        else:
+            write_whole(self.path, text, force=self.force)
+
+
+def _form_by_suffix(path: str | None, what: str) -> str | None:
+    """Name the form that a file's suffix stands for, if it can hold this kind of result."""
+    suffix = os.path.splitext(path)[1].lower() if path else ""  # noqa: PTH122 - pathlib costs 6 ms at start-up
+    return next((name for name in writers(what) if suffix and suffix in FORMATS[name].suffixes), None)
+
+
+def write_whole(path: str, text: str, *, force: bool = False) -> None:
+    """Write a file by way of a temporary one beside it, so that nobody ever sees half of it.
+
+    Raises FileProblem when it exists and `force` is not given, or cannot be written.
+    """
+    if not force and os.path.lexists(path):
+        raise FileProblem(f"{path}: exists; give --force to replace it")
+    temporary = f"{path}.{os.getpid()}.part"
+    try:
+        with open(temporary, "x", encoding="utf-8", newline="") as stream:  # noqa: PTH123
+            stream.write(text)
+        os.replace(temporary, path)  # noqa: PTH105
+    except OSError as error:
+        if os.path.lexists(temporary):
+            os.unlink(temporary)  # noqa: PTH108
+        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None

@@ -1,0 +1,111 @@
+"""Poses from the command line: inline mappings, bare numbers, files, standard input."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+from frametool.errors import FormatError, ValueInvalid, warn
+from frametool.formats.pose import Pose
+from frametool.formats.records import read_poses
+from frametool.formats.rotations import read_homogeneous, rotation_of
+from frametool.formats.source import Source, read_text
+from frametool.formats.values import INDICES, NotARotation, Reading, read_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.geometry.representations import Notation
+
+INLINE = "argument"
+
+
+def is_inline(text: str) -> bool:
+    """Tell a mapping or list written on the command line from a file's name."""
+    return text.startswith(("{", "["))
+
+
+def source_of(argument: str) -> Source:
+    """Take an inline argument as it stands, or read a file, or standard input for `-`."""
+    if is_inline(argument):
+        return Source(INLINE, argument)
+    if argument != "-":
+        return Source(argument, read_text(argument))
+    if sys.stdin.isatty():
+        raise click.UsageError("standard input is a terminal; pipe something in, or give values")
+    return Source("stdin", read_text("-"))
+
+
+def poses_from(argument: str, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
+    """Read the poses of one argument: inline, `-` for standard input, or a file."""
+    try:
+        return read_poses(source_of(argument), degrees=degrees, normalize=normalize)
+    except FormatError as error:
+        raise usage_if_inline(error) from None
+
+
+def usage_if_inline(error: FormatError) -> FormatError:
+    """Count an inline argument that cannot be parsed as misuse (2); what parses but is no rotation is bad data (1)."""
+    if error.source == INLINE and not isinstance(error.__cause__, NotARotation):
+        error.exit_code = 2
+    return error
+
+
+def combinations(arguments: Sequence[str], *, degrees: bool, normalize: bool) -> list[tuple[Pose, ...]]:
+    """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
+    if list(arguments).count("-") > 1:
+        raise click.UsageError("standard input can be read once; only one argument may be -")
+    read = [poses_from(each, degrees=degrees, normalize=normalize) for each in arguments]
+    several = [index for index, poses in enumerate(read) if len(poses) > 1]
+    if len(several) > 1:
+        counts = " and ".join(f"{arguments[index]} ({len(read[index])})" for index in several)
+        raise ValueInvalid(f"only one argument may hold several poses, found {counts}")
+    most = max(map(len, read))
+    return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
+
+
+def pose_from_numbers(
+    texts: Sequence[str],
+    given: tuple[Notation, ...] | None,
+    *,
+    degrees: bool = False,
+    normalize: bool = False,
+) -> Pose:
+    """Read bare numbers: a rotation in the order of its representation, after x y z if there is a position.
+
+    Raises click.UsageError for what is no such list of numbers, ValueInvalid for what is no rotation.
+    """
+    form = _form_of(texts, given)
+    size = len(form.representation.columns)
+    reading = Reading(Source(INLINE, ""), degrees=degrees, normalize=normalize)
+    try:
+        if len(texts) == 16 and size == 9:
+            return Pose(*read_homogeneous(form, texts, INDICES, reading))
+        if len(texts) not in (size, size + 3):
+            expected = f"{size} numbers ({' '.join(form.columns)}), or {size + 3} with x y z before them"
+            raise click.UsageError(f"{form.spec} has {expected}; found {len(texts)}")
+        x, y, z = map(read_number, texts[:-size] or ("0", "0", "0"))
+        rotation = rotation_of(form, texts[-size:], INDICES, reading)
+    except NotARotation:
+        raise
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+    for _, message in reading.notes:
+        warn(message)
+    return Pose((x, y, z) if len(texts) > size else None, rotation)
+
+
+def _form_of(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Notation:
+    """Settle what bare numbers are; only a matrix is known by their count."""
+    from frametool.geometry.representations import REPRESENTATIONS, notation
+
+    if given and len(given) == 1:
+        return given[0]
+    if given:
+        raise click.UsageError("--from takes one representation")
+    if len(texts) in (9, 16):
+        return notation("matrix")
+    choices = ", ".join(REPRESENTATIONS)
+    raise click.UsageError(f"{len(texts)} numbers do not say what they are; add --from with one of {choices}")

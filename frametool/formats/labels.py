@@ -1,0 +1,36 @@
+"""The pose of an edge in a few words, for drawings: millimetres and hundredths of a degree are enough there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.formats.pose import Pose
+from frametool.formats.results import rotation_numbers
+from frametool.geometry.representations import notation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from frametool.formats.results import Style
+    from frametool.geometry.transform import Transform
+
+METRES = 3
+DEGREES = 2
+
+
+def edge_label(transform: Transform, style: Style) -> tuple[str, str]:
+    """Give two lines: `xyz 0.1 0 1.2` and `rpy_deg 0 15 0`, or the first representation asked for."""
+    pose = Pose.of(transform.components)
+    form = style.notations[0] if style.notations else notation("rpy_deg")
+    degrees = bool(form.representation.angles) and style.in_degrees(form)
+    position = _short(pose.components[:3], style.precision if style.precision is not None else METRES)
+    decimals = style.precision if style.precision is not None else DEGREES if degrees else METRES
+    return f"xyz {position}", f"{form.spec} {_short(rotation_numbers(pose, form, style), decimals)}"
+
+
+def _short(values: Iterable[float], decimals: int) -> str:
+    """Round for reading; trailing zeros and minus zero say nothing."""
+    return " ".join(
+        f"{round(value, decimals) + 0.0:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
+        for value in values
+    )

@@ -1,0 +1,32 @@
+"""Mermaid: a flowchart from parents to children, edges labelled with their poses.
+
+n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.formats.labels import edge_label
+
+if TYPE_CHECKING:
+    from frametool.formats.results import Style
+    from frametool.frames.tree import FrameTree
+
+
+def write_tree(tree: FrameTree, style: Style) -> str:
+    """Give a flowchart; nodes are numbered, because mermaid's ids take few characters, and labelled with the names."""
+    ids = {frame: f"n{index}" for index, frame in enumerate(tree.frames)}
+    lines = ["flowchart TD"]
+    lines += [f'  {ids[frame]}["{_escaped(frame)}"]' for frame in tree.frames]
+    for parent, child, transform in tree.edges():
+        label = "<br>".join(_escaped(line) for line in edge_label(transform, style))
+        lines.append(f'  {ids[parent]} -->|"{label}"| {ids[child]}')
+    return "\n".join([*lines, ""])
+
+
+def _escaped(text: str) -> str:
+    """Write what mermaid or HTML would take for its own as character codes (`#quot;`)."""
+    return "".join(
+        character if character.isalnum() or character in " _-/.:,+" else f"#{ord(character)};" for character in text
+    )

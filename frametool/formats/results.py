@@ -1,0 +1,125 @@
+"""Poses as the mappings that machine formats write: the grammar of `frametool.formats.pose`, backwards."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.formats.pose import Pose
+from frametool.geometry import euler, floats, quaternion
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.frames.tree import FrameTree
+    from frametool.geometry.representations import Notation
+
+
+# --keep-sign: the components as they come out of the arithmetic; other notations have no such sign
+KEPT = {
+    "quaternion": lambda x, y, z, w: (x, y, z, w),
+    "xyzw": lambda x, y, z, w: (x, y, z, w),
+    "wxyz": lambda x, y, z, w: (w, x, y, z),
+}
+
+
+class Style(NamedTuple):
+    """How results are written: form, representations, unit of bare angles, digits, sign of quaternions."""
+
+    form: str
+    notations: tuple[Notation, ...] = ()
+    degrees: bool = False
+    precision: int | None = None
+    keep_sign: bool = False
+
+    def number(self, value: float) -> str:
+        """Write a number: shortest text that reads back to the same bits, or fixed decimals."""
+        return repr(value) if self.precision is None else f"{value:.{self.precision}f}"
+
+    def in_degrees(self, form: Notation) -> bool:
+        """Tell whether a representation's angles are written in degrees: its own suffix wins."""
+        return self.degrees if form.degrees is None else form.degrees
+
+
+class Result(NamedTuple):
+    """A pose and what else is known about it (distance, angle, ..)."""
+
+    pose: Pose
+    extras: dict[str, Any] = {}  # noqa: RUF012 - never changed
+
+    def mapping(self, style: Style) -> dict[str, Any]:
+        """Give the tree entry: name, parent, xyz, one key a representation, then what is only said."""
+        pose = self.pose
+        entry: dict[str, Any] = {key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name}
+        if pose.rotation is None:
+            return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | self.extras
+        if pose.position is not None and not any(is_matrix(form) for form in style.notations):
+            entry["xyz"] = list(pose.position)
+        for form in style.notations:
+            key, value = rotation_entry(pose, form, style)
+            entry[key] = value
+        if any(is_locked(pose, form) for form in style.notations):
+            entry["gimbal_lock"] = True
+        return entry | self.extras
+
+
+def tree_entries(tree: FrameTree, style: Style) -> Iterator[dict[str, Any]]:
+    """Give a tree as the entries of its list form: roots, then edges."""
+    yield from ({"name": root} for root in tree.roots)
+    for parent, child, transform in tree.edges():
+        yield Result(Pose.of(transform.components, child, parent)).mapping(style)
+
+
+def columns_of(form: Notation, style: Style) -> Sequence[str]:
+    """Name a representation's columns; angles in degrees say so."""
+    if form.degrees is not None or not style.degrees:
+        return form.columns
+    angles = form.representation.angles
+    return [f"{name}_deg" if index in angles else name for index, name in enumerate(form.columns)]
+
+
+def is_matrix(form: Notation) -> bool:
+    """Tell whether a representation takes the position into itself."""
+    return form.representation.name == "matrix"
+
+
+def is_locked(pose: Pose, form: Notation) -> bool:
+    """Tell whether the Euler angles asked for are not unique here: the third was set to 0."""
+    axes = "sxyz" if form.representation.name == "rpy" else form.axes
+    return axes is not None and pose.rotation is not None and bool(euler.locked(*pose.rotation, axes))
+
+
+def rotation_numbers(pose: Pose, form: Notation, style: Style) -> Sequence[float]:
+    """Give a pose's rotation as the numbers of one representation, in column order."""
+    x, y, z, w = quaternion.unit(*pose.components[3:], floats)
+    if style.keep_sign and form.representation.name in KEPT:
+        return KEPT[form.representation.name](x, y, z, w)
+    numbers: Sequence[float] = form.from_quaternion(x, y, z, w, floats, degrees=style.in_degrees(form))
+    return numbers
+
+
+def rotation_entry(pose: Pose, form: Notation, style: Style) -> tuple[str, Any]:
+    """Give the key and the value of one representation, in the shape the grammar reads."""
+    name = form.representation.name
+    numbers = list(rotation_numbers(pose, form, style))
+    key = f"{name}_deg" if form.representation.angles and style.in_degrees(form) else name
+    columns = form.representation.columns
+    match name:
+        case "quaternion":
+            return key, dict(zip("xyzw", numbers, strict=True))
+        case "rpy":
+            return key, dict(zip(columns, numbers, strict=True))
+        case "euler":
+            return key, {"axes": form.axes, "angles": numbers}
+        case "axis_angle":
+            return key, {"axis": numbers[:3], "angle": numbers[3]}
+        case "matrix":
+            return key, _rows(numbers, pose.position)
+    return key, numbers
+
+
+def _rows(numbers: list[float], position: Sequence[float] | None) -> list[list[float]]:
+    """Give the 3x3 rows of a rotation, or the 4x4 rows of a pose."""
+    rows = [numbers[0:3], numbers[3:6], numbers[6:9]]
+    if position is None:
+        return rows
+    return [[*row, moved] for row, moved in zip(rows, position, strict=True)] + [[0.0, 0.0, 0.0, 1.0]]

@@ -1,0 +1,40 @@
+"""Stamps: text of seconds to integer nanoseconds and back, by decimal arithmetic, never through a float."""
+
+from __future__ import annotations
+
+import re
+
+from frametool.errors import ValueInvalid
+
+BILLION = 1_000_000_000
+_SECONDS = re.compile(r"([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,3}))?", re.ASCII)
+_NANOSECONDS = re.compile(r"([-+]?\d{1,30})ns", re.ASCII)
+
+
+def parse_stamp(text: str) -> int:
+    """Read `12.5` (seconds) or `12500000000ns` as nanoseconds; digits below a nanosecond must be 0.
+
+    Raises ValueInvalid.
+    """
+    if match := _NANOSECONDS.fullmatch(text):
+        return int(match[1])
+    match = _SECONDS.fullmatch(text)
+    if match is None or not (match[2] or match[3]) or len(text) > 60:
+        raise ValueInvalid(f"{text!r} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
+    sign, whole, fraction, exponent = match[1], match[2], match[3] or "", int(match[4] or 0)
+    shift = 9 - len(fraction) + exponent
+    digits = int(whole + fraction)
+    if shift < 0:
+        digits, lost = divmod(digits, int(10**-shift))
+        if lost:
+            raise ValueInvalid(f"{text!r} is finer than a nanosecond; round it")
+        shift = 0
+    stamp_ns = digits * int(10**shift)
+    return -stamp_ns if sign == "-" else stamp_ns
+
+
+def format_stamp(stamp_ns: int) -> str:
+    """Write nanoseconds as seconds with nine decimals: `12.500000000`."""
+    sign = "-" if stamp_ns < 0 else ""
+    seconds, nanoseconds = divmod(abs(stamp_ns), BILLION)
+    return f"{sign}{seconds}.{nanoseconds:09d}"

@@ -1,0 +1,125 @@
+"""Kernels of the 24 Euler conventions, both ways, by one algorithm.
+
+A convention's name is that of tf's `transformations`: `s` (static axes, extrinsic) or `r` (rotating axes, intrinsic)
+and three axis letters in the order of the rotations. Angles stand in the order of the letters. Knows numbers only.
+"""
+
+from __future__ import annotations
+
+from math import pi, tau
+
+from frametool.geometry.quaternion import EPS, settled
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from frametool.geometry.kinds import Namespace, Number, Quaternion, Vector
+
+LOCK = EPS * EPS  # of the squared radii: beyond 1 eps the angles are still known, and dropping them would be an error
+
+
+def _plan(name: str) -> tuple[int, int, int, float, bool, bool]:
+    """Give the axes i, j, k (outermost first), their parity, and whether symmetric and static."""
+    static = name[0] == "s"
+    i, j, last = ("xyz".index(letter) for letter in (name[:0:-1] if static else name[1:]))
+    k = 3 - i - j
+    return i, j, k, 1.0 if (j - i) % 3 == 1 else -1.0, last == i, static
+
+
+AXES = {
+    name: _plan(name)
+    for name in (
+        "sxyz", "sxyx", "sxzy", "sxzx", "syzx", "syzy", "syxz", "syxy", "szxy", "szxz", "szyx", "szyz",
+        "rzyx", "rxyx", "ryzx", "rxzx", "rxzy", "ryzy", "rzxy", "ryxy", "ryxz", "rzxz", "rxyz", "rzyz",
+    )
+}  # fmt: skip
+
+
+def to_quaternion(
+    first: Number, second: Number, third: Number, axes: str, xp: Namespace, *, degrees: bool = False
+) -> Quaternion:
+    """Give the quaternion x, y, z, w of three angles about the axes of a convention.
+
+    Angles in radians, or in degrees with exact results at multiples of 90.
+    Source: the product of three elementary quaternions q_i(a) q_j(b) q_k(c), written out.
+    """
+    i, j, k, parity, symmetric, static = AXES[axes]
+    half = xp.half_sincos_deg if degrees else xp.half_sincos
+    sa, ca = half(third if static else first)
+    sb, cb = half(second)
+    sc, cc = half(first if static else third)
+    cosines, sines, mixed, turned = ca * cc, sa * sc, sa * cc, ca * sc
+    vector = [cb, cb, cb]
+    if symmetric:
+        w = cb * (cosines - sines)
+        vector[i] = cb * (mixed + turned)
+        vector[j] = sb * (cosines + sines)
+        vector[k] = sb * (mixed - turned) * parity
+    else:
+        signed = sb * parity
+        w = cb * cosines - signed * sines
+        vector[i] = cb * mixed + signed * turned
+        vector[j] = sb * cosines - (cb * parity) * sines
+        vector[k] = cb * turned + signed * mixed
+    x, y, z = vector
+    return settled(x, y, z, w) if degrees else (x, y, z, w)
+
+
+def from_quaternion(
+    x: Number, y: Number, z: Number, w: Number, axes: str, xp: Namespace, *, degrees: bool = False
+) -> Vector:
+    """Give the three angles of a convention, in the order of its letters.
+
+    The middle angle lies in [-pi/2, pi/2], or in [0, pi] where the outer axes are the same; the others in (-pi, pi].
+    At gimbal lock the third is 0.  Degrees are exact at multiples of 90.
+    Source: Bernardes & Viollet 2022; the middle angle from its sine, so that small ones keep their digits.
+    """
+    i, j, k, parity, symmetric, static = AXES[axes]
+    a, b, c, d = _pairs((x, y, z), w, i, j, k, parity, symmetric)
+    squared_sum, squared_difference = a * a + b * b, c * c + d * d
+    middle = _middle((x, y, z), w, i, j, k, parity, symmetric, squared_sum, squared_difference, xp)
+    half_sum, half_difference = xp.atan2(b, a), xp.atan2(d, c)
+    limit = LOCK * (squared_sum + squared_difference)
+    no_sum, no_difference = squared_sum <= limit, squared_difference <= limit
+    if xp.some(no_sum | no_difference):
+        third_away = 0.0 - half_sum if static else half_sum
+        half_sum = xp.where(no_sum, 0.0 - half_difference if static else half_difference, half_sum)
+        half_difference = xp.where(no_difference, third_away, half_difference)
+    outer, inner = _wrapped(half_sum + half_difference, xp), _wrapped(half_sum - half_difference, xp)
+    first, third = (inner, outer) if static else (outer, inner)
+    return (xp.degrees(first), xp.degrees(middle), xp.degrees(third)) if degrees else (first, middle, third)
+
+
+def locked(x: Number, y: Number, z: Number, w: Number, axes: str) -> Number:
+    """Say whether a convention is at gimbal lock here: the first and third axis coincide to 1 eps."""
+    i, j, k, parity, symmetric, _ = AXES[axes]
+    a, b, c, d = _pairs((x, y, z), w, i, j, k, parity, symmetric)
+    squared_sum, squared_difference = a * a + b * b, c * c + d * d
+    limit = LOCK * (squared_sum + squared_difference)
+    return (squared_sum <= limit) | (squared_difference <= limit)
+
+
+def _pairs(
+    vector: Vector, w: Number, i: int, j: int, k: int, parity: float, symmetric: bool  # noqa: FBT001
+) -> Quaternion:
+    """Give a, b, c, d: (a, b) points along half the sum of the outer angles, (c, d) along half their difference."""
+    vi, vj, vk = vector[i], vector[j], vector[k]
+    if symmetric:
+        return w, vi, vj, vk * parity
+    signed = vj * parity
+    return w + signed, vi + vk, w - signed, vi - vk
+
+
+def _middle(
+    vector: Vector, w: Number, i: int, j: int, k: int, parity: float, symmetric: bool,  # noqa: FBT001
+    squared_sum: Number, squared_difference: Number, xp: Namespace,
+) -> Number:  # fmt: skip
+    """Give the middle angle from the radii of the two pairs; its sine directly where the axes are three."""
+    if symmetric:
+        return 2.0 * xp.atan2(xp.sqrt(squared_difference), xp.sqrt(squared_sum))
+    sine = 2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity)
+    return xp.atan2(sine, xp.sqrt(squared_sum * squared_difference))
+
+
+def _wrapped(angle: Number, xp: Namespace) -> Number:
+    """Bring an angle between -2 pi and 2 pi into (-pi, pi]."""
+    return xp.minimum(angle - tau * xp.ceil(angle / tau - 0.5), pi)

@@ -1,0 +1,61 @@
+"""The functions kernels find in `xp` when their components are Python floats; loads no numpy."""
+
+from __future__ import annotations
+
+from math import atan2, cbrt, ceil, copysign, cos, degrees, fmod, frexp, ldexp, radians, sin, sqrt
+from math import hypot as length
+
+__all__ = [
+    "atan2", "cbrt", "ceil", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos", "half_sincos_deg",
+    "largest", "ldexp", "length", "maximum", "minimum", "negated_where", "radians", "some", "sqrt", "where",
+]  # fmt: skip
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from frametool.geometry.kinds import Pair
+
+SQRT_HALF = sqrt(0.5)
+maximum, minimum = max, min
+largest = abs
+some = bool
+
+
+def where(condition: bool, yes: float, no: float) -> float:  # noqa: FBT001 - numpy's signature
+    """Give `yes` if the condition holds, else `no`; both are already computed."""
+    return yes if condition else no
+
+
+def negated_where(condition: bool, *values: float) -> tuple[float, ...]:  # noqa: FBT001 - as `where`
+    """Give the values negated if the condition holds, zeros as +0; else as they are."""
+    return tuple([0.0 - value for value in values]) if condition else values
+
+
+def first_nonzero(*values: float) -> float:
+    """Give the first value that is not zero, or the last."""
+    for value in values:
+        if value:
+            return value
+    return values[-1]
+
+
+def half_sincos(angle: float) -> Pair:
+    """Give sine and cosine of half an angle in radians."""
+    half = 0.5 * angle
+    return sin(half), cos(half)
+
+
+def half_sincos_deg(angle: float) -> Pair:
+    """Give sine and cosine of half an angle in degrees.
+
+    Exact at multiples of 180; at odd multiples of 90 both have the same double sqrt(1/2) as magnitude, so that
+    products cancel exactly.  The reduction to at most 45 degrees is exact.
+    """
+    half = 0.5 * fmod(angle, 720.0)
+    quarter = round(half / 90.0)
+    rest = half - 90.0 * quarter
+    sine, cosine = sin(radians(rest)), cos(radians(rest))
+    if abs(rest) == 45.0:
+        sine, cosine = copysign(SQRT_HALF, rest), SQRT_HALF
+    if quarter & 1:
+        sine, cosine = cosine, 0.0 - sine
+    return (0.0 - sine, 0.0 - cosine) if quarter & 2 else (sine, cosine)

@@ -1,0 +1,281 @@
+"""The value of a rotation, or of many: components inside, numpy at its face.
+
+Knows no text and no files; radians only. One item is four Python floats and needs no numpy until it shows an array.
+"""
+
+from __future__ import annotations
+
+from frametool.errors import ValueInvalid
+from frametool.geometry import axis_angle, batches, doors, euler, floats, matrix, mrp, quaternion, rotvec, six_d
+from frametool.geometry.representations import checked_axes
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import Any
+
+    from frametool.geometry.kinds import Array, Components, Kernel, Numbers, Quaternion
+
+NEAR = 1e-9  # rad: rotations closer than this count as close, three digits above the rounding of long chains
+
+
+class Rotation:
+    """One rotation, or an array of them of any shape; frozen.
+
+    Active, right-handed; quaternions are Hamilton's, x, y, z, w.  `@` composes (the right one acts first), `apply`
+    turns vectors.  Every `from_X` takes leading axes (..., k), every `as_X` gives them; nothing given is changed.
+    """
+
+    __slots__ = ("_components",)
+    __array_ufunc__ = None  # an array times a rotation is refused, not tried element by element
+    _components: Quaternion
+
+    def __init__(self, xyzw: Numbers) -> None:
+        """Take quaternions x, y, z, w of shape (..., 4), as `from_quaternion` does."""
+        self._components = Rotation.from_quaternion(xyzw).components
+
+    @classmethod
+    def of(cls, x: Any, y: Any, z: Any, w: Any) -> Rotation:
+        """Trust components to be unit, all floats or all arrays of one shape: the fast door without checks."""
+        made = cls.__new__(cls)
+        made._components = (x, y, z, w)  # noqa: SLF001 - its own class
+        return made
+
+    @property
+    def components(self) -> Quaternion:
+        """The quaternion's x, y, z, w: floats of one rotation, else arrays of the batch's shape."""
+        return self._components
+
+    @classmethod
+    def identity(cls) -> Rotation:
+        """Give the rotation that turns nothing."""
+        return cls.of(0.0, 0.0, 0.0, 1.0)
+
+    @classmethod
+    def random(cls, n: int | None = None, *, seed: Any = None) -> Rotation:
+        """Draw one rotation, or n, uniformly over all; a seed makes them repeatable.
+
+        Source: Muller 1959, a normal vector of four has no preferred direction.
+        """
+        import numpy as np
+
+        drawn = np.random.default_rng(seed).normal(size=(4,) if n is None else (n, 4))
+        return cls.from_quaternion(drawn, normalize=True)
+
+    @classmethod
+    def from_quaternion(cls, xyzw: Numbers, *, normalize: bool = False) -> Rotation:
+        """Take quaternions x, y, z, w of shape (..., 4).
+
+        Norms within 1e-6 of 1 are normalised in silence, within 1e-3 with a warning; with `normalize` any non-zero.
+
+        Raises:
+            ValueInvalid: wrong shape, not finite, zero, or not of norm 1; names the first such row.
+        """
+        given = doors.columns(xyzw, 4, "xyzw")
+        if doors.single(given):
+            return cls.of(*quaternion.check(*given, normalize=normalize))
+        from frametool.geometry.sifting import unit_quaternions
+
+        return cls._of_columns(unit_quaternions(given, "xyzw", normalize=normalize))
+
+    @classmethod
+    def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Rotation:
+        """Take matrices of shape (..., 3, 3), rows orthonormal to 1e-6 (to 1e-3: nearest rotation and a warning).
+
+        With `normalize` the nearest rotation (the polar factor) of any matrix of positive determinant.
+
+        Raises:
+            ValueInvalid: wrong shape, not finite, mirrored, singular, not orthonormal; names the first such row.
+        """
+        given = doors.matrices(matrices, 3, "matrix")
+        if doors.single(given):
+            return cls.of(*matrix.to_quaternion(*matrix.check(*given, normalize=normalize), floats))
+        from frametool.geometry.sifting import rotation_quaternions
+
+        return cls._of_columns(rotation_quaternions(given, "matrix", normalize=normalize))
+
+    @classmethod
+    def from_rotvec(cls, rotvec_xyz: Numbers) -> Rotation:
+        """Take rotation vectors, axis times angle in radians, of shape (..., 3)."""
+        return cls._from(rotvec_xyz, 3, "rotvec", rotvec.to_quaternion, rotvec.check)
+
+    @classmethod
+    def from_axis_angle(cls, axis: Numbers, angle: Numbers) -> Rotation:
+        """Take axes of shape (..., 3), of any length but 0, and angles in radians of shape (...); they broadcast."""
+        given = (*doors.columns(axis, 3, "axis"), doors.scalars(angle, "angle"))
+        return cls._checked(given, "axis", axis_angle.to_quaternion, axis_angle.check)
+
+    @classmethod
+    def from_euler(cls, axes: str, angles: Numbers) -> Rotation:
+        """Take angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`."""
+        given = doors.columns(angles, 3, "angles")
+        return cls._of_columns(batches.convert(euler.to_quaternion, 4, given, "angles", checked_axes(axes)))
+
+    @classmethod
+    def from_rpy(cls, rpy: Numbers) -> Rotation:
+        """Take roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
+        return cls._of_columns(batches.convert(euler.to_quaternion, 4, doors.columns(rpy, 3, "rpy"), "rpy", "sxyz"))
+
+    @classmethod
+    def from_mrp(cls, parameters: Numbers) -> Rotation:
+        """Take modified Rodrigues parameters, axis times tan(angle/4), of shape (..., 3)."""
+        return cls._from(parameters, 3, "mrp", lambda px, py, pz, _xp: mrp.to_quaternion(px, py, pz), mrp.check)
+
+    @classmethod
+    def from_six_d(cls, columns: Numbers) -> Rotation:
+        """Take the first two matrix columns, one after the other, of shape (..., 6); they are orthonormalised."""
+        return cls._from(columns, 6, "six_d", six_d.to_quaternion, six_d.check)
+
+    @classmethod
+    def between(cls, start: Numbers, end: Numbers) -> Rotation:
+        """Give the shortest rotation that turns one direction, shape (..., 3), into another; lengths do not matter.
+
+        For opposite directions the axis is at right angles to the start and to the coordinate axis farthest from it.
+        """
+        parts = (*doors.columns(start, 3, "start"), *doors.columns(end, 3, "end"))
+        return cls._checked(parts, "start, end", quaternion.between, quaternion.check_directions)
+
+    @classmethod
+    def _from(cls, value: Numbers, width: int, name: str, kernel: Kernel, check: Any) -> Rotation:
+        return cls._checked(doors.columns(value, width, name), name, kernel, check)
+
+    @classmethod
+    def _checked(cls, given: Components, name: str, kernel: Kernel, check: Any) -> Rotation:
+        return cls._of_columns(batches.checked(kernel, 4, given, name, check))
+
+    @classmethod
+    def _of_columns(cls, components: Components) -> Rotation:
+        x, y, z, w = components
+        return cls.of(x, y, z, w)
+
+    def as_quaternion(self) -> Array:
+        """Give x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""
+        return batches.rows(quaternion.from_quaternion, 4, self._components)
+
+    def as_matrix(self) -> Array:
+        """Give matrices of shape (..., 3, 3); columns are the turned axes."""
+        nine = batches.rows(lambda x, y, z, w, _xp: quaternion.to_matrix(x, y, z, w), 9, self._components)
+        return nine.reshape(*self.shape, 3, 3)
+
+    def as_rotvec(self) -> Array:
+        """Give rotation vectors of shape (..., 3), radians, of length 0 to pi."""
+        return batches.rows(rotvec.from_quaternion, 3, self._components)
+
+    def as_axis_angle(self) -> tuple[Array, Any]:
+        """Give unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x."""
+        four = batches.rows(axis_angle.from_quaternion, 4, self._components)
+        return four[..., :3], four[..., 3] if four.ndim > 1 else float(four[3])
+
+    def as_euler(self, axes: str) -> Array:
+        """Give angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`.
+
+        The middle one lies in [-pi/2, pi/2], or in [0, pi] where first and third axis are the same; at gimbal lock
+        (see `gimbal_lock`) the third is 0.
+        """
+        return batches.rows(euler.from_quaternion, 3, self._components, checked_axes(axes))
+
+    def as_rpy(self) -> Array:
+        """Give roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
+        return self.as_euler("sxyz")
+
+    def as_mrp(self) -> Array:
+        """Give modified Rodrigues parameters of shape (..., 3), of length 0 to 1."""
+        return batches.rows(mrp.from_quaternion, 3, self._components)
+
+    def as_six_d(self) -> Array:
+        """Give the first two matrix columns, one after the other, of shape (..., 6)."""
+        return batches.rows(lambda x, y, z, w, _xp: six_d.from_quaternion(x, y, z, w), 6, self._components)
+
+    def gimbal_lock(self, axes: str) -> Any:
+        """Say per element whether the angles of a convention are at gimbal lock, to 1 eps."""
+        locked = euler.locked(*self._components, checked_axes(axes))
+        return bool(locked) if doors.single(self._components) else locked
+
+    def __matmul__(self, other: Rotation) -> Rotation:
+        """Compose: a_from_b @ b_from_c is a_from_c."""
+        if not isinstance(other, Rotation):
+            return NotImplemented
+        ours, theirs = self._components, other._components
+        if type(ours[3]) is float and type(theirs[3]) is float:
+            return Rotation.of(*quaternion.compose(*ours, *theirs))
+        return self._of_columns(batches.run(quaternion.compose, 4, (*ours, *theirs)))
+
+    def inverse(self) -> Rotation:
+        """Give the rotation back."""
+        return Rotation.of(*quaternion.conjugate(*self._components))
+
+    def canonical(self) -> Rotation:
+        """Give the same rotation, its quaternion with the canonical sign."""
+        return self._of_columns(batches.run_with_xp(quaternion.from_quaternion, 4, self._components))
+
+    def apply(self, vectors: Numbers) -> Array:
+        """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
+        given = doors.columns(vectors, 3, "vectors")
+        return batches.moved(quaternion.rotate, self._components, quaternion.to_matrix, given, "vectors")
+
+    def angle(self) -> Any:
+        """Give the angle of rotation in [0, pi] radians."""
+        return batches.number(quaternion.angle, self._components)
+
+    def distance(self, other: Rotation) -> Any:
+        """Give the angle in [0, pi] radians of the rotation between two."""
+        return batches.number(quaternion.distance, (*self._components, *require(other, "other").components))
+
+    def is_close(self, other: Rotation, *, angle: float = NEAR) -> Any:
+        """Say per element whether two rotations are within an angle in radians; q and -q are one."""
+        return self.distance(other) <= angle
+
+    def slerp(self, other: Rotation, fraction: Numbers) -> Rotation:
+        """Interpolate along the shorter arc; fraction 0 gives this one and 1 the other to the bit.
+
+        fraction: a number, or an array that broadcasts with the rotations.
+        """
+        parts = (*self._components, *require(other, "other").components, doors.scalars(fraction, "fraction"))
+        return self._of_columns(batches.run_with_xp(quaternion.slerp, 4, parts))
+
+    def mean(self, weights: Numbers | None = None) -> Rotation:
+        """Give the chordal mean of all elements: the rotation with the least sum of squared matrix differences.
+
+        Source: Markley et al. 2007, the eigenvector of the largest eigenvalue of sum(w q q^T).
+        """
+        import numpy as np
+
+        if doors.single(self._components):
+            return self
+        heavy = None if weights is None else doors.weights(weights, self.shape)
+        moment = batches.second_moment(self._components, heavy)
+        return Rotation.from_quaternion(np.linalg.eigh(moment)[1][:, 3], normalize=True).canonical()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the batch; () for one rotation."""
+        return getattr(self._components[3], "shape", ())
+
+    def __len__(self) -> int:
+        """Count along the first axis; one rotation has no length."""
+        if not self.shape:
+            raise TypeError("one rotation has no length")
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> Rotation:
+        """Choose elements as numpy does."""
+        if not self.shape:
+            raise TypeError("one rotation has no elements")
+        return self._of_columns(batches.chosen(self._components, index))
+
+    def __iter__(self) -> Iterator[Rotation]:
+        """Go along the first axis."""
+        return (self[index] for index in range(len(self)))
+
+    def __repr__(self) -> str:
+        """Show one rotation's quaternion, or the shape of many."""
+        if self.shape:
+            return f"<Rotation of shape {self.shape}>"
+        return f"Rotation([{', '.join(map(repr, self._components))}])"
+
+
+def require(value: object, name: str) -> Rotation:
+    """Give a rotation back; raise ValueInvalid for anything else."""
+    if isinstance(value, Rotation):
+        return value
+    raise ValueInvalid(f"{name}: expected a Rotation, got {type(value).__name__}")

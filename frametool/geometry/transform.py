@@ -1,0 +1,223 @@
+"""The value of a rigid transform, or of many: seven components inside, numpy at its face.
+
+Knows no names and no time. `a_from_b` takes points seen in b to the same points seen in a, and is the pose of b in a.
+"""
+
+from __future__ import annotations
+
+from frametool.errors import ValueInvalid
+from frametool.geometry import batches, doors, floats, matrix, rigid
+from frametool.geometry.rotation import NEAR, Rotation, require
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import Any
+
+    from frametool.geometry.kinds import Array, Components, Numbers, Rigid
+
+NEAR_BY = 1e-9  # metres: translations closer than this count as close
+
+
+class Transform:
+    """One rigid transform, or an array of them of any shape; frozen.
+
+    `a_from_c = a_from_b @ b_from_c`; `point_in_a = a_from_b.apply(point_in_b)`.  Metres and radians.
+    """
+
+    __slots__ = ("_components",)
+    __array_ufunc__ = None  # an array times a transform is refused, not tried element by element
+    _components: Rigid
+
+    def __init__(self, rotation: Rotation, translation: Numbers) -> None:
+        """Join a rotation and a translation of shape (..., 3) in metres; batch shapes broadcast."""
+        shift = doors.columns(translation, 3, "translation")
+        parts = (*shift, *require(rotation, "rotation").components)
+        self._components = doors.joined(parts, "translation")
+
+    @classmethod
+    def of(cls, tx: Any, ty: Any, tz: Any, x: Any, y: Any, z: Any, w: Any) -> Transform:
+        """Trust components, all floats or all arrays of one shape, the quaternion unit: the fast door."""
+        made = cls.__new__(cls)
+        made._components = (tx, ty, tz, x, y, z, w)  # noqa: SLF001 - its own class
+        return made
+
+    @property
+    def components(self) -> Rigid:
+        """Give tx, ty, tz, x, y, z, w: floats of one transform, else arrays of the batch's shape."""
+        return self._components
+
+    @classmethod
+    def identity(cls) -> Transform:
+        """Give the transform that moves nothing."""
+        return cls.of(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+    @classmethod
+    def random(cls, n: int | None = None, *, seed: Any = None, radius: float = 1.0) -> Transform:
+        """Draw one transform, or n: rotations uniform, translations normal with this deviation in metres."""
+        import numpy as np
+
+        generator = np.random.default_rng(seed)
+        rotation = Rotation.random(n, seed=generator)
+        return cls(rotation, radius * generator.normal(size=(3,) if n is None else (n, 3)))
+
+    @classmethod
+    def from_arrays(cls, xyz: Numbers, xyzw: Numbers, *, normalize: bool = False) -> Transform:
+        """Take translations of shape (..., 3) in metres and quaternions x, y, z, w of shape (..., 4).
+
+        Raises:
+            ValueInvalid: wrong shapes, not finite, or no rotation; names the first such row.
+        """
+        shift = doors.columns(xyz, 3, "xyz")
+        rotation = Rotation.from_quaternion(xyzw, normalize=normalize)
+        return cls._of_columns(doors.joined((*shift, *rotation.components), "xyz"))
+
+    @classmethod
+    def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Transform:
+        """Take homogeneous matrices of shape (..., 4, 4), the last row 0 0 0 1.
+
+        Raises:
+            ValueInvalid: wrong shape, another last row, not finite, or no rotation; names the first such row.
+        """
+        m = doors.matrices(matrices, 4, "matrix")
+        doors.check_last_row(m, "matrix")
+        turned = (*m[0:3], *m[4:7], *m[8:11])
+        if doors.single(m):
+            rotation: Any = matrix.to_quaternion(*matrix.check(*turned, normalize=normalize), floats)
+        else:
+            from frametool.geometry.sifting import rotation_quaternions
+
+            rotation = rotation_quaternions(turned, "matrix", normalize=normalize)
+        return cls._of_columns(doors.joined((m[3], m[7], m[11], *rotation), "matrix"))
+
+    @classmethod
+    def exp(cls, twist: Numbers) -> Transform:
+        """Give the transform reached by constant twists (vx, vy, vz, wx, wy, wz), shape (..., 6), in unit time.
+
+        Linear part first, as in ROS messages: metres, then radians.
+        """
+        given = doors.columns(twist, 6, "twist")
+        return cls._of_columns(batches.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
+
+    @classmethod
+    def _of_columns(cls, components: Components) -> Transform:
+        tx, ty, tz, x, y, z, w = components
+        return cls.of(tx, ty, tz, x, y, z, w)
+
+    @property
+    def xyz(self) -> Array:
+        """The translations, shape (..., 3), metres."""
+        return batches.stacked(self._components[:3])
+
+    @property
+    def xyzw(self) -> Array:
+        """The quaternions x, y, z, w, shape (..., 4), unit, with the canonical sign."""
+        return self.rotation.as_quaternion()
+
+    @property
+    def rotation(self) -> Rotation:
+        """The rotation."""
+        return Rotation.of(*self._components[3:])
+
+    @property
+    def translation(self) -> Array:
+        """The translations, shape (..., 3), metres."""
+        return self.xyz
+
+    def as_matrix(self) -> Array:
+        """Give homogeneous matrices of shape (..., 4, 4)."""
+        return batches.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
+
+    def log(self) -> Array:
+        """Give the twists (vx, vy, vz, wx, wy, wz), shape (..., 6), whose `exp` this is; angles up to pi."""
+        return batches.rows(rigid.log, 6, self._components)
+
+    def __matmul__(self, other: Transform) -> Transform:
+        """Compose: a_from_b @ b_from_c is a_from_c."""
+        if not isinstance(other, Transform):
+            return NotImplemented
+        ours, theirs = self._components, other._components
+        if type(ours[6]) is float and type(theirs[6]) is float:
+            return Transform.of(*rigid.compose(*ours, *theirs))
+        return self._of_columns(batches.run(rigid.compose, 7, (*ours, *theirs)))
+
+    def inverse(self) -> Transform:
+        """Give b_from_a of a_from_b."""
+        return self._of_columns(batches.run(rigid.inverse, 7, self._components))
+
+    def relative(self, other: Transform) -> Transform:
+        """Give the pose of the other seen from this one: self.inverse() @ other, near poses keeping their digits."""
+        return self._of_columns(batches.run(rigid.relative, 7, (*self._components, *_components_of(other))))
+
+    def apply(self, points: Numbers) -> Array:
+        """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
+        given = doors.columns(points, 3, "points")
+        return batches.moved(rigid.apply, self._components, rigid.to_matrix, given, "points")
+
+    def apply_vector(self, vectors: Numbers) -> Array:
+        """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
+        return self.rotation.apply(vectors)
+
+    def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
+        """Interpolate: translation along the line, rotation by slerp; fractions 0 and 1 give the ends to the bit.
+
+        fraction: a number, or an array that broadcasts with the transforms.
+        """
+        parts = (*self._components, *_components_of(other), doors.scalars(fraction, "fraction"))
+        return self._of_columns(batches.run_with_xp(rigid.interpolate, 7, parts))
+
+    def distance(self, other: Transform) -> tuple[Any, Any]:
+        """Give the metres and the radians between two."""
+        metres, radians = batches.run_with_xp(rigid.distance, 2, (*self._components, *_components_of(other)))
+        return metres, radians
+
+    def is_close(self, other: Transform, *, angle: float = NEAR, distance: float = NEAR_BY) -> Any:
+        """Say per element whether two are within an angle in radians and a distance in metres; q and -q are one."""
+        metres, radians = self.distance(other)
+        close = (metres <= distance) & (radians <= angle)
+        return bool(close) if type(metres) is float else close
+
+    def canonical(self) -> Transform:
+        """Give the same transform, its quaternion with the canonical sign."""
+        return Transform.of(*self._components[:3], *self.rotation.canonical().components)
+
+    def mean(self, weights: Numbers | None = None) -> Transform:
+        """Give the weighted mean of all elements: of the translations, and the chordal one of the rotations."""
+        if not self.shape:
+            return self
+        return Transform(self.rotation.mean(weights), batches.mean_rows(self._components[:3], weights))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the batch; () for one transform."""
+        return getattr(self._components[6], "shape", ())
+
+    def __len__(self) -> int:
+        """Count along the first axis; one transform has no length."""
+        if not self.shape:
+            raise TypeError("one transform has no length")
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> Transform:
+        """Choose elements as numpy does."""
+        if not self.shape:
+            raise TypeError("one transform has no elements")
+        return self._of_columns(batches.chosen(self._components, index))
+
+    def __iter__(self) -> Iterator[Transform]:
+        """Go along the first axis."""
+        return (self[index] for index in range(len(self)))
+
+    def __repr__(self) -> str:
+        """Show one transform's numbers, or the shape of many."""
+        if self.shape:
+            return f"<Transform of shape {self.shape}>"
+        shown = [repr(part) for part in self._components]
+        return f"Transform(Rotation([{', '.join(shown[3:])}]), [{', '.join(shown[:3])}])"
+
+
+def _components_of(other: object) -> Rigid:
+    """Give the components of a transform; raise ValueInvalid for anything else."""
+    if isinstance(other, Transform):
+        return other.components
+    raise ValueInvalid(f"other: expected a Transform, got {type(other).__name__}")

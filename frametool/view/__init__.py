@@ -1,0 +1,1 @@
+"""What a person looks at: aligned text, drawings; the only place that imports rich."""

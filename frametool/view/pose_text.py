@@ -1,0 +1,143 @@
+"""One pose for a person: which frame in which, then every notation, aligned on the decimal point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.formats.results import is_locked, rotation_entry, rotation_numbers
+from frametool.geometry.representations import notation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from frametool.formats.pose import Pose
+    from frametool.formats.results import Result, Style
+    from frametool.geometry.representations import Notation
+
+EVERYTHING = ("quaternion", "rpy_rad", "rpy_deg", "axis_angle_rad", "matrix")
+LABELS = {
+    "axis_angle": "axis-angle",
+    "rotvec": "rotation vector",
+    "six_d": "6d",
+    "xyzw": "quaternion",
+    "wxyz": "quaternion",
+}
+
+
+class Line(NamedTuple):
+    """One line of a description: what it is, its numbers with their names, their unit."""
+
+    label: str
+    cells: Sequence[tuple[str, float]]
+    unit: str
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Describe the results, parted by blank lines."""
+    return "\n".join(_describe(result, style) for result in results)
+
+
+def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
+    """Give one line a point, aligned, with its frame."""
+    rows = [
+        (record.get("frame"), next(value for value in record.values() if isinstance(value, list))) for record in records
+    ]
+    aligned = _aligned([[_number(value, style) for value in numbers] for _, numbers in rows])
+    lines = [
+        f"{'  '.join(cells)}  {f'm in {frame}' if frame else 'm'}"
+        for cells, (frame, _) in zip(aligned, rows, strict=True)
+    ]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _describe(result: Result, style: Style) -> str:
+    """Give the heading and the aligned lines of one pose."""
+    pose = result.pose
+    lines: list[Line] = []
+    if pose.position is not None:
+        lines.append(Line("translation", list(zip("xyz", pose.position, strict=True)), "m"))
+    if pose.rotation is not None:
+        for form in style.notations or tuple(map(notation, EVERYTHING)):
+            lines += _rotation_lines(pose, form, style)
+    lines += [Line(*extra) for extra in _extra_lines(result)]
+    return _heading(pose) + _layout(lines, style)
+
+
+def _heading(pose: Pose) -> str:
+    """Say in words which frame is seen from which."""
+    if pose.name is None or pose.parent is None:
+        return ""
+    return f"{pose.name} seen from {pose.parent}  (maps points in {pose.name} to points in {pose.parent})\n"
+
+
+def _rotation_lines(pose: Pose, form: Notation, style: Style) -> Iterator[Line]:
+    """Give the lines of one representation."""
+    name = form.representation.name
+    label = LABELS.get(name, name) + (f" {form.axes}" if form.axes else "")
+    unit = ("deg" if style.in_degrees(form) else "rad") if form.representation.angles else ""
+    if name == "matrix":
+        rows = rotation_entry(pose, form, style)[1]
+        yield from (Line(label if row is rows[0] else "", [("", value) for value in row], "") for row in rows[:3])
+        return
+    numbers = rotation_numbers(pose, form, style)
+    if is_locked(pose, form):
+        unit += "  (gimbal lock: not unique, third angle set to 0)"
+    yield Line(label, list(zip(_names(form), numbers, strict=True)), unit)
+
+
+def _names(form: Notation) -> Sequence[str]:
+    """Name the numbers of a line."""
+    match form.representation.name:
+        case "quaternion" | "xyzw":
+            return "xyzw"
+        case "wxyz":
+            return "wxyz"
+        case "rpy":
+            return ("roll", "pitch", "yaw")
+        case "euler":
+            return tuple((form.axes or "")[1:])
+        case "axis_angle":
+            return ("x", "y", "z", "angle")
+    return ("x", "y", "z") if len(form.representation.columns) == 3 else [""] * len(form.representation.columns)
+
+
+def _extra_lines(result: Result) -> Iterator[tuple[str, Sequence[tuple[str, float]], str]]:
+    """Give the lines of what is only said about a pose."""
+    units = {"distance": "m", "angle": "rad", "angle_deg": "deg"}
+    for key, value in result.extras.items():
+        if isinstance(value, float):
+            yield key.removesuffix("_deg"), [("", value)], units.get(key, "")
+
+
+def _layout(lines: Sequence[Line], style: Style) -> str:
+    """Align labels, names and numbers in columns."""
+    width = max(len(line.label) for line in lines)
+    named = max((len(name) for line in lines for name, _ in line.cells), default=0)
+    numbers = _aligned([[_number(value, style) for _, value in line.cells] for line in lines])
+    text = ""
+    for line, cells in zip(lines, numbers, strict=True):
+        columns = [f"{name:>{named}} {cell}" for (name, _), cell in zip(line.cells, cells, strict=True)]
+        text += f"  {line.label:<{width}} {' '.join(columns)}  {line.unit}".rstrip() + "\n"
+    return text
+
+
+def _number(value: float, style: Style) -> str:
+    """Write a number for a person: no minus before zero."""
+    return style.number(value + 0.0)
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Pad the numbers of each column so that their decimal points stand below one another."""
+    columns = max(map(len, rows), default=0)
+    wholes = [max(len(_split(row[at])[0]) for row in rows if at < len(row)) for at in range(columns)]
+    rests = [max(len(_split(row[at])[1]) for row in rows if at < len(row)) for at in range(columns)]
+    return [
+        [f"{_split(cell)[0]:>{wholes[at]}}{_split(cell)[1]:<{rests[at]}}" for at, cell in enumerate(row)]
+        for row in rows
+    ]
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Split a number before its decimal point."""
+    whole, point, rest = text.partition(".")
+    return whole, point + rest

@@ -1,0 +1,56 @@
+"""What the tests share: the command line in this process, and the seeded generator."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from typing import TYPE_CHECKING, NamedTuple
+
+import pytest
+
+from frametool import cli
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+class Outcome(NamedTuple):
+    """What a run of the command line left behind."""
+
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Outcome]:
+    """Run the command line in this process, in an empty folder that `files` fill."""
+
+    def call(*arguments: str, stdin: str | bytes = "", files: dict[str, str | bytes] | None = None) -> Outcome:
+        monkeypatch.chdir(tmp_path)
+        for name, content in (files or {}).items():
+            (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
+        streams = {"out": io.TextIOWrapper(io.BytesIO(), "utf-8"), "err": io.TextIOWrapper(io.BytesIO(), "utf-8")}
+        data = stdin.encode() if isinstance(stdin, str) else stdin
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data), "utf-8"))
+        monkeypatch.setattr(sys, "stdout", streams["out"])
+        monkeypatch.setattr(sys, "stderr", streams["err"])
+        status = cli.run(list(arguments))
+        texts = {}
+        for name, stream in streams.items():
+            stream.flush()
+            stream.seek(0)
+            texts[name] = stream.read()
+        return Outcome(status, texts["out"], texts["err"])
+
+    return call
+
+
+@pytest.fixture(autouse=True)
+def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the caller's settings out of the tests."""
+    monkeypatch.delenv("FRAMETOOL_TREE", raising=False)
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setitem(os.environ, "COLUMNS", "100")

@@ -1,0 +1,83 @@
+"""Every example that the README and the helps give runs, and prints what they say."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import console
+import pytest
+
+from frametool.cli import COMMANDS
+from frametool.formats import FORMATS
+from frametool.geometry.representations import REPRESENTATIONS
+
+README = (console.ROOT / "README.md").read_text()
+EXAMPLES = [pair for block in console.BLOCK.findall(README) for pair in console.commands(block)]
+HELP_EXAMPLES = [
+    (name, line.strip())
+    for name, (module, _) in COMMANDS.items()
+    for line in (import_module(module).command.help or "").splitlines()
+    if line.strip().startswith("frametool ")
+]
+
+
+@pytest.fixture(scope="module")
+def bin_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make a folder that holds the command."""
+    return tmp_path_factory.mktemp("bin")
+
+
+def split(text: str) -> tuple[list[str], list[float]]:
+    """Part a text into its words and its numbers: another libm may differ in a number's last digit."""
+    pieces = re.split(r"((?<![\w.])[-+]?\d+\.\d+(?:e[-+]\d+)?)", text)
+    return [" ".join(piece.split()) for piece in pieces[::2]], [float(piece) for piece in pieces[1::2]]
+
+
+@pytest.mark.parametrize(("command", "output"), EXAMPLES, ids=[command for command, _ in EXAMPLES])
+def test_a_readme_example_prints_what_the_readme_shows(command: str, output: str, bin_folder: Path) -> None:
+    words, numbers = split(console.printed(command, bin_folder))
+    assert words == split(output)[0]
+    assert numbers == pytest.approx(split(output)[1], rel=1e-12, abs=1e-15)
+
+
+@pytest.mark.parametrize(("name", "command"), HELP_EXAMPLES, ids=[command for _, command in HELP_EXAMPLES])
+def test_an_example_in_a_help_runs(name: str, command: str, bin_folder: Path, tmp_path: Path) -> None:
+    robot = console.ROOT / "examples" / "robot.yaml"
+    for file in ("robot.yaml", "arm.yaml", "gripper.yaml"):
+        (tmp_path / file).write_text(robot.read_text() if file != "gripper.yaml" else "frames: {gripper: {finger: {xyz: [0, 0, 0]}}}")
+    console.printed("true", bin_folder)
+    command = re.sub(r"\| dot -Tsvg -o (\S+)", r"> \1", command)
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False,
+        stdin=subprocess.DEVNULL, env={"PATH": f"{bin_folder}:/usr/bin:/bin"},
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, ""), name
+
+
+def test_every_command_has_an_example_in_its_help_and_in_the_readme() -> None:
+    assert {name for name, _ in HELP_EXAMPLES} == set(COMMANDS)
+    assert {name for name in COMMANDS if any(f"frametool {name} " in command for command, _ in EXAMPLES)} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("name", [*COMMANDS, *REPRESENTATIONS, *FORMATS])
+def test_the_readme_mentions_every_command_representation_and_format(name: str) -> None:
+    assert f"`{name}" in README or f"### {name}" in README or f"{name}`" in README or f", {name}" in README
+
+
+def test_the_python_example_of_the_readme_runs() -> None:
+    code = "\n".join(re.findall(r"```python\n(.*?)```", README, re.DOTALL))
+    done = subprocess.run([sys.executable, "-c", code], cwd=console.ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_trees_shown_in_the_readme_are_read(tmp_path: Path) -> None:
+    from frametool import load
+
+    for number, text in enumerate(re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)):
+        path = tmp_path / f"{number}.yaml"
+        path.write_text(text)
+        assert len(load(path).frames) > 1
