@@ -72,10 +72,7 @@ def split_delimited(block: bytes, delimiter: bytes, columns: int, *, comment: by
     """
     data, end = _closed(block)
     hidden = _inside_quotes(data, end, delimiter) if b'"' in block else _NOTHING_HIDDEN
-    if hidden is None:
-        found = _quoted_cells(block, data, delimiter)
-    else:
-        found = _plain_cells(data, end, delimiter, hidden)
+    found = _quoted_cells(block, data, delimiter) if hidden is None else _plain_cells(data, end, delimiter, hidden)
     if b"\r" in block:
         last = found.stops - 1
         found.ends[last] -= (data[found.ends[last] - 1] == _RETURN) & (found.ends[last] > found.starts[last])
@@ -151,13 +148,14 @@ def _inside_quotes(data: Bytes, end: int, delimiter: bytes) -> Flags | None:
     before, after = data[opening - 1], data[closing + 1]
     opens = _is_any(before, (delimiter[0], _NEWLINE, _QUOTE)) | (opening == MARGIN)
     closes = _is_any(after, (delimiter[0], _NEWLINE, _QUOTE, _RETURN))
-    if len(quotes) % 2 or not (opens.all() and closes.all()):
+    if len(quotes) % 2 or not opens.all() or not closes.all():
         return None
-    return np.bitwise_xor.accumulate(data[MARGIN:end] == _QUOTE)
+    inside: Flags = np.bitwise_xor.accumulate(data[MARGIN:end] == _QUOTE)
+    return inside
 
 
 def _is_any(text: Bytes, characters: tuple[int, ...]) -> Flags:
-    same = text == characters[0]
+    same: Flags = text == characters[0]
     for character in characters[1:]:
         same |= text == character
     return same

@@ -18,7 +18,7 @@ import numpy as np
 from frametool.text.powers import halves, power_of_ten, product_error
 
 if TYPE_CHECKING:
-    from frametool.text.arrays import Flags, Floats, Ints
+    from frametool.text.arrays import Floats, Ints
 
 # Sizes whose products with the powers, and the errors of these, stay normal floats.
 _LEAST, _GREATEST = 1e-270, 1e270
@@ -60,8 +60,9 @@ def _are_short(size: Floats) -> bool:
 def _scaled_decimals(size: Floats) -> Decimals:
     bits = size.view(np.int64)
     exponents = bits >> 52
-    power, rest, half_ulp, places = (table.take(exponents) for table in _tables())
-    number, fraction = _scale(size, power, rest)
+    powers, rests, half_ulps, all_places = _tables()
+    half_ulp = half_ulps.take(exponents)
+    number, fraction = _scale(size, powers.take(exponents), rests.take(exponents))
     tens = number // 10
     above_ten = (number - tens * 10) + fraction
     below_ten = 10.0 - above_ten
@@ -76,7 +77,7 @@ def _scaled_decimals(size: Floats) -> Decimals:
     to_tens -= nearest
     to_tens *= upwards | (above_ten < half_ulp)
     nearest += to_tens
-    return Decimals(nearest, places, np.flatnonzero(~sure))
+    return Decimals(nearest, all_places.take(exponents), np.flatnonzero(~sure))
 
 
 def _scale(size: Floats, power: Floats, rest: Floats) -> tuple[Ints, Floats]:
@@ -95,8 +96,8 @@ def _scale(size: Floats, power: Floats, rest: Floats) -> tuple[Ints, Floats]:
 def _tables() -> tuple[Floats, Floats, Floats, Ints]:
     """Tabulate by binary exponent: power of ten that scales, what it lacks, half an ulp scaled, its decimal places."""
     rows = [_table_row(exponent) for exponent in range(2048)]
-    power, rest, half_ulp, places = (np.array(column) for column in zip(*rows, strict=True))
-    return power, rest, half_ulp, places.astype(np.int64)
+    powers, rests, half_ulps, places = zip(*rows, strict=True)
+    return np.array(powers), np.array(rests), np.array(half_ulps), np.array(places, np.int64)
 
 
 def _table_row(exponent: int) -> tuple[float, float, float, int]:

@@ -59,7 +59,8 @@ def first_point(characters: Words) -> Ints:
     found &= _HIGH
     # The bits below the lowest one set: eight for each byte before it, and seven; all 64 if none is set.
     below = ~found & (found - np.uint64(1))
-    return (np.bitwise_count(below) >> 3).astype(np.int64)
+    places: Ints = (np.bitwise_count(below) >> 3).astype(np.int64)
+    return places
 
 
 @cache

@@ -74,11 +74,11 @@ def _scaled(size: Floats, precision: int) -> Ints:
 def _round_exactly(size: Floats, product: Floats, power: float) -> Ints:
     """Round the exact product, which is the rounded one and its error, half to even."""
     error = product_error(halves(size), halves(np.full_like(size, power)), product)
-    below = np.floor(product)
-    # The part above `below` may cross 0 or 1 by the error alone, but never a half unseen: both terms are exact.
-    excess = (product - below - 0.5) + error
-    odd = below.astype(np.int64) & 1
-    return below.astype(np.int64) + ((excess > 0) | ((excess == 0) & (odd == 1)))
+    floor = np.floor(product)
+    excess = (product - floor - 0.5) + error
+    below: Ints = floor.astype(np.int64)
+    below += (excess > 0) | ((excess == 0) & (below % 2 == 1))
+    return below
 
 
 def _write(numbers: Ints, negative: Flags, precision: int) -> Spans:

@@ -5,6 +5,8 @@ Knows nothing of numpy, so that a tool which sees only a few lines stays light.
 
 from __future__ import annotations
 
+from time import monotonic
+
 from frametool.errors import FormatError
 
 TYPE_CHECKING = False
@@ -21,9 +23,11 @@ if TYPE_CHECKING:
 
 BLOCK_BYTES = 1 << 19
 LONGEST_LINE = 1 << 26
-# A piece this large was not typed: more is on its way, and waiting a moment for it saves much work per block.
+# A piece this large was not typed: more is on its way, and waiting a moment for it saves much work per block. But
+# nothing that has arrived is kept back for longer than the second number.
 _BULK_BYTES = 1 << 14
 _PATIENCE_MS = 5
+_LONGEST_WAIT_S = 0.02
 
 
 def whole_lines(text: bytes) -> int:
@@ -67,7 +71,8 @@ def _read_piece(stream: Source, size: int, ready: Callable[[int], bool]) -> byte
         return piece
     pieces = [piece]
     missing = size - len(piece)
-    while missing > 0 and ready(_PATIENCE_MS if len(piece) >= _BULK_BYTES else 0):
+    until = monotonic() + _LONGEST_WAIT_S
+    while missing > 0 and monotonic() < until and ready(_PATIENCE_MS if len(piece) >= _BULK_BYTES else 0):
         piece = stream.read1(missing)
         if not piece:
             break

@@ -44,12 +44,15 @@ class _Mantissa(NamedTuple):
 def parse_floats(cells: Spans) -> tuple[Floats, Ints]:
     """Read cells as floats.
 
-    Accepted are plain decimal numbers, `[+-] digits [. digits] [e [+-] digits]` with blanks or tabs around them; neither
-    nan, inf, hexadecimals, underscores nor what is beyond the range of floats.
-    Returns the values, in the cells' shape, and the places of the bad ones, counted as in the flattened cells, in
-    order; a bad one's value is nan.
+    Accepted are plain decimal numbers, `[+-] digits [. digits] [e [+-] digits]`, with blanks or tabs around them;
+    neither nan, inf, hexadecimals, underscores nor what is beyond the range of floats.
+    Returns the values, in the cells' shape, and the places of the bad ones in order, counted in the flattened
+    cells; a bad one's value is nan.
     """
     starts, ends = cells.starts.ravel(), cells.ends.ravel()
+    # Where the first cell begins with a blank, all but a few do.
+    if starts.size and _is_blank(cells.data[starts[:1]])[0]:
+        starts, ends = _trimmed(cells.data, starts, ends)
     values, sure = _parse_plain(cells.data, starts, ends)
     rest = np.flatnonzero(~sure)
     if rest.size:
@@ -76,8 +79,9 @@ def _parse_plain(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
         sure &= mantissa.whole < _EXACT
         values = mantissa.whole / 1e8
     else:
-        values = _scale(mantissa, *power_of_ten(-8 * mantissa.words), sure)
-    np.negative(values, out=values, where=negative)
+        power, rest = power_of_ten(-8 * mantissa.words)
+        values = _scale(mantissa, np.array(power), np.array(rest), sure)
+    values *= 1.0 - 2.0 * negative
     return values, sure
 
 
@@ -89,8 +93,9 @@ def _parse_decorated(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Fla
     mantissa, is_number = _read_mantissa(data, begins, ends)
     sure &= is_number
     places = exponents - 8 * mantissa.words - LEAST_POWER
-    values = _scale(mantissa, *(table.take(places, mode="clip") for table in powers_of_ten()), sure)
-    np.negative(values, out=values, where=negative)
+    powers, rests = powers_of_ten()
+    values = _scale(mantissa, powers.take(places, mode="clip"), rests.take(places, mode="clip"), sure)
+    values *= 1.0 - 2.0 * negative
     return values, sure
 
 
@@ -110,7 +115,8 @@ def _trimmed(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints]:
 
 
 def _is_blank(characters: Bytes) -> Flags:
-    return (characters == ord(" ")) | (characters == ord("\t"))
+    blank: Flags = (characters == ord(" ")) | (characters == ord("\t"))
+    return blank
 
 
 def _split_exponent(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, Flags]:
@@ -132,7 +138,7 @@ def _split_exponent(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, 
 
 
 def _read_mantissa(data: Bytes, starts: Ints, ends: Ints) -> tuple[_Mantissa, Flags]:
-    """Read unsigned decimals; give integers, the digits after the point filled up to whole words, and which are sure."""
+    """Read unsigned decimals as integers of whole words, and tell which of them are sure."""
     characters = windows(data, 8)[starts].view("<u8")
     length = ends - starts
     before = np.minimum(first_point(characters), length)
@@ -171,15 +177,14 @@ def _tail(words: list[Words]) -> Ints:
     return total.view(np.int64)
 
 
-def _scale(mantissa: _Mantissa, power: Floats | float, rest: Floats | float, sure: Flags) -> Floats:
+def _scale(mantissa: _Mantissa, power: Floats, rest: Floats, sure: Flags) -> Floats:
     """Multiply by a power of ten, itself a sum of two floats; clear `sure` where the last bit is in doubt."""
     high, low = _as_two_floats(mantissa)
-    powers = np.asarray(power)
-    product = high * powers
-    error = product_error(halves(high), halves(powers), product)
+    product = high * power
+    error = product_error(halves(high), halves(power), product)
     error += high * rest
-    error += low * powers
-    values = product + error
+    error += low * power
+    values: Floats = product + error
     dropped = error - (values - product)
     dropped *= _DOUBT
     dropped += values
@@ -192,7 +197,7 @@ def _as_two_floats(mantissa: _Mantissa) -> tuple[Floats, Floats]:
     high, low = _split_integer(mantissa.whole)
     if mantissa.words == 1:
         return high, low
-    power = np.float64(10.0 ** (8 * mantissa.words - 8))
+    power: Floats = np.array(10.0 ** (8 * mantissa.words - 8))
     tail_high, tail_low = _split_integer(mantissa.tail)
     product = high * power
     error = product_error(halves(high), halves(power), product)

@@ -70,7 +70,7 @@ def _unusual(size: Floats, unsure: Ints) -> tuple[Ints, Ints]:
     """Give the places written with an exponent, and those left to Python."""
     single = unsure[size[unsure] != 0]
     inner = size[size != 0] if not size.all() else size
-    if _LEAST_PLAIN <= inner.min(initial=1) and inner.max(initial=1) < GREATEST_WHOLE:
+    if inner.min(initial=1) >= _LEAST_PLAIN and inner.max(initial=1) < GREATEST_WHOLE:
         return np.empty(0, np.int64), single
     powered = ((size < _LEAST_PLAIN) & (size > 0)) | (size >= _LEAST_POWER)
     by_python = (size >= GREATEST_WHOLE) & ~powered

@@ -44,9 +44,11 @@ def test_cells_are_those_the_csv_module_finds(rows: list[list[str]], line_end: s
     assert_as_csv_reads((written if ended else written.removesuffix(line_end)).encode())
 
 
-@pytest.mark.parametrize("block", [
-    b'a,5" pipe,b\nc,"d""e",f\n', b'a,"b"c,d\n"x,\ny",z,w\n', b'"a"b"c,d\n', b'a,b"\n"c,d"\n', b"", b"\n\n", b"a", b",\n,", b'""\n'
-])  # fmt: skip
+STRAY_QUOTES = [b'a,5" pipe,b\nc,"d""e",f\n', b'a,"b"c,d\n"x,\ny",z,w\n', b'"a"b"c,d\n', b'a,b"\n"c,d"\n', b'""\n']
+EMPTY_LINES = [b"", b"\n\n", b"a", b",\n,"]
+
+
+@pytest.mark.parametrize("block", [*STRAY_QUOTES, *EMPTY_LINES])
 def test_stray_quotes_and_empty_lines_are_read_as_the_csv_module_reads_them(block: bytes) -> None:
     assert_as_csv_reads(block)
 

@@ -42,7 +42,7 @@ def test_every_hostile_float_reads_as_python_reads_it(style: str) -> None:
 
 @pytest.mark.parametrize("text", [*NUMBERS, *SHAPES])
 def test_a_number_reads_as_python_reads_it(text: str) -> None:
-    assert read([text, "1.5"]) == [float(text).hex(), 1.5.hex()]
+    assert read([text, "1.5"]) == [float(text).hex(), (1.5).hex()]
 
 
 @pytest.mark.parametrize("text", NO_NUMBERS)

@@ -30,12 +30,14 @@ def test_short_decimals_come_back_as_they_were(digits: int, places: int) -> None
 
 
 def test_short_decimals_among_themselves_are_written_as_repr_writes_them() -> None:
-    values = np.round(np.random.default_rng(5).uniform(-1000, 1000, 2000), 6).tolist() + [0.0, -0.0, 100.0]
+    rounded = np.round(np.random.default_rng(5).uniform(-1000, 1000, 2000), 6)
+    values = [*rounded.tolist(), 0.0, -0.0, 100.0]
     assert lines(values) == [repr(value) for value in values]
 
 
 def test_rows_are_written_with_the_separator_of_each_column() -> None:
-    assert format_shortest(np.array([[1.0, -0.0, 1e-5], [0.1, 1e22, 3.0]]), b",;\n") == b"1.0,-0.0;1e-05\n0.1,1e+22;3.0\n"
+    values = np.array([[1.0, -0.0, 1e-5], [0.1, 1e22, 3.0]])
+    assert format_shortest(values, b",;\n") == b"1.0,-0.0;1e-05\n0.1,1e+22;3.0\n"
 
 
 def test_no_rows_are_no_text() -> None:

@@ -17,7 +17,9 @@ def spans_of(table: list[list[bytes]]) -> Spans:
 
 
 TABLES = st.integers(1, 4).flatmap(
-    lambda columns: st.lists(st.lists(st.binary(max_size=12), min_size=columns, max_size=columns), min_size=1, max_size=9)
+    lambda columns: st.lists(
+        st.lists(st.binary(max_size=12), min_size=columns, max_size=columns), min_size=1, max_size=9
+    )
 )
 
 
@@ -38,8 +40,8 @@ def test_many_rows_are_joined_over_the_bounds_of_batches() -> None:
 
 
 def test_no_rows_are_joined_to_nothing() -> None:
-    nothing = np.empty(0, np.int64)
-    assert join([Spans(framed(b""), nothing, nothing), Spans(framed(b""), nothing.reshape(0, 2), nothing.reshape(0, 2))]) == b""
+    column, table = np.empty(0, np.int64), np.empty((0, 2), np.int64)
+    assert join([Spans(framed(b""), column, column), Spans(framed(b""), table, table)]) == b""
 
 
 def test_a_framed_block_stands_between_margins() -> None:
