@@ -34,7 +34,7 @@ def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Outcom
             (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
         streams = {"out": io.TextIOWrapper(io.BytesIO(), "utf-8"), "err": io.TextIOWrapper(io.BytesIO(), "utf-8")}
         data = stdin.encode() if isinstance(stdin, str) else stdin
-        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data), "utf-8"))
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BufferedReader(io.BytesIO(data)), "utf-8"))
         monkeypatch.setattr(sys, "stdout", streams["out"])
         monkeypatch.setattr(sys, "stderr", streams["err"])
         status = cli.run(list(arguments))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,20 +9,22 @@ import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, poses_from, source_of, usage_if_inline
-from frametool.cli.trees import FRAME, announce, frame_name, load_tree, verbose_option
+from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline
+from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import FRAME, announce, frame_name, load_tree
 from frametool.errors import FormatError, ValueInvalid
-from frametool.formats.load import open_source
 from frametool.formats.numbers import parse_number
 from frametool.formats.points import Point, read_moveables
 from frametool.formats.pose import Pose
-from frametool.formats.source import Source
 from frametool.geometry import quaternion, rigid
+from frametool.stream.operation import Operation
+from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.formats.recordings import Recording
+    from frametool.formats.source import Source
     from frametool.geometry.kinds import Rigid
 
 CHOICES = ("point", "vector", "pose")
@@ -34,10 +35,17 @@ CHOICES = ("point", "vector", "pose")
 @click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
 @click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
-@verbose_option
 @rotation_options
 @pose_options
 @result_options("points")
+@click.option(
+    "--frame-column",
+    "frame_column",
+    type=TEXT,
+    metavar="NAME",
+    help="without SOURCE, the column that names each row's frame",
+)
+@stream_options
 def command(
     arguments: tuple[str, ...],
     pose: str | None,
@@ -45,8 +53,9 @@ def command(
     deg: bool,
     normalize: bool,
     kind: str | None,
+    frame_column: str | None,
     **options: Any,
-) -> None:
+) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
 
     \b
@@ -66,18 +75,49 @@ def command(
     wrench is that about TARGET's origin: force R f, torque R m + t x R f. A twist is the velocity of the same rigid
     body at TARGET's origin: angular R w, linear R v + t x R w.
     """
+    stream = Stream(options)
     output = Output("points", deg=deg, **options)
     if pose is None:
         way, rest = _way_by_tree(arguments, more)
     else:
-        way, rest = _way_by_pose(_one_pose(pose, degrees=deg, normalize=normalize)), arguments
+        way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
+    if rest in ((), ("-",)) and (recording := _messages(stream.path)) is not None:
+        _move_messages(recording, kind, way, output, normalize=normalize)
+        return 0
+    if rest in ((), ("-",)):
+        wishes = _wishes(way, frame_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
+        outcome = stream.run(wishes, output)
+        if isinstance(outcome, int):
+            return outcome
+        rest = (outcome,)
+    elif stream.path:
+        raise click.UsageError("-i FILE and records are two inputs; give one")
     records = _records(rest, kind, degrees=deg, normalize=normalize)
-    moved = (move(each, way.from_frame(own_frame(each), own_stamp(each)), way.target) for each in records)
-    first = next(moved)
-    if isinstance(first, (Pose, Point)):
-        output.moved([first, *moved])
-    else:
-        output.messages(itertools.chain([first], moved))
+    output.moved([move(each, way.from_frame(own_frame(each), None), way.target) for each in records])
+    return 0
+
+
+def _wishes(way: Way, frame_column: str | None) -> Request:
+    """Say how a stream's rows move: all from one frame, or each from the one it names."""
+    fixed = way.from_frame(None, None) if way.has_source and frame_column is None else None
+    frames = () if fixed else (frame_column or "",)
+
+    def edge_of(own: str | None) -> Rigid:
+        return way.from_frame(own, None)
+
+    return Request(
+        Operation(left=fixed, moves=True), frames=frames, edge_of=None if fixed else edge_of, way=edge_of,
+        told=way.target,
+    )  # fmt: skip
+
+
+def _move_messages(recording: Recording, kind: str | None, way: Way, output: Output, *, normalize: bool) -> None:
+    """Move stamped ROS messages, each from its own frame and at its own time."""
+    from frametool.formats.stamped_stream import read_stamped_messages
+
+    announce(recording)
+    messages = read_stamped_messages(recording, kind, normalize=normalize)
+    output.messages(each.moved(way.from_frame(each.frame, each.stamp_ns), way.target) for each in messages)
 
 
 class Way(NamedTuple):
@@ -85,12 +125,11 @@ class Way(NamedTuple):
 
     target: str | None
     from_frame: Callable[[str | None, int | None], Rigid]
+    has_source: bool  # whether all come from one frame
 
 
-def move(record: Any, target_from_source: Rigid, target: str | None) -> Any:
-    """Give a record as seen from the target: points shift and rotate, vectors rotate, poses compose, messages know."""
-    if not isinstance(record, (Pose, Point)):
-        return record.moved(target_from_source, target)
+def move(record: Pose | Point, target_from_source: Rigid, target: str | None) -> Pose | Point:
+    """Give a record as seen from the target: points shift and rotate, vectors rotate, poses compose."""
     if isinstance(record, Pose):
         return Pose.of(rigid.compose(*target_from_source, *record.components), record.name, target)
     if record.is_vector:
@@ -100,7 +139,7 @@ def move(record: Any, target_from_source: Rigid, target: str | None) -> Any:
     return record._replace(position=(x, y, z), frame=target)
 
 
-def _way_by_tree(arguments: Sequence[str], more: Sequence[str]) -> tuple[Way, Sequence[str]]:
+def _way_by_tree(arguments: tuple[str, ...], more: Sequence[str]) -> tuple[Way, tuple[str | Source, ...]]:
     """Take tree, target and, if one is named, source from the arguments; the rest are records."""
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
@@ -116,7 +155,7 @@ def _way_by_tree(arguments: Sequence[str], more: Sequence[str]) -> tuple[Way, Se
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
         return tree.lookup(target, start, at_ns).components
 
-    return Way(target, from_frame), rest
+    return Way(target, from_frame, source is not None), rest
 
 
 def _way_by_pose(pose: Pose) -> Way:
@@ -126,19 +165,12 @@ def _way_by_pose(pose: Pose) -> Way:
         _settled(own, pose.name)
         return pose.components
 
-    return Way(pose.parent, from_frame)
+    return Way(pose.parent, from_frame, has_source=True)
 
 
-def own_stamp(record: Any) -> int | None:
-    """Give the time a record says it is from."""
-    stamp_ns: int | None = getattr(record, "stamp_ns", None)
-    return stamp_ns
-
-
-def own_frame(record: Any) -> str | None:
+def own_frame(record: Pose | Point) -> str | None:
     """Give the frame a record says it is given in."""
-    frame: str | None = record.parent if isinstance(record, Pose) else record.frame
-    return frame
+    return record.parent if isinstance(record, Pose) else record.frame
 
 
 def _settled(own: str | None, source: str | None) -> str | None:
@@ -155,18 +187,13 @@ def is_record(argument: str) -> bool:
     return argument == "-" or is_inline(argument)
 
 
-def _one_pose(argument: str, *, degrees: bool, normalize: bool) -> Pose:
-    poses = poses_from(argument, degrees=degrees, normalize=normalize)
-    if len(poses) != 1:
-        raise click.UsageError(f"--transform takes one pose, {argument} holds {len(poses)}")
-    return poses[0]
-
-
-def _records(arguments: Sequence[str], kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Any]:
+def _records(
+    arguments: Sequence[str | Source], kind: str | None, *, degrees: bool, normalize: bool
+) -> Iterator[Pose | Point]:
     """Read the records: bare numbers in threes, mappings, standard input."""
     pending: list[str] = []
-    for argument in arguments or ("-",):
-        if not is_record(argument):
+    for argument in arguments:
+        if isinstance(argument, str) and not is_record(argument):
             pending.append(argument)
             continue
         yield from _points(pending, kind)
@@ -190,23 +217,21 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
         yield Point((x, y, z), kind or "point")
 
 
-def _input(argument: str) -> Source | Recording:
-    """Take an inline record as it stands, or look at what standard input holds."""
-    if is_inline(argument) or sys.stdin.isatty():
-        return source_of(argument)
-    source = open_source(argument)
-    announce(source)
-    return source
+def _messages(path: str | None) -> Recording | None:
+    """Open a stream of stamped ROS messages, as its first bytes tell; None for any other."""
+    if path is None and sys.stdin.isatty():
+        return None
+    with_peek = getattr(sys.stdin.buffer, "peek", None) if path is None else None
+    if path is None and with_peek is None:
+        return None
+    from frametool.formats.recordings import open_messages
+
+    return open_messages(path or "-")
 
 
-def _read(argument: str, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Any]:
+def _read(argument: str | Source, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
     """Read records from a mapping or from standard input, and take them for what --as says."""
-    source = _input(argument)
-    if not isinstance(source, Source):
-        from frametool.formats.stamped_stream import read_stamped_messages
-
-        yield from read_stamped_messages(source, kind, normalize=normalize)
-        return
+    source = source_of(argument) if isinstance(argument, str) else argument
     try:
         records = read_moveables(source, degrees=degrees, normalize=normalize)
     except FormatError as error:
@@ -216,7 +241,7 @@ def _read(argument: str, kind: str | None, *, degrees: bool, normalize: bool) ->
             yield Pose(record.position, None, record.name, record.frame)
         elif kind in ("point", "vector") and isinstance(record, Pose):
             raise ValueInvalid(f"a record has a rotation and cannot be taken for a {kind}")
-        elif kind == "vector" and isinstance(record, Point):
-            yield record._replace(key="vector")
+        elif kind in ("point", "vector") and isinstance(record, Point) and record.is_vector != (kind == "vector"):
+            yield record._replace(key=kind)
         else:
             yield record

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import combinations
+from frametool.cli.poses import combinations, one_pose
+from frametool.cli.streaming import Stream, stream_options
 from frametool.errors import ValueInvalid
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result
 from frametool.geometry import rigid
+from frametool.stream.operation import Operation
+from frametool.stream.request import Request
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.formats.source import Source
+
+    Rename = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
 
 @click.command(cls=Command, name="compose")
@@ -21,7 +31,8 @@ from frametool.geometry import rigid
 @rotation_options
 @pose_options
 @result_options("poses")
-def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> None:
+@stream_options
+def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 
     \b
@@ -30,9 +41,34 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
 
     POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch.
     """
+    stream = Stream(options)
     output = Output("poses", deg=deg, **options)
-    products = [reduce(product, each) for each in combinations(poses, degrees=deg, normalize=normalize)]
+    given: list[str | Source] = list(poses)
+    if poses.count("-") == 1:
+        at = poses.index("-")
+        fixed = [None if each == "-" else one_pose(each, degrees=deg, normalize=normalize) for each in poses]
+        operation, rename = _around(fixed[:at], fixed[at + 1 :])
+        wishes = Request(operation, degrees=deg, normalize=normalize, rename=rename)
+        outcome = stream.run(wishes, output)
+        if isinstance(outcome, int):
+            return outcome
+        given[at] = outcome
+    elif stream.path:
+        raise click.UsageError("-i FILE is read where - stands among the poses")
+    products = [reduce(product, each) for each in combinations(given, degrees=deg, normalize=normalize)]
     output.poses(Result(each) for each in products)
+    return 0
+
+
+def _around(left: Sequence[Pose | None], right: Sequence[Pose | None]) -> tuple[Operation, Rename]:
+    """Give the operation that puts each row between two products, and what it does to frames."""
+    before, after = (reduce(product, filter(None, poses)) if poses else None for poses in (left, right))
+
+    def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
+        result = reduce(product, filter(None, (before, Pose(name=name, parent=parent), after)))
+        return result.parent, result.name
+
+    return Operation(left=before and before.components, right=after and after.components), rename
 
 
 def product(left: Pose, right: Pose) -> Pose:

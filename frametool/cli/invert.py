@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import poses_from
+from frametool.cli.streaming import Stream, stream_options
 from frametool.formats.pose import inverted
 from frametool.formats.results import Result
+from frametool.stream.operation import Operation
+from frametool.stream.request import Request
+
+if TYPE_CHECKING:
+    from frametool.formats.source import Source
 
 
 @click.command(cls=Command, name="invert")
@@ -18,7 +24,8 @@ from frametool.formats.results import Result
 @rotation_options
 @pose_options
 @result_options("poses")
-def command(pose: str, deg: bool, normalize: bool, **options: Any) -> None:
+@stream_options
+def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.
 
     \b
@@ -27,9 +34,20 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> None:
 
     POSE is a mapping, a file, or - for standard input, also with several poses.
     """
+    stream = Stream(options)
+    source: str | Source = pose
     output = Output("poses", deg=deg, **options)
+    if stream.is_wanted(pose):
+        wishes = Request(
+            Operation(inverse=True), degrees=deg, normalize=normalize, rename=lambda parent, name: (name, parent)
+        )
+        outcome = stream.run(wishes, output)
+        if isinstance(outcome, int):
+            return outcome
+        source = outcome
     inverses = [
         inverted(each)._replace(name=each.parent, parent=each.name)
-        for each in poses_from(pose, degrees=deg, normalize=normalize)
+        for each in poses_from(source, degrees=deg, normalize=normalize)
     ]
     output.poses(Result(each) for each in inverses)
+    return 0

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, result_options, rotation_options
+from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
+from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, read_times, rules, rules_options, times_option
-from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
+from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import LookupFailed
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result
@@ -24,22 +26,21 @@ if TYPE_CHECKING:
 
 @click.command(cls=Command, name="lookup")
 @click.argument("tree", type=TEXT)
-@click.argument("target", type=FRAME)
-@click.argument("source", type=FRAME)
+@click.argument("target", type=FRAME, required=False, metavar="TARGET")
+@click.argument("source", type=FRAME, required=False, metavar="SOURCE")
 @click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
 @click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns, or latest  [default: latest]")
 @click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE, where --at is that at TARGET")
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")
 @times_option
-@click.option("--on-error", type=click.Choice(("fail", "skip")), default="fail", show_default=True,
-              help="what a time without data does to --times; skip ends with exit code 3")
 @rules_options
-@verbose_option
 @rotation_options
 @result_options("poses")
+@column_options
+@stream_options
 def command(
-    tree: str, target: str, source: str, more: Sequence[str], at: int | str | None, source_at: int | str | None,
-    fixed: str | None, times: str | None, on_error: str, moving: bool, cache: int | None, tf2: str | None,
+    tree: str, target: str | None, source: str | None, more: Sequence[str], at: int | str | None,
+    source_at: int | str | None, fixed: str | None, times: str | None, moving: bool, cache: int | None, tf2: str | None,
     **options: Any,
 ) -> int:  # fmt: skip
     """Give the pose of SOURCE in TARGET: the transform that maps points in SOURCE to points in TARGET.
@@ -55,14 +56,19 @@ def command(
     the result; the tree's own are what its file says. Between two samples of a moving frame positions are interpolated
     along the line and rotations by slerp, edge by edge, as tf2 does; nothing is extrapolated.
     """
+    by_row, stream = RowFrames(options), Stream(options)
     output = Output("poses", **options)
+    if not by_row and (target is None or source is None):
+        raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
+    if by_row or target is None or source is None:
+        return by_row.run(stream, output, frames, target=target, source=source, at=at_ns(at))
     if tf2 is None:
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
     if times is not None:
-        results = _many(frames, target, source, read_times(times), skip=on_error == "skip")
+        results = _many(frames, target, source, read_times(times), skip=stream.options["on_error"] == "skip")
         output.poses(found := [result for result in results if result is not None])
         return 3 if len(found) < len(results) else 0
     if fixed is not None:

@@ -41,12 +41,9 @@ class Output:
         """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
-        self.told = format_name is not None or _form_by_suffix(output, what) is not None
-        form = (
-            format_name
-            or _form_by_suffix(output, what)
-            or ("text" if output is None and sys.stdout.isatty() else "yaml")
-        )
+        self.told = format_name or _form_by_suffix(output, what)
+        self.notations = notations or ()
+        form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
         self.style = Style(form, chosen, degrees=deg, precision=precision, keep_sign=keep_sign)
@@ -138,7 +135,7 @@ class Output:
 
 def _form_by_suffix(path: str | None, what: str) -> str | None:
     """Name the form that a file's suffix stands for, if it can hold this kind of result."""
-    suffix = os.path.splitext(path)[1].lower() if path else ""  # noqa: PTH122 - pathlib costs 6 ms at start-up
+    suffix = os.path.splitext(path)[1].lower() if path else ""
     return next((name for name in writers(what) if suffix and suffix in FORMATS[name].suffixes), None)
 
 
@@ -152,13 +149,13 @@ def write_whole(path: str, text: str, *, force: bool = False) -> None:
     temporary = f"{path}.{os.getpid()}.part"
     try:
         if os.path.exists(path) and not os.path.isfile(path):
-            with open(path, "w", encoding="utf-8", newline="") as stream:  # noqa: PTH123
+            with open(path, "w", encoding="utf-8", newline="") as stream:
                 stream.write(text)
             return
         mode = os.stat(path).st_mode & 0o7777 if os.path.lexists(path) else None
         if mode is not None and not force:
-            raise FileProblem(f"{path}: exists; give --force to replace it")
-        with open(temporary, "x", encoding="utf-8", newline="") as stream:  # noqa: PTH123
+            _refuse_to_replace(path)
+        with open(temporary, "x", encoding="utf-8", newline="") as stream:
             stream.write(text)
         if mode is not None:
             os.chmod(temporary, mode)
@@ -169,3 +166,7 @@ def write_whole(path: str, text: str, *, force: bool = False) -> None:
         if os.path.lexists(temporary):
             os.unlink(temporary)
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def _refuse_to_replace(path: str) -> None:
+    raise FileProblem(f"{path}: exists; give --force to replace it")

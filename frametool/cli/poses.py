@@ -27,8 +27,10 @@ def is_inline(text: str) -> bool:
     return text.startswith(("{", "["))
 
 
-def source_of(argument: str) -> Source:
-    """Take an inline argument as it stands, or read a file, or standard input for `-`."""
+def source_of(argument: str | Source) -> Source:
+    """Take what was read already or an inline argument as it stands, or read a file, or standard input for `-`."""
+    if isinstance(argument, Source):
+        return argument
     if is_inline(argument):
         return Source(INLINE, argument)
     if argument != "-":
@@ -38,7 +40,7 @@ def source_of(argument: str) -> Source:
     return Source("stdin", read_text("-"))
 
 
-def poses_from(argument: str, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
+def poses_from(argument: str | Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
     """Read the poses of one argument: inline, `-` for standard input, or a file."""
     try:
         return read_poses(source_of(argument), degrees=degrees, normalize=normalize)
@@ -53,7 +55,7 @@ def usage_if_inline(error: FormatError) -> FormatError:
     return error
 
 
-def combinations(arguments: Sequence[str], *, degrees: bool, normalize: bool) -> list[tuple[Pose, ...]]:
+def combinations(arguments: Sequence[str | Source], *, degrees: bool, normalize: bool) -> list[tuple[Pose, ...]]:
     """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
     if list(arguments).count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
@@ -64,6 +66,14 @@ def combinations(arguments: Sequence[str], *, degrees: bool, normalize: bool) ->
         raise ValueInvalid(f"only one argument may hold several poses, found {counts}")
     most = max(map(len, read))
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
+
+
+def one_pose(argument: str, *, degrees: bool, normalize: bool) -> Pose:
+    """Read the one pose of an argument."""
+    poses = poses_from(argument, degrees=degrees, normalize=normalize)
+    if len(poses) != 1:
+        raise click.UsageError(f"one pose is wanted here, {argument} holds {len(poses)}")
+    return poses[0]
 
 
 def pose_from_numbers(

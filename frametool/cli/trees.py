@@ -51,12 +51,14 @@ def announce(source: Source | Recording) -> None:
         click.echo(f"frametool: {described}", err=True)
 
 
-def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:
+def be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> bool:
+    """Remember that -v was given, for whatever opens files."""
     context.meta[VERBOSE] = chosen
+    return chosen
 
 
 verbose_option = click.option(
-    "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
+    "-v", "--verbose", is_flag=True, expose_value=False, callback=be_verbose,
     help="say on stderr what each file was taken for",
 )  # fmt: skip
 

@@ -96,6 +96,16 @@ def samples_of(recording: Recording, report: Report | None = None) -> Iterator[S
             yield Sample(edge.parent, edge.child, edge.pose.components, edge.stamp_ns)
 
 
+def open_messages(path: str) -> Recording | None:
+    """Open what begins with a stamped message, as text or JSON lines; None for anything else, nothing of it read."""
+    stream = _opened(path)
+    head = stream.peek(HEAD)[:HEAD]  # type: ignore[attr-defined]
+    if path != "-":
+        stream.close()
+    stamped = b"header" in head and detect(head) in ("echo", "jsonl")
+    return Recording(path) if stamped else None
+
+
 def _raise(error: FormatError) -> None:
     raise error
 
@@ -104,7 +114,7 @@ def _is_bag_folder(path: str) -> bool:
     """Tell the folder that ROS 2 records into."""
     import os
 
-    return os.path.isdir(path) and os.path.exists(os.path.join(path, "metadata.yaml"))  # noqa: PTH110, PTH112, PTH118 - pathlib costs 6 ms at start-up
+    return os.path.isdir(path) and os.path.exists(os.path.join(path, "metadata.yaml"))
 
 
 def _opened(path: str) -> BinaryIO:
@@ -115,7 +125,7 @@ def _opened(path: str) -> BinaryIO:
         stdin = sys.stdin.buffer
         return stdin if hasattr(stdin, "peek") else io.BufferedReader(stdin)  # type: ignore[type-var]
     try:
-        return open(path, "rb", buffering=HEAD)  # noqa: PTH123 - pathlib costs 6 ms at start-up
+        return open(path, "rb", buffering=HEAD)
     except OSError as error:
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:

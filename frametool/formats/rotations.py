@@ -44,12 +44,18 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
     """
     if key == AXES_KEY:
         return None, _read_axes(value)
-    form = ROTATION_KEYS[key]
-    shape = SHAPES.get(form.representation.name, _list_or_map)
-    form, texts, places = shape(form, value)
+    form, texts, places = shape_of(key, value)
     if len(texts) == 16:
         return read_homogeneous(form, texts, places, reading)
     return None, rotation_of(form, texts, places, reading)
+
+
+def shape_of(key: str, value: Any) -> Shape:
+    """Take the value of a rotation key apart: its notation, one text a component, and where each stands below it."""
+    if key == AXES_KEY:
+        return notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
+    form = ROTATION_KEYS[key]
+    return SHAPES.get(form.representation.name, _list_or_map)(form, value)
 
 
 def _read_axes(value: Any) -> Quaternion:

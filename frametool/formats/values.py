@@ -60,10 +60,10 @@ class Reading:
         self.notes.append(((*self.here, *path), message))
 
 
-def within(path: Path, read: Callable[..., Any], *arguments: Any) -> Any:
+def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     """Call a reader for something further down; its misfits then name the whole path."""
     try:
-        return read(*arguments)
+        return read(*arguments, **options)
     except Misfit as misfit:
         raise misfit.below(*path) from None
 

@@ -276,3 +276,12 @@ def _children(container: dict[str, Value] | list[Value]) -> list[tuple[Any, Valu
 def _tag_shown(tag: str) -> str:
     """Give a tag as it is written."""
     return tag.replace("tag:yaml.org,2002:", "!!")
+
+
+def node_events(text: str) -> Iterator[Any]:
+    """Give the events of scalars, aliases, lists and maps with their marks."""
+    get: Callable[[], Any] = _Loader(text).get_event
+    kinds = (ScalarEvent, AliasEvent, SequenceStartEvent, MappingStartEvent, SequenceEndEvent, MappingEndEvent)
+    while type(event := get()) is not StreamEndEvent:
+        if isinstance(event, kinds):
+            yield event

@@ -13,9 +13,9 @@ from frametool.errors import ValueInvalid
 from frametool.geometry.elementary import doubled_arctan, half_sincos, largest
 
 __all__ = [
-    "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos",
-    "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some", "sqrt",
-    "where",
+    "all_near_one", "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp",
+    "half_sincos", "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some",
+    "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
     from frametool.geometry.kinds import Array, Components, Kernel, Number, Pair, Quaternion
 
-BLOCK = 12288  # rows: numpy's calls cost little beside their work, and the temporaries of a kernel stay in the cache
+BLOCK = 16384  # rows: numpy's calls cost little beside their work, and the temporaries of a kernel stay in the cache
+WIDE = 12  # columns in and out: kernels with more have more temporaries, and get three quarters of the rows
 SQRT_HALF = float(np.sqrt(0.5))
 np.empty(2**21)  # 16 MiB given back untouched: from then on glibc reuses the memory of blocks instead of mapping anew
 
@@ -34,14 +35,19 @@ def length(x: Number, y: Number, z: Number) -> Number:
     return sqrt(x * x + y * y + z * z)
 
 
+def all_near_one(values: Number, tolerance: float) -> bool:
+    """Say whether all values are within a tolerance of 1; none, and NaN is not."""
+    least, most = np.min(values, initial=1.0), np.max(values, initial=1.0)
+    return bool(1.0 - tolerance <= least and most <= 1.0 + tolerance)
+
+
 def first_nonzero(*values: Number) -> Number:
     """Give element by element the first value that is not zero, or the last."""
     found = values[0]
     for value in values[1:]:
-        zero = found == 0.0
-        if not np.asarray(zero).any():
+        if np.all(found):
             break
-        found = where(zero, value, found)
+        found = where(found == 0.0, value, found)
     return found
 
 
@@ -50,9 +56,8 @@ def canonical_sign(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
 
     A product with +-1 costs a quarter of `where`; only exact zeros need the longer way.
     """
-    negative = first_nonzero(w, x, y, z) < 0.0
-    sign = 1.0 - 2.0 * negative
-    return tuple(part * sign if np.all(part) else where(negative, 0.0 - part, part) for part in (x, y, z, w))
+    sign = copysign(1.0, first_nonzero(w, x, y, z))
+    return tuple(part * sign if np.all(part) else where(sign < 0.0, 0.0 - part, part) for part in (x, y, z, w))
 
 
 def incline(rise: Number, run: Number) -> Number:
@@ -122,7 +127,7 @@ def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *a
     shape = batch_shape(parts)
     columns = [part if isinstance(part, float) else np.broadcast_to(part, shape).reshape(-1) for part in parts]
     with np.errstate(all="ignore"):
-        for start, stop in blocks(int(np.prod(shape))):
+        for start, stop in blocks(int(np.prod(shape)), len(parts) + len(targets)):
             results = kernel(*(_cut(column, start, stop) for column in columns), *args)
             for target, result in zip(targets, results, strict=True):
                 target[start:stop] = result
@@ -143,10 +148,11 @@ def guarded(kernel: Kernel, complain: Callable[[], None]) -> Kernel:
     return watched
 
 
-def blocks(size: int) -> Iterator[tuple[int, int]]:
-    """Cut a length into blocks."""
-    for start in range(0, size, BLOCK):
-        yield start, min(start + BLOCK, size)
+def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:
+    """Cut a length into blocks, shorter ones for a kernel with many columns in and out."""
+    rows = BLOCK if columns <= WIDE else BLOCK * 3 // 4
+    for start in range(0, size, rows):
+        yield start, min(start + rows, size)
 
 
 def _cut(column: Number, start: int, stop: int) -> Number:

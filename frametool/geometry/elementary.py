@@ -39,15 +39,18 @@ def half_sincos(angle: Number) -> Pair:
     well-conditioned.  Quarters beyond pi/4 are reduced as Cody & Waite 1980 do.
     """
     quarter = 0.25 * angle
-    if largest(quarter) <= 0.25 * pi:
+    bound = largest(quarter)
+    if bound <= 0.25 * pi:
         return _doubled(quarter)
-    turns = np.rint(quarter * (2.0 / pi))
-    if not largest(turns) < FAR:
+    if not bound < FAR:
         return np.sin(0.5 * angle), np.cos(0.5 * angle)
+    turns = np.rint(quarter * (2.0 / pi))
     quarter -= turns * QUARTER_TURN
     quarter -= turns * QUARTER_TURN_REST
     sine, cosine = _doubled(quarter)
-    sign = 1.0 - 2.0 * abs(turns - 2.0 * np.rint(0.5 * turns))
+    if bound > 0.75 * pi:
+        turns -= 2.0 * np.rint(0.5 * turns)
+    sign = 1.0 - 2.0 * abs(turns)
     return sine * sign, cosine * sign
 
 

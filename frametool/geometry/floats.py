@@ -6,9 +6,9 @@ from math import atan2, cbrt, copysign, cos, degrees, fmod, frexp, ldexp, radian
 from math import hypot as length
 
 __all__ = [
-    "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp", "half_sincos",
-    "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some", "sqrt",
-    "where",
+    "all_near_one", "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp",
+    "half_sincos", "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some",
+    "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -37,6 +37,11 @@ def canonical_sign(x: float, y: float, z: float, w: float) -> tuple[float, float
 def bearing(y: float, x: float, _radius: float) -> float:
     """Give the angle of a direction in [-pi, pi]; arrays profit from knowing its length."""
     return atan2(y, x)
+
+
+def all_near_one(value: float, tolerance: float) -> bool:
+    """Say whether a number is within a tolerance of 1."""
+    return abs(value - 1.0) <= tolerance
 
 
 def first_nonzero(*values: float) -> float:

@@ -10,7 +10,7 @@ from frametool.geometry import floats
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Matrix, Namespace, Number, Quaternion, Vector
+    from frametool.geometry.kinds import Components, Matrix, Namespace, Number, Quaternion, Vector
 
 EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: what lies within 4 is left alone, bit for bit
@@ -69,10 +69,9 @@ def conjugate(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
 def unit(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
     """Normalise a quaternion of moderate norm; what is unit to 4 eps keeps its bits."""
     squared = x * x + y * y + z * z + w * w
-    off = abs(squared - 1.0) > UNIT
-    if not xp.some(off):
+    if xp.all_near_one(squared, UNIT):
         return x, y, z, w
-    norm = xp.where(off, xp.sqrt(squared), 1.0)
+    norm = xp.where(abs(squared - 1.0) > UNIT, xp.sqrt(squared), 1.0)
     return x / norm, y / norm, z / norm, w / norm
 
 
@@ -142,14 +141,18 @@ def slerp(
     mixed = unit(
         to_a * ax + signed * bx, to_a * ay + signed * by, to_a * az + signed * bz, to_a * aw + signed * bw, xp
     )  # fmt: skip
-    x, y, z, w = (ends(*three, fraction, xp) for three in zip((ax, ay, az, aw), mixed, (bx, by, bz, bw), strict=True))
+    x, y, z, w = ends((ax, ay, az, aw), mixed, (bx, by, bz, bw), fraction, xp)
     return x, y, z, w
 
 
-def ends(start: Number, between: Number, end: Number, fraction: Number, xp: Namespace) -> Number:
+def ends(start: Components, between: Components, end: Components, fraction: Number, xp: Namespace) -> Components:
     """Put the very ends, to the bit, where the fraction is 0 or 1."""
     at_start, at_end = fraction == 0.0, fraction == 1.0
-    return xp.where(at_start, start, xp.where(at_end, end, between)) if xp.some(at_start | at_end) else between
+    if not xp.some(at_start | at_end):
+        return between
+    return tuple(
+        xp.where(at_start, a, xp.where(at_end, b, mixed)) for a, mixed, b in zip(start, between, end, strict=True)
+    )
 
 
 def to_matrix(x: Number, y: Number, z: Number, w: Number) -> Matrix:

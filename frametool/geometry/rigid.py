@@ -73,15 +73,15 @@ def interpolate(
     fraction: 0 gives a and 1 gives b to the bit; outside is extrapolated.
     """
     rotation = quaternion.slerp(ax, ay, az, aw, bx, by, bz, bw, fraction, xp)
-    tx, ty, tz = (_line(a, b, fraction, xp) for a, b in ((atx, btx), (aty, bty), (atz, btz)))
+    between = tuple(_line(a, b, fraction, xp) for a, b in ((atx, btx), (aty, bty), (atz, btz)))
+    tx, ty, tz = quaternion.ends((atx, aty, atz), between, (btx, bty, btz), fraction, xp)
     return tx, ty, tz, *rotation
 
 
 def _line(start: Number, end: Number, fraction: Number, xp: Namespace) -> Number:
-    """Interpolate two numbers from the nearer end, and give the very ends at 0 and 1."""
+    """Interpolate two numbers from the nearer end."""
     step = end - start
-    between = xp.where(fraction < 0.5, start + fraction * step, end - (1.0 - fraction) * step)
-    return quaternion.ends(start, between, end, fraction, xp)
+    return xp.where(fraction < 0.5, start + fraction * step, end - (1.0 - fraction) * step)
 
 
 def distance(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from frametool.geometry.kinds import Components, Kernel, Matrix
+    from frametool.geometry.kinds import Array, Components, Kernel, Matrix
 
 
 class _Irregular(Exception):
@@ -31,20 +31,27 @@ def unit_quaternions(given: Components, name: str, *, normalize: bool) -> Compon
     Raises:
         ValueInvalid: naming the first row that is no rotation.
     """
-    try:
-        return arrays.run(_plainly_unit, 4, given)
-    except _Irregular:
-        return arrays.run(_quaternion_sifter(given, name, normalize=normalize), 4, given)
+    copied = np.empty((4, *given[0].shape))
+    columns, flat = [column.reshape(-1) for column in given], copied.reshape(4, -1)
+    for start, stop in arrays.blocks(flat.shape[1]):
+        block = flat[:, start:stop]
+        for target, column in zip(block, columns, strict=True):
+            target[...] = column[start:stop]
+        if not _made_unit(block):
+            return arrays.run(_quaternion_sifter(given, name, normalize=normalize), 4, given)
+    return tuple(copied)
 
 
-def _plainly_unit(x: Any, y: Any, z: Any, w: Any) -> Components:
-    """Pass a block whose rows need no word; most are unit already."""
-    off = arrays.largest(quaternion.squared_norm(x, y, z, w) - 1.0)
-    if off <= quaternion.UNIT:
-        return x, y, z, w
-    if off <= quaternion.SILENT:
-        return quaternion.unit(x, y, z, w, arrays)
-    raise _Irregular
+def _made_unit(block: Array) -> bool:
+    """Make a block unit if its rows need no word; most are already."""
+    x, y, z, w = block
+    with np.errstate(over="ignore", invalid="ignore"):
+        squared = quaternion.squared_norm(x, y, z, w)
+    if not arrays.all_near_one(squared, quaternion.SILENT):
+        return False
+    if not arrays.all_near_one(squared, quaternion.UNIT):
+        block[...] = quaternion.unit(x, y, z, w, arrays)
+    return True
 
 
 def _quaternion_sifter(given: Components, name: str, *, normalize: bool) -> Kernel:

@@ -130,8 +130,8 @@ class _Reader:
             raise Misfit(f"expected a leader's name, a file or a list of commands, found {kind(value)}")
         if value in LEADERS:
             return built_in(value, self.seed or 0)
-        path = os.path.join(os.path.dirname(self.source.name), value)  # noqa: PTH118, PTH120 - pathlib costs 6 ms
-        if not os.path.exists(path):  # noqa: PTH110
+        path = os.path.join(os.path.dirname(self.source.name), value)
+        if not os.path.exists(path):
             raise Misfit(f"no file {path} and no leader {value!r}{alternatives(value, LEADERS, 'leaders')}")
         return scripted(read_script(Source(path, read_text(path))))
 

@@ -115,7 +115,7 @@ def safe(path: str) -> int:
     import yaml
 
     records = []
-    with open(path) as stream:  # noqa: PTH123 - as the other readers do
+    with open(path) as stream:
         for document in yaml.load_all(stream, Loader=yaml.CSafeLoader):
             for message in (document or {}).get("transforms", ()):
                 stamp, moved = message["header"]["stamp"], message["transform"]

@@ -1,0 +1,81 @@
+"""Look-ups for every row of a table: the frames are named in its columns."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import TEXT
+from frametool.cli.trees import frame_name
+from frametool.geometry.representations import notation
+from frametool.stream.request import Request
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeVar
+
+    from frametool.cli.output import Output
+    from frametool.cli.streaming import Stream
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.tree import FrameTree
+    from frametool.geometry.kinds import Rigid
+
+    Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def column_options(function: Function) -> Function:
+    """Give a command the options that name columns of frames; `RowFrames` takes them."""
+    function = click.option(
+        "--source-column", type=TEXT, metavar="NAME", help="stream a table; this column names each row's SOURCE"
+    )(function)
+    return click.option(
+        "--target-column", type=TEXT, metavar="NAME", help="stream a table; this column names each row's TARGET"
+    )(function)
+
+
+class RowFrames:
+    """Which columns name the frames of each row; true if one does."""
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        """Take the options out of a command's."""
+        self.target: str | None = options.pop("target_column")
+        self.source: str | None = options.pop("source_column")
+
+    def __bool__(self) -> bool:
+        """Tell whether rows are looked up."""
+        return self.target is not None or self.source is not None
+
+    def run(
+        self,
+        stream: Stream,
+        output: Output,
+        tree: FrameTree | TransformBuffer,
+        *,
+        target: str | None,
+        source: str | None,
+        at: int | None = None,
+    ) -> int:
+        """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
+        fixed_target, fixed_source = self._fixed(target, source)
+
+        def edge_of(names: str) -> Rigid:
+            first, _, second = names.partition("\0")
+            return tree.lookup(fixed_target or first, fixed_source or second or first, at).components
+
+        fixed_target = fixed_target and frame_name(fixed_target, tree)
+        fixed_source = fixed_source and frame_name(fixed_source, tree)
+        frames = tuple(name for name in (self.target, self.source) if name is not None)
+        forms = output.notations or (notation("quaternion"),)
+        wishes = Request(poses=0, frames=frames, edge_of=edge_of, notations=forms, degrees=output.style.degrees)
+        status = stream.run(wishes, output, tables_only=True)
+        return status if isinstance(status, int) else 0
+
+    def _fixed(self, target: str | None, source: str | None) -> tuple[str | None, str | None]:
+        """Give the frames named on the command line; each frame is named once."""
+        if self.target is not None and source is None:
+            target, source = None, target
+        for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
+            if (name is None) == (column is None):
+                raise click.UsageError(f"name {option} or its column, one of the two")
+        return target, source

@@ -1,0 +1,218 @@
+"""Streams on the command line: the options they add, and the run itself."""
+
+from __future__ import annotations
+
+import os
+import sys
+from io import BufferedReader
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import TEXT, Notations
+from frametool.cli.trees import be_verbose
+from frametool.errors import FileProblem, FormatError
+from frametool.formats.source import Source, decode
+from frametool.stream.detect import RECORDS, STREAMS, form_of
+from frametool.stream.faults import MOST, ON_ERROR, STOP, Policy
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+    from typing import TypeVar
+
+    from frametool.cli.output import Output
+    from frametool.stream.request import Request
+    from frametool.stream.run import Outcome
+
+    Function = TypeVar("Function", bound=Callable[..., Any])
+
+SMALL = 1 << 14  # bytes: a few records, which a person reads as text
+PATIENCE_MS = 50
+NAMES = (
+    "input_path",
+    "input_form",
+    "columns",
+    "keep",
+    "prefix",
+    "header",
+    "on_error",
+    "max_errors",
+    "jobs",
+    "quiet",
+    "verbose",
+)
+
+
+def stream_options(function: Function) -> Function:
+    """Give a command the options of streams; `Stream` takes them."""
+    for names, attributes in reversed(OPTIONS):
+        function = click.option(*names, **attributes)(function)
+    return function
+
+
+def _flag(summary: str) -> dict[str, Any]:
+    return {"is_flag": True, "help": summary}
+
+
+def _text(metavar: str, summary: str) -> dict[str, Any]:
+    return {"type": TEXT, "metavar": metavar, "help": summary}
+
+
+def _number(least: int, default: int, summary: str) -> dict[str, Any]:
+    kind = click.IntRange(least)
+    return {"type": kind, "default": default, "show_default": True, "metavar": "N", "help": summary}
+
+
+FORM = {"type": click.Choice(tuple(STREAMS)), "help": "form of the stream  [default: by suffix or first line]"}
+GIVEN = {"type": Notations(), "metavar": "REP", "help": "what the rotations of VALUES or of a stream's columns are"}
+HEADER = {"is_flag": True, "flag_value": False, "default": True, "help": "a table without names; columns are numbered"}
+ON_BAD_ROWS = {"type": click.Choice(ON_ERROR), "default": STOP, "show_default": True, "help": "what bad rows do"}
+OPTIONS: tuple[tuple[tuple[str, ...], dict[str, Any]], ...] = (
+    (("-i", "--input", "input_path"), _text("FILE", "stream from this file instead of standard input")),
+    (("--in", "input_form"), FORM),
+    (("--from", "given"), GIVEN),
+    (("--columns",), _text("NAME,..", "our columns, by name or number; once for each pose") | {"multiple": True}),
+    (("--keep",), _flag("add the result's columns instead of replacing ours")),
+    (("--prefix",), _text("TEXT", "put this before the names of the result's columns") | {"default": ""}),
+    (("--no-header", "header"), HEADER),
+    (("--on-error",), ON_BAD_ROWS),
+    (("--max-errors",), _number(0, MOST, "tell of so many bad rows; all are counted")),
+    (("--jobs",), _number(1, 1, "processes for a large stream")),
+    (("--quiet",), _flag("no progress on stderr")),
+    (("-v", "--verbose"), _flag("say on stderr what was detected") | {"callback": be_verbose}),
+)
+
+
+class Stream:
+    """The stream of a command, as its options describe it."""
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        """Take the stream's options out of a command's."""
+        self.options = {name: options.pop(name) for name in NAMES}
+        self.given = one_notation(options.pop("given", None))
+        self.path: str | None = self.options["input_path"]
+        if self.path == "-":
+            self.path = None
+
+    def is_wanted(self, argument: object) -> bool:
+        """Tell whether standard input or -i FILE is to be read in this argument's place."""
+        if self.path is not None and argument not in (None, "-"):
+            raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
+        return self.path is not None or argument in (None, "-")
+
+    def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int | Source:
+        """Run the stream and give its exit status; or give the text of a few records that are to be shown otherwise."""
+        name = self.path or "stdin"
+        with _opened(self.path) as stream:
+            begin = stream.peek()
+            form, known_by = form_of(begin, self.path or "", told=self.options["input_form"] or _table_form(output))
+            if self.options["verbose"] and known_by:
+                click.echo(f"frametool: {name}: read as {form} ({STREAMS[form]}), known by {known_by}", err=True)
+            if tables_only and form in RECORDS:
+                raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
+            shown = output.style.form == "text" and _is_small(stream)
+            if form in RECORDS and (shown or (output.told or form) != form):
+                return Source(name, decode(stream.read(), name))
+            if form not in RECORDS and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
+                raise click.UsageError(
+                    f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
+                )
+            return self._run(stream, form, self._completed(request, output), output)
+
+    def _completed(self, request: Request, output: Output) -> Request:
+        """Add what the stream's options say to the request."""
+        options = self.options
+        if options["keep"] and output.told in RECORDS:
+            raise click.UsageError("--keep is for tables; a record holds one pose")
+        return request._replace(
+            given=request.given or self.given,
+            notations=request.notations or output.notations,
+            precision=output.style.precision,
+            keep_sign=output.style.keep_sign,
+            columns=options["columns"],
+            keep=options["keep"],
+            prefix=options["prefix"],
+            on_error=options["on_error"],
+        )
+
+    def _run(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        from frametool.stream.run import run
+        from frametool.stream.sink import Sink, die_of_closed_pipe
+        from frametool.view.progress import Progress
+
+        name = self.path or "stdin"
+        policy = Policy(
+            name,
+            request.on_error,
+            most=self.options["max_errors"],
+            tell=lambda text: click.echo(f"frametool: {text}", err=True),
+        )
+        progress = Progress(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"])
+        outcomes = self._outcomes(stream, form, request, name)
+        try:
+            with Sink(None if output.path == "-" else output.path, force=output.force) as sink:
+                return run(outcomes, sink.write, policy, progress.advance)
+        except BrokenPipeError:
+            outcomes.close()  # ends the processes of --jobs
+            die_of_closed_pipe()
+            raise
+        finally:
+            progress.stop()
+            outcomes.close()
+
+    def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
+        if form in RECORDS:
+            from frametool.stream.documents import run_records
+
+            return run_records(stream, form, request, source=name, jobs=self.options["jobs"])
+        from frametool.stream.tables import run_table
+
+        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
+
+
+def _is_small(stream: BufferedReader) -> bool:
+    """Tell whether what is left is known to be little: a small file, or a pipe whose writer is done."""
+    import select
+    from stat import S_ISREG
+
+    try:
+        status = os.fstat(stream.fileno())
+        if S_ISREG(status.st_mode):
+            return status.st_size < SMALL
+        poll = select.poll()
+        poll.register(stream.fileno(), select.POLLHUP)
+        return bool(poll.poll(PATIENCE_MS))
+    except OSError:
+        return True
+
+
+def _table_form(output: Output) -> str:
+    """Give the form of a table if --format names one: a table is written as it is read."""
+    return output.told if output.told in STREAMS and output.told not in RECORDS else ""
+
+
+def _opened(path: str | None) -> BufferedReader:
+    """Open the input; raises FileProblem."""
+    if path is None:
+        if sys.stdin.isatty():
+            click.echo("frametool: reading from the terminal; end with Ctrl-D", err=True)
+        stream = sys.stdin.buffer
+        return stream if isinstance(stream, BufferedReader) else BufferedReader(stream)  # type: ignore[arg-type]
+    try:
+        return open(path, "rb")
+    except OSError as error:
+        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def one_notation(given: Any) -> Any:
+    """Take the one representation of --from."""
+    if given and len(given) > 1:
+        raise click.UsageError("--from takes one representation")
+    return given[0] if given else None
+
+
+def no_columns(error: FormatError) -> FormatError:
+    """Count what --columns names wrongly as misuse."""
+    if not error.line:
+        error.exit_code = 2
+    return error

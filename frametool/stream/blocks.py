@@ -1,0 +1,304 @@
+"""One block of rows through the operation: numbers read, checked, moved, written; faults collected, nothing lost."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.errors import FrametoolError, ValueInvalid
+from frametool.formats.numbers import explain_angle, explain_number, parse_angle
+from frametool.geometry import arrays, rigid
+from frametool.stream.faults import NULL, STOP, Fault
+from frametool.stream.pieces import Const, Out
+from frametool.stream.rotations import read_rotations
+from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
+from frametool.stream.shape import IDENTITY, POSE, TURN, pose_of
+from frametool.text.parse import parse_floats
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.kinds import Components, Rigid
+    from frametool.stream.operation import Operation
+    from frametool.stream.pieces import Piece
+    from frametool.stream.rows import Block
+    from frametool.stream.shape import Shape, Target
+    from frametool.text.arrays import Flags, Floats, Ints
+    from frametool.text.spans import Spans
+
+NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
+
+
+class Plan(NamedTuple):
+    """What is done to every row of one layout.
+
+    shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
+    pieces: the text of a result; null: what stands for each number of a row without one
+    edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
+    yaml: numbers need a point before the exponent
+    """
+
+    shapes: tuple[Shape, ...]
+    targets: tuple[Target, ...]
+    operation: Operation
+    pieces: tuple[Piece, ...]
+    names: tuple[str, ...]
+    null: bytes = b""
+    edge_of: Callable[[str], Rigid] | None = None
+    normalize: bool = False
+    precision: int | None = None
+    on_error: str = STOP
+    unwrap: bool = False
+    yaml: bool = False
+    edges: tuple[Rigid | None, ...] = ()
+
+
+class State:
+    """What one block leaves for the next: the row before, and how often each angle has turned around."""
+
+    __slots__ = ("angles", "previous", "turns")
+
+    def __init__(self) -> None:
+        """Begin before the first row."""
+        self.previous: list[float] | None = None
+        self.angles: dict[int, float] = {}
+        self.turns: dict[int, float] = {}
+
+
+class Run:
+    """The steps of one block; rows are numbered as in the block.
+
+    reasons: row -> column and why it is bad; mended: rows whose rotation was off and normalised
+    doubted: rows with angles that look like degrees, and which
+    """
+
+    def __init__(self, plan: Plan, block: Block, state: State) -> None:
+        """Do all of it."""
+        self.plan = plan
+        self.block = block
+        self.reasons: dict[int, tuple[str, str]] = {}
+        self.mended: list[int] = []
+        self.doubted: list[tuple[int, str]] = []
+        self.count = len(block.places)
+        numbers = self._read()
+        edge = None if plan.edge_of is None or not self.count else self._edges(plan.edge_of)
+        with np.errstate(all="ignore"):
+            moved = self._compute(list(np.ascontiguousarray(numbers.T)), edge, state)
+            self.results, self.locked = self._results(moved)
+        self.rows = np.arange(self.count)
+        if self.reasons:
+            self._keep(np.array([row not in self.reasons for row in range(self.count)], np.bool_))
+        if plan.unwrap and len(self.rows):
+            _unwrap(self.results, plan.targets[0].angle_columns(), state)
+
+    def _blame(self, row: int, column: str, reason: str) -> None:
+        """Keep the first reason why a row is bad."""
+        self.reasons.setdefault(row, (column, reason))
+
+    def _read(self) -> Floats:
+        """Read all numbers; those that are none are nan."""
+        numbers, bad = parse_floats(self.block.numbers)
+        for place in bad.tolist():
+            row, column = divmod(place, numbers.shape[1])
+            text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
+            try:
+                numbers[row, column] = _read_angle(text, self._unit_of(column))
+            except ValueInvalid as error:
+                self._blame(row, self.plan.names[column], str(error))
+        return numbers
+
+    def _unit_of(self, column: int) -> bool | None:
+        """Tell whether a number is in degrees; None if it is no angle."""
+        for shape in self.plan.shapes:
+            if column < shape.size:
+                return shape.degrees if column in shape.angles_at else None
+            column -= shape.size
+        return None
+
+    def _edges(self, edge_of: Callable[[str], Rigid]) -> Rigid:
+        """Give the edge of each row by its frame's name; a row whose frame has none is bad."""
+        table: list[Rigid] = []
+        known: dict[str, tuple[int, str]] = {}
+        for row, name in enumerate(self.block.frames):
+            if name not in known:
+                edge, problem = _edge(edge_of, name)
+                known[name] = len(table), problem
+                table.append(edge)
+            if known[name][1]:
+                self._blame(row, "", known[name][1])
+        chosen_rows = np.array([known[name][0] for name in self.block.frames], np.int64)
+        return tuple(np.array(column)[chosen_rows] for column in zip(*table, strict=True))  # type: ignore[return-value]
+
+    def _compute(self, columns: list[Floats], edge: Rigid | None, state: State) -> list[Components]:
+        """Apply the operation to each point or pose of the rows."""
+        shapes, operation, moved = self.plan.shapes, self.plan.operation, []
+        poses: list[Rigid] = []
+        first = 0
+        for index, shape in enumerate(shapes):
+            numbers = columns[first : first + shape.size]
+            mover = edge if edge is not None else self.plan.edges[index] if self.plan.edges else None
+            if shape.kind != POSE:
+                moved.append(operation.point(shape.kind, shape.position(numbers), mover))
+            else:
+                pose = pose_of(shape.position(numbers), self._rotation(shape, numbers, first))
+                poses.append(rigid.inverse(*pose) if shape.inverse else pose)
+                if len(self.plan.targets) > 1 or operation.of != "pair":
+                    moved.append(operation.pose(self._with_previous(poses.pop(), state), mover, arrays))
+            first += shape.size
+        if poses or not shapes:
+            moved.append(operation.pose(poses or [NOWHERE], edge, arrays))
+        return moved
+
+    def _with_previous(self, pose: Rigid, state: State) -> list[Rigid]:
+        if self.plan.operation.of != "previous" or not self.count:
+            return [pose]
+        return _with_previous(pose, [row for row in range(self.count) if row not in self.reasons], state, self.count)
+
+    def _rotation(self, shape: Shape, numbers: list[Floats], first: int) -> Components:
+        if shape.notation is None:
+            return IDENTITY
+        given = [numbers[index] for index in shape.rotation_at]
+        names = self.plan.names[first : first + shape.size]
+        if shape.whole:
+            self._check_last_row(numbers[12:], names[12])
+        found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
+        for row, reason in found.reasons.items():
+            self._blame(row, names[shape.rotation_at[0]], reason)
+        self.mended += found.mended.tolist()
+        self.doubted += _doubtful_angles(shape, given)
+        return found.quaternions
+
+    def _check_last_row(self, numbers: list[Floats], name: str) -> None:
+        wrong = (numbers[0] != 0.0) | (numbers[1] != 0.0) | (numbers[2] != 0.0) | (numbers[3] != 1.0)
+        for row in np.flatnonzero(wrong).tolist():
+            found = " ".join(f"{number[row]:g}" for number in numbers)
+            self._blame(row, name, f"the last row of a 4x4 pose is 0 0 0 1, found {found}")
+
+    def _results(self, moved: list[Components]) -> tuple[Floats, Ints]:
+        """Give the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
+        numbers: list[Floats] = []
+        locked = np.zeros(self.count, np.int64)
+        for target, parts in zip(self.plan.targets, moved, strict=True):
+            pose = parts[:7] if len(parts) > 3 else parts
+            numbers += [*target.numbers(pose, arrays), *parts[7:]]
+            flags = target.locked(pose)
+            if flags is not None:
+                locked |= flags
+        results = np.empty((self.count, len(numbers)))
+        for column, number in enumerate(numbers):
+            results[:, column] = number
+        if not np.isfinite(results.sum()):
+            for row in np.flatnonzero(~np.isfinite(results).all(axis=1)).tolist():
+                self._blame(row, "", "the result is not finite: the numbers are too large")
+        return results, locked
+
+    def _keep(self, kept: Flags) -> None:
+        self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
+
+    def first_fault(self) -> int | None:
+        """Give the place of the first bad row, if the run stops there."""
+        if self.plan.on_error != STOP:
+            return None
+        bad = [int(self.block.places[row]) for row in self.reasons]
+        return min([*bad, *(each.place for each in self.block.broken)], default=None)
+
+    def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
+        """Give what is written before place `end`: results, rows without one, and what passes."""
+        odd = list(self.block.odd)
+        if end is not None:
+            self._keep(self.block.places[self.rows] < end)
+            odd = [(place, text) for place, text in odd if place < end]
+        if self.plan.on_error == NULL:
+            odd += [(each.place, each.null_row) for each in self.block.broken]
+        groups = [*self._written(), *self._null_rows()]
+        return [*groups, texts_as_rows(odd)] if odd else groups
+
+    def _written(self) -> list[tuple[Ints, list[Spans]]]:
+        plan, rows = self.plan, self.rows
+        if not len(rows):
+            return []
+        values = None
+        if self.results.shape[1]:
+            values = number_spans(
+                self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml
+            )
+        parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
+        return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked))]
+
+    def _null_rows(self) -> list[tuple[Ints, list[Spans]]]:
+        if self.plan.on_error != NULL or not self.reasons:
+            return []
+        rows = np.array(sorted(self.reasons), np.int64)
+        pieces = [
+            Const(piece.between.join([self.plan.null] * (piece.last - piece.first)))
+            if isinstance(piece, Out)
+            else piece
+            for piece in self.plan.pieces
+        ]
+        parts = [chosen(part, rows) for part in self.block.parts]
+        return [(self.block.places[rows], assemble(pieces, parts, None, np.zeros(len(rows), np.int64)))]
+
+    def faults(self) -> list[Fault]:
+        """Give what is wrong, line by line."""
+        found = [Fault(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
+        return sorted(found + [Fault(each.line, each.column, each.reason) for each in self.block.broken])
+
+
+def _read_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001
+    """Read an angle that says its unit; raise ValueInvalid with the reason why a text is no number."""
+    if degrees is None:
+        raise ValueInvalid(explain_number(text))
+    try:
+        value, unit = parse_angle(text)
+    except ValueInvalid:
+        raise ValueInvalid(explain_angle(text)) from None
+    if unit is None or (unit == "deg") == degrees:
+        return value
+    return math.degrees(value) if degrees else math.radians(value)
+
+
+def _edge(edge_of: Callable[[str], Rigid], name: str) -> tuple[Rigid, str]:
+    """Give the edge of a frame, or why there is none."""
+    try:
+        return edge_of(name), ""
+    except FrametoolError as error:
+        return NOWHERE, str(error)
+
+
+def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]:
+    """Wonder about the first bare angle beyond a full turn."""
+    form = shape.notation
+    if form is None or shape.degrees or form.degrees is not None or form.representation.name == "rotvec":
+        return []
+    for index in form.representation.angles:
+        beyond = np.flatnonzero(abs(given[index]) > TURN)
+        if beyond.size:
+            return [(int(beyond[0]), f"{form.spec} {given[index][beyond[0]]:g}")]
+    return []
+
+
+def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
+    """Give the good row before each row, and the row; the very first row's is itself."""
+    full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
+    if not good:
+        return [pose, pose]
+    kept = np.array(good)
+    before = kept[np.maximum(np.searchsorted(kept, np.arange(count)) - 1, 0)]
+    earlier = [part[before] for part in full]
+    if state.previous is not None:
+        for part, value in zip(earlier, state.previous, strict=True):
+            part[: kept[0] + 1] = value
+    state.previous = [float(part[kept[-1]]) for part in full]
+    return [tuple(earlier), tuple(full)]
+
+
+def _unwrap(results: Floats, angles: Sequence[tuple[int, float]], state: State) -> None:
+    """Add full turns to angles, in place, so that no step is larger than half a turn."""
+    for column, period in angles:
+        values = results[:, column].copy()
+        before = np.concatenate([[state.angles.get(column, values[0])], values[:-1]])
+        turns = state.turns.get(column, 0.0) - np.cumsum(np.rint((values - before) / period))
+        results[:, column] = values + period * turns
+        state.angles[column], state.turns[column] = float(values[-1]), float(turns[-1])

@@ -1,0 +1,34 @@
+"""The pieces a row's text is made of: stretches of the input, numbers of the result, constant text."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+
+class In(NamedTuple):
+    """A stretch of the input, by its index among the spans a format found."""
+
+    part: int
+
+
+class Out(NamedTuple):
+    """Numbers of the result, from the first up to before the last, each followed by `between` but for the last."""
+
+    first: int
+    last: int
+    between: bytes = b","
+
+
+class Const(NamedTuple):
+    """The same text in every row."""
+
+    text: bytes
+
+
+class IfLocked(NamedTuple):
+    """Text that stands only in rows whose angles are not unique."""
+
+    text: bytes
+
+
+Piece: TypeAlias = In | Out | Const | IfLocked

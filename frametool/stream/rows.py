@@ -1,0 +1,136 @@
+"""A block of rows: numbers in, the operation, numbers out, and the text put together again around them.
+
+Knows no syntax: what a format found is spans of text, what it wants written is a list of pieces.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.stream.pieces import Const, IfLocked, In, Out
+from frametool.text.fixed import fixed_spans
+from frametool.text.shortest import shortest_spans
+from frametool.text.spans import MARGIN, Spans, framed, join
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from frametool.stream.pieces import Piece
+    from frametool.text.arrays import Floats, Ints
+
+
+class Broken(NamedTuple):
+    """A row that no number can be read from: its place, its line, the column and the reason, and its null row."""
+
+    place: int
+    line: int
+    column: str
+    reason: str
+    null_row: bytes
+
+
+class Block(NamedTuple):
+    """What a format found in a block of text.
+
+    numbers: (n, c) the cells with our numbers; parts: spans (n,) that pieces refer to
+    places: (n,) where each row stands among all that the block holds; line_of: the line of a row, from 0
+    odd: place and text of what passes as it is; broken: rows that have no numbers
+    frames: the name of the frame each row is given in, if rows say so
+    """
+
+    numbers: Spans
+    parts: Sequence[Spans]
+    places: Ints
+    line_of: Callable[[int], int]
+    odd: Sequence[tuple[int, bytes]] = ()
+    broken: Sequence[Broken] = ()
+    frames: Sequence[str] = ()
+
+
+def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:
+    """Write floats as fixed decimals or as the shortest text that reads back; YAML wants a point before an exponent."""
+    if precision is not None:
+        return fixed_spans(values, precision, separators)
+    spans = shortest_spans(values, separators)
+    return _with_points(spans, values, separators) if yaml else spans
+
+
+def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
+    """Write 1e-05 as 1.0e-05."""
+    size = abs(values)
+    odd = np.flatnonzero(((size < 1e-4) & (size > 0.0)) | (size >= 1e16))
+    if not odd.size:
+        return spans
+    texts = [
+        repr(value) if "." in repr(value) else repr(value).replace("e", ".0e") for value in values.ravel()[odd].tolist()
+    ]
+    after = [chr(separators[place % len(separators)]) for place in odd.tolist()]
+    _, (added,) = texts_as_rows([(0, f"{text}{end}".encode()) for text, end in zip(texts, after, strict=True)])
+    starts, ends = spans.starts.copy(), spans.ends.copy()
+    starts.reshape(-1)[odd] = added.starts + len(spans.data)
+    ends.reshape(-1)[odd] = added.ends + len(spans.data)
+    return Spans(np.concatenate([spans.data, added.data]), starts, ends)
+
+
+def separators(pieces: Iterable[Piece], count: int) -> bytes:
+    """Give the character that follows each number of the result."""
+    after = bytearray(b"," * count)
+    for piece in pieces:
+        if isinstance(piece, Out) and piece.between:
+            after[piece.first : piece.last] = piece.between[:1] * (piece.last - piece.first)
+    return bytes(after)
+
+
+def assemble(pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints) -> list[Spans]:
+    """Give the spans, in order, that make up the rows; locked: (n,) 1 where angles are not unique."""
+    return [_spans(piece, parts, values, locked) for piece in pieces]
+
+
+def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, locked: Ints) -> Spans:
+    if isinstance(piece, In):
+        return parts[piece.part]
+    if isinstance(piece, Out) and values is not None:
+        ends = values.ends[:, piece.first : piece.last].copy()
+        ends[:, -1] -= 1
+        return Spans(values.data, values.starts[:, piece.first : piece.last], ends)
+    text = piece.text if isinstance(piece, (Const, IfLocked)) else b""
+    data = framed(text)
+    starts = np.full(len(locked), MARGIN, np.int64)
+    return Spans(data, starts, starts + (locked * len(text) if isinstance(piece, IfLocked) else len(text)))
+
+
+def chosen(spans: Spans, rows: Ints) -> Spans:
+    """Keep some rows."""
+    return Spans(spans.data, spans.starts[rows], spans.ends[rows])
+
+
+def texts_as_rows(odd: Sequence[tuple[int, bytes]]) -> tuple[Ints, list[Spans]]:
+    """Give texts as rows at their places."""
+    lengths = np.array([len(text) for _, text in odd], np.int64)
+    ends = np.cumsum(lengths) + MARGIN
+    data = framed(b"".join(text for _, text in odd))
+    return np.array([place for place, _ in odd], np.int64), [Spans(data, ends - lengths, ends)]
+
+
+def written(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
+    """Put the rows of all groups in the order of their places."""
+    if len(groups) < 2:
+        return join(groups[0][1]) if groups else b""
+    places = np.concatenate([each for each, _ in groups])
+    rows = [_finished(spans) for _, spans in groups]
+    offsets = np.cumsum([0, *(len(each.data) for each in rows)])[:-1].tolist()
+    order = np.argsort(places, kind="stable")
+    starts = np.concatenate([each.starts + offset for each, offset in zip(rows, offsets, strict=True)])
+    ends = np.concatenate([each.ends + offset for each, offset in zip(rows, offsets, strict=True)])
+    return join([Spans(np.concatenate([each.data for each in rows]), starts[order], ends[order])])
+
+
+def _finished(spans: list[Spans]) -> Spans:
+    """Join the spans of each row, and give the rows as spans of the joined text."""
+    if len(spans) == 1 and spans[0].starts.ndim == 1:
+        return spans[0]
+    lengths = sum((part.ends - part.starts).reshape(len(part.starts), -1).sum(axis=1) for part in spans)
+    ends = np.cumsum(lengths) + MARGIN
+    return Spans(framed(join(spans)), ends - lengths, ends)

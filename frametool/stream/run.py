@@ -1,0 +1,89 @@
+"""A whole stream: blocks in, outcomes out in order, faults told after the good rows before them are out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import warn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from frametool.stream.faults import Fault, Policy
+
+MOST_WAITING = 2  # blocks a process may have ahead: memory stays flat
+
+
+class Outcome(NamedTuple):
+    """What became of a block: its text, faults by line from 0, how many rows and lines it had, what is worth a word."""
+
+    text: bytes
+    faults: Sequence[Fault] = ()
+    rows: int = 0
+    lines: int = 0
+    mended: int = 0
+    doubted: Sequence[tuple[int, str]] = ()
+    size: int = 0
+
+
+def run(
+    outcomes: Iterable[Outcome], write: Callable[[bytes], None], policy: Policy, advance: Callable[[int, int], None]
+) -> int:
+    """Write what becomes of each block, tell of its faults, and give the exit status.
+
+    advance: is told rows and bytes done after each block.  Raises Stopped at the first fault if that is the rule.
+    """
+    line, rows, mended, doubted = 1, 0, 0, False
+    for outcome in outcomes:
+        if outcome.text:
+            write(outcome.text)
+        advance(outcome.rows, outcome.size)
+        if outcome.doubted and not doubted:
+            doubted = True
+            _wonder(policy.source, line, outcome.doubted[0])
+        policy.take(fault._replace(line=fault.line + line) for fault in outcome.faults)
+        line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
+    if mended:
+        warn(f"{policy.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
+    return policy.finish(rows)
+
+
+def _wonder(source: str, line: int, doubted: tuple[int, str]) -> None:
+    remedy = "degrees? give --deg, or name the columns _deg"
+    warn(f"{source}:{line + doubted[0]}: {doubted[1]} is more than a full turn in radians; {remedy}")
+
+
+def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:
+    """Process blocks in order, over several processes if asked for."""
+    return map(process, blocks) if jobs < 2 else _spread(process, blocks, jobs)
+
+
+def _spread(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:
+    """Hand blocks to forked processes, and give what becomes of them in order."""
+    from collections import deque
+    from multiprocessing import get_context
+
+    global _process  # noqa: PLW0603 - what the processes inherit: closures cannot be sent
+    _process = process
+    waiting: deque[object] = deque()
+    with get_context("fork").Pool(jobs, initializer=_ignore_interrupt) as pool:
+        for block in blocks:
+            waiting.append(pool.apply_async(_call, (block,)))
+            if len(waiting) >= MOST_WAITING * jobs:
+                yield waiting.popleft().get()  # type: ignore[attr-defined]
+        while waiting:
+            yield waiting.popleft().get()  # type: ignore[attr-defined]
+
+
+_process: Callable[[bytes], Outcome]
+
+
+def _call(block: bytes) -> Outcome:
+    return _process(block)
+
+
+def _ignore_interrupt() -> None:
+    """Leave Ctrl-C to the parent, which ends its processes."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,75 @@
+"""One record at a time with plain floats: for the few records of a typed line or of another command, without numpy."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from frametool.errors import ValueInvalid
+from frametool.geometry import floats, rigid
+from frametool.stream.pieces import Const, In, Out
+from frametool.stream.shape import IDENTITY, POSE, pose_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.kinds import Components, Rigid
+    from frametool.stream.learned import Entry, Learned
+    from frametool.stream.request import Request
+
+
+def result_of(record: Learned, request: Request) -> str:
+    """Give the text of a record's result; raises ValueInvalid for what is no rotation, or too large."""
+    numbers: list[float] = []
+    locked = False
+    first = 0
+    for entry in record.entries:
+        count = len(entry.holder.values)
+        parts = _moved(entry, record.values[first : first + count], request)
+        pose = parts[:7] if len(parts) > 3 else parts
+        numbers += [*entry.target.numbers(pose, floats), *parts[7:]]
+        locked = locked or bool(entry.target.locked(pose))
+        first += count
+    if not all(map(isfinite, numbers)):
+        raise ValueInvalid("the result is not finite: the numbers are too large")
+    write = number_writer(request.precision, yaml=not record.json)
+    return _text(record, [write(number) for number in numbers], locked=locked)
+
+
+def _moved(entry: Entry, values: Sequence[float], request: Request) -> Components:
+    shape = entry.holder.shape
+    if shape.kind != POSE:
+        return request.operation.point(shape.kind, shape.position(values), entry.edge)
+    rotation: Components = IDENTITY
+    if shape.notation is not None:
+        given = shape.rotation(values)
+        rotation = shape.notation.checked_quaternion(given, floats, degrees=shape.degrees, normalize=request.normalize)
+    pose: Rigid = pose_of(shape.position(values), rotation)
+    return request.operation.pose([rigid.inverse(*pose) if shape.inverse else pose], entry.edge, floats)
+
+
+def number_writer(precision: int | None, *, yaml: bool) -> Callable[[float], str]:
+    """Give what writes a number as the bulk of a stream does."""
+    if precision is not None:
+        return lambda value: f"{value:.{precision}f}"
+    if not yaml:
+        return repr
+
+    def write(value: float) -> str:
+        text = repr(value)
+        return text if "e" not in text or "." in text else text.replace("e", ".0e")
+
+    return write
+
+
+def _text(record: Learned, numbers: Sequence[str], *, locked: bool) -> str:
+    segments = record.segments()
+    text = ""
+    for piece in record.pieces:
+        if isinstance(piece, In):
+            text += segments[piece.part]
+        elif isinstance(piece, Out):
+            text += numbers[piece.first]
+        elif isinstance(piece, Const) or locked:
+            text += piece.text.decode()
+    return text

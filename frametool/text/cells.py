@@ -1,0 +1,208 @@
+"""Find the cells of a block of lines: where each begins and ends, without touching their text.
+
+Two families: cells between delimiters (CSV, TSV; quoted as RFC 4180 says) and cells between blanks (TUM and the like).
+Knows nothing of what a cell holds.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.text.spans import MARGIN, Spans, framed
+
+if TYPE_CHECKING:
+    from frametool.text.arrays import Bytes, Flags, Ints
+
+_NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
+_NEWLINE, _RETURN, _QUOTE, _BLANK, _TAB = b'\n\r" \t'
+
+
+class Cells(NamedTuple):
+    """The lines of a block and the cells of those that have the wanted number of them.
+
+    data: the block between margins (see spans.py); all places count in it
+    line_starts, line_ends: (lines,), a line's first byte and the one behind its line end
+    counts: (lines,), cells in each line; 0 for an empty line or a comment
+    rows: (n,), the lines with the wanted number of cells, and starts, ends: (n, columns), theirs
+    """
+
+    data: Bytes
+    line_starts: Ints
+    line_ends: Ints
+    counts: Ints
+    rows: Ints
+    starts: Ints
+    ends: Ints
+
+    def column(self, index: int) -> Spans:
+        """Give the spans of one column."""
+        return Spans(self.data, self.starts[:, index], self.ends[:, index])
+
+    def odd_lines(self) -> Ints:
+        """Give the lines with another number of cells, empty ones and comments among them."""
+        return np.delete(np.arange(len(self.counts)), self.rows)
+
+    def line(self, index: int) -> bytes:
+        """Give the bytes of one line with its end."""
+        return self.data[self.line_starts[index] : self.line_ends[index]].tobytes()
+
+    def lines_before(self, index: int) -> int:
+        """Count the line ends in the block before a line: more than its index if cells hold line ends."""
+        return int(np.count_nonzero(self.data[MARGIN : self.line_starts[index]] == _NEWLINE))
+
+
+class _Found(NamedTuple):
+    """All cells of a block in order, and for each line the number of cells found up to its end."""
+
+    starts: Ints
+    ends: Ints
+    stops: Ints
+    line_ends: Ints
+
+
+def split_delimited(block: bytes, delimiter: bytes, columns: int, *, comment: bytes = b"") -> Cells:
+    """Find cells between delimiters; quotes belong to the cell's span, and hide delimiters and line ends.
+
+    block: whole lines; the last line end may be missing.
+    A line that begins with `comment`, if given, has no cells.
+    """
+    data, end = _closed(block)
+    hidden = _inside_quotes(data, end, delimiter) if b'"' in block else _NOTHING_HIDDEN
+    found = _quoted_cells(block, data, delimiter) if hidden is None else _plain_cells(data, end, delimiter, hidden)
+    if b"\r" in block:
+        last = found.stops - 1
+        found.ends[last] -= (data[found.ends[last] - 1] == _RETURN) & (found.ends[last] > found.starts[last])
+    return _select(data, min(end, MARGIN + len(block)), found, columns, comment)
+
+
+def split_blank(block: bytes, columns: int, *, comment: bytes = b"#") -> Cells:
+    """Find cells between runs of blanks and tabs, as `split_delimited` does for delimiters."""
+    data, end = _closed(block)
+    text = data[MARGIN - 1 : end]
+    gap = (text == _BLANK) | (text == _TAB) | (text == _RETURN) | (text == _NEWLINE)
+    gap[0] = True
+    edges = np.flatnonzero(gap[1:] != gap[:-1]) + MARGIN
+    newlines = np.flatnonzero(text == _NEWLINE) + MARGIN - 1
+    starts = edges[::2]
+    found = _Found(starts, edges[1::2], np.searchsorted(starts, newlines), newlines + 1)
+    return _select(data, min(end, MARGIN + len(block)), found, columns, comment)
+
+
+def whole_records(text: bytes, delimiter: bytes = b",") -> int:
+    """Give how many bytes of the text are whole lines, the last of which ends outside quotes."""
+    end = text.rfind(b"\n") + 1
+    if _ends_outside_quotes(text[:end], delimiter):
+        return end
+    before_last_quote = text.rfind(b"\n", 0, text.rfind(b'"', 0, end)) + 1
+    if before_last_quote and _ends_outside_quotes(text[:before_last_quote], delimiter):
+        return before_last_quote
+    record_ends = [cell.end() for cell in _cell_pattern(delimiter).finditer(text) if cell[1] == b"\n"]
+    return max(record_ends, default=0)
+
+
+def _ends_outside_quotes(lines: bytes, delimiter: bytes) -> bool:
+    """Tell whether whole lines certainly end outside quotes."""
+    return b'"' not in lines or _inside_quotes(framed(lines), MARGIN + len(lines), delimiter) is not None
+
+
+def without_quotes(cells: Spans) -> Spans:
+    """Give the spans without the quotes around those that have them; for text that holds no quote itself."""
+    first, last = cells.data[cells.starts], cells.data[cells.ends - 1]
+    quoted = (first == _QUOTE) & (last == _QUOTE) & (cells.ends - cells.starts > 1)
+    return Spans(cells.data, cells.starts + quoted, cells.ends - quoted)
+
+
+def _closed(block: bytes) -> tuple[Bytes, int]:
+    """Give the block between margins, with a line end if it has none, and where that ends."""
+    data = framed(block)
+    end = MARGIN + len(block)
+    if not block or block.endswith(b"\n"):
+        return data, end
+    data[end] = _NEWLINE
+    return data, end + 1
+
+
+def _plain_cells(data: Bytes, end: int, delimiter: bytes, hidden: Flags) -> _Found:
+    """Find cells where every delimiter and line end counts, but those that are hidden."""
+    text = data[MARGIN:end]
+    is_mark = (text == delimiter[0]) | (text == _NEWLINE)
+    if hidden.size:
+        is_mark &= ~hidden
+    marks = np.flatnonzero(is_mark)
+    marks += MARGIN
+    stops = np.flatnonzero(data.take(marks) == _NEWLINE) + 1
+    starts = np.empty_like(marks)
+    starts[:1] = MARGIN
+    starts[1:] = marks[:-1] + 1
+    return _Found(starts, marks, stops, marks[stops - 1] + 1)
+
+
+def _inside_quotes(data: Bytes, end: int, delimiter: bytes) -> Flags | None:
+    """Tell which bytes stand inside quotes; nothing if some quote neither opens, closes nor doubles another."""
+    quotes = np.flatnonzero(data[:end] == _QUOTE)
+    opening, closing = quotes[::2], quotes[1::2]
+    before, after = data[opening - 1], data[closing + 1]
+    opens = _is_any(before, (delimiter[0], _NEWLINE, _QUOTE)) | (opening == MARGIN)
+    closes = _is_any(after, (delimiter[0], _NEWLINE, _QUOTE, _RETURN))
+    if len(quotes) % 2 or not opens.all() or not closes.all():
+        return None
+    inside: Flags = np.bitwise_xor.accumulate(data[MARGIN:end] == _QUOTE)
+    return inside
+
+
+def _is_any(text: Bytes, characters: tuple[int, ...]) -> Flags:
+    same: Flags = text == characters[0]
+    for character in characters[1:]:
+        same |= text == character
+    return same
+
+
+def _quoted_cells(block: bytes, data: Bytes, delimiter: bytes) -> _Found:
+    closed = block if block.endswith(b"\n") else block + b"\n"
+    found = [(cell.start(), cell.start(1), cell.end()) for cell in _cell_pattern(delimiter).finditer(closed)]
+    # The last match is the empty one at the end of the text.
+    starts, ends, after = (np.array(found[:-1], np.int64).reshape(-1, 3) + MARGIN).T
+    ends = np.minimum(ends, MARGIN + len(block))
+    stops = np.flatnonzero((data[ends] == _NEWLINE) | (after == MARGIN + len(closed))) + 1
+    return _Found(starts, ends, stops, after[stops - 1])
+
+
+@cache
+def _cell_pattern(delimiter: bytes) -> re.Pattern[bytes]:
+    """Match one cell and, as group 1, what ends it; a quote that is never closed reaches to the end of the text."""
+    mark = re.escape(delimiter)
+    quoted = rb'"(?:[^"]++|"")*+(?:"[^' + mark + rb"\n]*+|\Z)"
+    return re.compile(rb"(?:" + quoted + rb"|[^" + mark + rb"\n]*+)(" + mark + rb"|\n|\Z)")
+
+
+def _select(data: Bytes, end: int, found: _Found, columns: int, comment: bytes) -> Cells:
+    """Pick the cells of those lines that have the wanted number of them."""
+    line_starts = np.concatenate([[MARGIN], found.line_ends[:-1]])[: len(found.line_ends)]
+    line_ends = np.minimum(found.line_ends, end)
+    counts = np.diff(found.stops, prepend=0)
+    if len(found.ends):
+        counts[found.ends[found.stops - 1] <= line_starts] = 0
+    if comment:
+        counts[_begins_with(data, line_starts, comment)] = 0
+    rows = np.flatnonzero(counts == columns)
+    starts, ends = _rows_of(found, rows, columns)
+    return Cells(data, line_starts, line_ends, counts, rows, starts, ends)
+
+
+def _rows_of(found: _Found, rows: Ints, columns: int) -> tuple[Ints, Ints]:
+    if len(rows) * columns == len(found.starts):
+        return found.starts.reshape(-1, columns), found.ends.reshape(-1, columns)
+    places = found.stops[rows][:, None] + np.arange(-columns, 0)
+    return found.starts[places], found.ends[places]
+
+
+def _begins_with(data: Bytes, places: Ints, text: bytes) -> Flags:
+    """Tell at which places the text stands; it is shorter than the margin."""
+    same = np.ones(len(places), np.bool_)
+    for offset, character in enumerate(text):
+        same &= data[places + offset] == character
+    return same

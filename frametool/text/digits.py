@@ -1,0 +1,105 @@
+"""Decimal digits of non-negative integers as eight characters in one 64-bit word, the first in the lowest byte."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frametool.text.powers import TENS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.text.arrays import Ints, Words
+
+
+def _word(byte: int) -> np.uint64:
+    return np.uint64(int.from_bytes(bytes([byte]) * 8, "little"))
+
+
+ZEROS = _word(ord("0"))
+_POINTS, _ONES, _HIGH, _ABOVE_NINE = _word(ord(".")), _word(1), _word(0x80), _word(0x76)
+_EVERY_FOURTH = np.uint64(0x000000FF000000FF)
+_HUNDREDS = np.uint64(100 + (1000000 << 32))
+_ONES_AND_TEN_THOUSANDS = np.uint64(1 + (10000 << 32))
+
+
+def read_eight_digits(digits: Words) -> Words:
+    """Give the numbers that words of eight digit values (characters ^ ZEROS) write.
+
+    Source: three multiplications, Lemire 2018.
+    """
+    pairs = digits * np.uint64(10)
+    pairs += digits >> np.uint64(8)
+    upper = pairs >> np.uint64(16)
+    upper &= _EVERY_FOURTH
+    upper *= _ONES_AND_TEN_THOUSANDS
+    pairs &= _EVERY_FOURTH
+    pairs *= _HUNDREDS
+    pairs += upper
+    pairs >>= np.uint64(32)
+    return pairs
+
+
+def not_digits(digits: Words) -> Words:
+    """Give words that are zero where all eight digit values are 0 to 9."""
+    beyond = digits + _ABOVE_NINE
+    beyond |= digits
+    beyond &= _HIGH
+    return beyond
+
+
+def first_point(characters: Words) -> Ints:
+    """Give the place, 0 to 7, of the first point in words of eight characters; 8 if there is none."""
+    others = characters ^ _POINTS
+    found = others - _ONES
+    found &= ~others
+    found &= _HIGH
+    # The bits below the lowest one set: eight for each byte before it, and seven; all 64 if none is set.
+    below = ~found & (found - np.uint64(1))
+    places: Ints = (np.bitwise_count(below) >> 3).astype(np.int64)
+    return places
+
+
+@cache
+def _four_digits() -> tuple[Words, Words]:
+    """Tabulate the characters 0000 .. 9999, once in the lower and once in the upper half of a word."""
+    characters = b"".join(b"%04d" % number for number in range(10000))
+    low = np.frombuffer(characters, "<u4").astype(np.uint64)
+    return low, low << np.uint64(32)
+
+
+def eight_digits(numbers: Ints) -> Words:
+    """Give the characters of integers in 0 .. 99999999, with leading zeros."""
+    low, high = _four_digits()
+    narrow = numbers.astype(np.uint32)
+    upper = narrow // np.uint32(10000)
+    narrow -= upper * np.uint32(10000)
+    words = low.take(upper)
+    words |= high.take(narrow)
+    return words
+
+
+def count_digits(numbers: Ints) -> Ints:
+    """Count the decimal digits of integers from 0 to below 10**18; 0 has one."""
+    count = np.ones(numbers.shape, np.int64)
+    for power in TENS[1 : len(str(int(numbers.max(initial=0))))]:
+        count += numbers >= power
+    return count
+
+
+def significant_digits(words: Sequence[Words]) -> Ints:
+    """Count the digits of numbers in words of characters up to their last one that is not 0.
+
+    A word's highest byte that is not 0 is found in the exponent of the word as a float: digits are below 16, so that
+    rounding never reaches the next byte. The float 0 has the exponent -1023, which no other word is below.
+    """
+    last = np.full(words[0].shape, -1, np.int64)
+    for index, word in enumerate(words):
+        exponents = (word ^ ZEROS).view(np.int64).astype(np.float64).view(np.int64) >> 52
+        exponents -= 1023 - 64 * index
+        exponents >>= 3
+        np.maximum(last, exponents, out=last)
+    return last + 1

@@ -1,0 +1,93 @@
+"""Read a stream in blocks of whole lines: a typed line at once, a full pipe in large pieces.
+
+Knows nothing of numpy, so that a tool which sees only a few lines stays light.
+"""
+
+from __future__ import annotations
+
+from time import monotonic
+
+from frametool.errors import FormatError
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import Protocol
+
+    class Source(Protocol):
+        """A binary stream that gives what has arrived."""
+
+        def read1(self, size: int, /) -> bytes:
+            """Give at most `size` bytes, waiting only while there are none; nothing at the end."""
+
+
+BLOCK_BYTES = 1 << 19
+LONGEST_LINE = 1 << 26
+# A piece this large was not typed: more is on its way, and waiting a moment for it saves much work per block. But
+# nothing that has arrived is kept back for longer than the second number.
+_BULK_BYTES = 1 << 14
+_PATIENCE_MS = 5
+_LONGEST_WAIT_S = 0.02
+
+
+def whole_lines(text: bytes) -> int:
+    """Give how many bytes of the text are whole lines."""
+    return text.rfind(b"\n") + 1
+
+
+def read_blocks(
+    stream: Source,
+    *,
+    size: int = BLOCK_BYTES,
+    longest: int = LONGEST_LINE,
+    whole: Callable[[bytes], int] = whole_lines,
+) -> Iterator[bytes]:
+    """Yield blocks of whole lines, in order; only the very last may lack its line end.
+
+    size: bytes a block has when the stream delivers as fast as they are taken.
+    whole: how many bytes of a text are finished records; for records of several lines.
+    Raises FormatError if one record is longer than `longest`.
+    """
+    ready = _readiness(stream)
+    pieces: list[bytes] = []
+    while piece := _read_piece(stream, size, ready):
+        pieces.append(piece)
+        if b"\n" in piece:
+            text = b"".join(pieces)
+            end = whole(text)
+            pieces = [text[end:]]
+            if end:
+                yield text[:end]
+        if sum(map(len, pieces)) > longest:
+            raise FormatError(f"a line is longer than {longest} bytes: this is no text in lines")
+    if rest := b"".join(pieces):
+        yield rest
+
+
+def _read_piece(stream: Source, size: int, ready: Callable[[int], bool]) -> bytes:
+    """Read what has arrived, and what arrives right after it if that is much."""
+    piece = stream.read1(size)
+    if not piece or len(piece) >= size:
+        return piece
+    pieces = [piece]
+    missing = size - len(piece)
+    until = monotonic() + _LONGEST_WAIT_S
+    while missing > 0 and monotonic() < until and ready(_PATIENCE_MS if len(piece) >= _BULK_BYTES else 0):
+        piece = stream.read1(missing)
+        if not piece:
+            break
+        pieces.append(piece)
+        missing -= len(piece)
+    return b"".join(pieces)
+
+
+def _readiness(stream: Source) -> Callable[[int], bool]:
+    """Give a function that tells whether the stream has more within so many milliseconds; never, if it cannot tell."""
+    import select
+
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), select.POLLIN)  # type: ignore[attr-defined]
+    except (AttributeError, OSError, ValueError):
+        return lambda _patience: False
+    return lambda patience: bool(poll.poll(patience))

@@ -1,0 +1,213 @@
+"""Text to floats in bulk, every one rounded as Python's `float` rounds it.
+
+The common cell, a sign, up to eight digits, a point and up to 24 digits, is read in words of eight characters; blanks
+around it and an exponent cost a second look. Where the result is too near to the middle of two floats, where the cell
+is longer, or is no number, Python's own reader decides. Source of the exact division: Clinger 1990.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
+from frametool.text.powers import LEAST_POWER, halves, power_of_ten, powers_of_ten, product_error
+from frametool.text.spans import Spans, windows
+
+if TYPE_CHECKING:
+    from frametool.text.arrays import Bytes, Flags, Floats, Ints, Words
+
+_NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[ \t]*")
+_MOST_WORDS = 3
+_EXACT = 1 << 53
+# Results are good to 2**-100; what the rounding dropped may be off by this share of itself and still be decided.
+_DOUBT = 1.0 + 2.0**-30
+# With these exponents neither a product nor its error leaves the range of normal floats.
+_GREATEST_EXPONENT = 240
+_MINUS, _PLUS, _SMALL_E = b"-+e"
+_LOWER_CASE = 0x20
+# The lowest 0 .. 8 bytes of a word.
+_LOWEST = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
+
+
+class _Mantissa(NamedTuple):
+    """Integers `whole * 10**(8 * words - 8) + tail` of cells read as so many words after the point."""
+
+    whole: Ints
+    tail: Ints
+    words: int
+
+
+def parse_floats(cells: Spans) -> tuple[Floats, Ints]:
+    """Read cells as floats.
+
+    Accepted are plain decimal numbers, `[+-] digits [. digits] [e [+-] digits]`, with blanks or tabs around them;
+    neither nan, inf, hexadecimals, underscores nor what is beyond the range of floats.
+    Returns the values, in the cells' shape, and the places of the bad ones in order, counted in the flattened
+    cells; a bad one's value is nan.
+    """
+    starts, ends = cells.starts.ravel(), cells.ends.ravel()
+    # Where the first cell begins with a blank, all but a few do.
+    if starts.size and _is_blank(cells.data[starts[:1]])[0]:
+        starts, ends = _trimmed(cells.data, starts, ends)
+    values, sure = _parse_plain(cells.data, starts, ends)
+    rest = np.flatnonzero(~sure)
+    if rest.size:
+        # What overflows is undecided, and read singly.
+        with np.errstate(over="ignore", invalid="ignore"):
+            values[rest], sure = _parse_decorated(cells.data, starts[rest], ends[rest])
+        rest = rest[~sure]
+    single = [_parse_single(cells.data[starts[place] : ends[place]].tobytes()) for place in rest.tolist()]
+    values[rest] = single
+    return values.reshape(cells.starts.shape), rest[np.isnan(single)]
+
+
+def _parse_single(text: bytes) -> float:
+    """Read one cell with Python's own reader; nan if it is not a plain finite number."""
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    return value if math.isfinite(value) else math.nan
+
+
+def _parse_plain(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
+    """Read cells without blanks and exponents; give the values and which of them are decided."""
+    begins, negative = _after_sign(data, starts)
+    mantissa, sure = _read_mantissa(data, begins, ends)
+    if mantissa.words == 1:
+        sure &= mantissa.whole < _EXACT
+        values = mantissa.whole / 1e8
+    else:
+        power, rest = power_of_ten(-8 * mantissa.words)
+        values = _scale(mantissa, np.array(power), np.array(rest), sure)
+    values *= 1.0 - 2.0 * negative
+    return values, sure
+
+
+def _parse_decorated(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
+    """Read cells with blanks around them or with exponents, as `_parse_plain` does."""
+    starts, ends = _trimmed(data, starts, ends)
+    begins, negative = _after_sign(data, starts)
+    ends, exponents, sure = _split_exponent(data, begins, ends)
+    mantissa, is_number = _read_mantissa(data, begins, ends)
+    sure &= is_number
+    places = exponents - 8 * mantissa.words - LEAST_POWER
+    powers, rests = powers_of_ten()
+    values = _scale(mantissa, powers.take(places, mode="clip"), rests.take(places, mode="clip"), sure)
+    values *= 1.0 - 2.0 * negative
+    return values, sure
+
+
+def _after_sign(data: Bytes, starts: Ints) -> tuple[Ints, Flags]:
+    first = data.take(starts)
+    negative = first == _MINUS
+    return starts + (negative | (first == _PLUS)), negative
+
+
+def _trimmed(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints]:
+    """Leave out the blanks and tabs around cells."""
+    while (blank := _is_blank(data.take(starts)) & (starts < ends)).any():
+        starts = starts + blank
+    while (blank := _is_blank(data.take(ends - 1)) & (starts < ends)).any():
+        ends = ends - blank
+    return starts, ends
+
+
+def _is_blank(characters: Bytes) -> Flags:
+    blank: Flags = (characters == ord(" ")) | (characters == ord("\t"))
+    return blank
+
+
+def _split_exponent(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, Flags]:
+    """Find an `e` followed by up to four characters, and read these.
+
+    Returns the ends of what stands before it, the exponents (0 without an e) and which of them are numbers in range.
+    """
+    stops = ends
+    for behind in (2, 3, 4, 5):
+        places = ends - behind
+        stops = np.where((data.take(places) | _LOWER_CASE == _SMALL_E) & (places > starts), places, stops)
+    begins, negative = _after_sign(data, np.minimum(stops + 1, ends))
+    length = np.where(stops < ends, ends - begins, 0)
+    digits = windows(data, 8)[begins].view("<u8") ^ ZEROS
+    digits <<= (8 * (8 - length)).astype(np.uint64)
+    numbers = read_eight_digits(digits).astype(np.int64)
+    sure = (not_digits(digits) == 0) & (numbers <= _GREATEST_EXPONENT) & ((length > 0) | (stops == ends))
+    return stops, np.where(negative, -numbers, numbers), sure
+
+
+def _read_mantissa(data: Bytes, starts: Ints, ends: Ints) -> tuple[_Mantissa, Flags]:
+    """Read unsigned decimals as integers of whole words, and tell which of them are sure."""
+    characters = windows(data, 8)[starts].view("<u8")
+    length = ends - starts
+    before = np.minimum(first_point(characters), length)
+    characters ^= ZEROS
+    characters <<= ((8 - before) << 3).astype(np.uint64)
+    after = length - before - 1
+    most = int(after.max(initial=0))
+    words = min(max(-(-most // 8), 1), _MOST_WORDS)
+    fraction = _fraction_digits(data, ends - after, after, words)
+    wrong = not_digits(characters)
+    for word in fraction:
+        wrong |= not_digits(word)
+    sure = (wrong == 0) & (length > (after >= 0)) & ((before < 8) | (length <= 8))
+    if most > 8 * words:
+        sure &= after <= 8 * words
+    whole = read_eight_digits(characters) * np.uint64(10**8) + read_eight_digits(fraction[0])
+    return _Mantissa(whole.view(np.int64), _tail(fraction[1:]), words), sure
+
+
+def _fraction_digits(data: Bytes, starts: Ints, length: Ints, words: int) -> list[Words]:
+    """Take so many words of digit values; those beyond the cell's end are 0."""
+    characters = windows(data, 8 * words)[starts].view("<u8").reshape(-1, words)
+    digits = []
+    for word in range(words):
+        kept = _LOWEST.take(length - 8 * word, mode="clip")
+        kept &= characters[:, word] ^ ZEROS
+        digits.append(kept)
+    return digits
+
+
+def _tail(words: list[Words]) -> Ints:
+    """Give the integer that the words after the first fraction word write, below 10**16."""
+    total = np.zeros(1, np.uint64)
+    for word in words:
+        total = total * np.uint64(10**8) + read_eight_digits(word)
+    return total.view(np.int64)
+
+
+def _scale(mantissa: _Mantissa, power: Floats, rest: Floats, sure: Flags) -> Floats:
+    """Multiply by a power of ten, itself a sum of two floats; clear `sure` where the last bit is in doubt."""
+    high, low = _as_two_floats(mantissa)
+    product = high * power
+    error = product_error(halves(high), halves(power), product)
+    error += high * rest
+    error += low * power
+    values: Floats = product + error
+    dropped = error - (values - product)
+    dropped *= _DOUBT
+    dropped += values
+    sure &= dropped == values
+    return values
+
+
+def _as_two_floats(mantissa: _Mantissa) -> tuple[Floats, Floats]:
+    """Give the mantissa as the sum of a float and what that lacks."""
+    high, low = _split_integer(mantissa.whole)
+    if mantissa.words == 1:
+        return high, low
+    power: Floats = np.array(10.0 ** (8 * mantissa.words - 8))
+    tail_high, tail_low = _split_integer(mantissa.tail)
+    product = high * power
+    error = product_error(halves(high), halves(power), product)
+    error += low * power
+    total = product + tail_high
+    error += (product - total) + tail_high
+    error += tail_low
+    return total, error
+
+
+def _split_integer(numbers: Ints) -> tuple[Floats, Floats]:
+    high = numbers.astype(np.float64)
+    return high, (numbers - high.astype(np.int64)).astype(np.float64)

@@ -1,0 +1,140 @@
+"""Floats to the shortest text that reads back to the same bits, in bulk, byte for byte as `repr` writes them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.text.decimals import Decimals, shortest_decimals
+from frametool.text.digits import count_digits, significant_digits
+from frametool.text.fields import GREATEST_WHOLE, POINT, Fields, replaced, with_separators
+from frametool.text.powers import TENS
+from frametool.text.spans import Spans, join
+
+if TYPE_CHECKING:
+    from frametool.text.arrays import Bytes, Floats, Ints, Words
+
+# repr writes an exponent below the first and from the second on; between GREATEST_WHOLE and there Python does it.
+_LEAST_PLAIN = 1e-4
+_LEAST_POWER = 1e16
+_MOST_DIGITS = 17
+_MOST_EXPONENT = 330
+
+
+class _Parts(NamedTuple):
+    """A number's whole part, its fraction as 17 digits, and the zeros before these."""
+
+    whole: Ints
+    fraction: Ints
+    zeros: Ints
+
+
+def format_shortest(values: Floats, separators: bytes) -> bytes:
+    """Write rows of floats as text.
+
+    values: (n, c); separators: c bytes, the one that follows each column.
+    Nan and infinity become `nan` and `inf`, as in `repr`.
+    """
+    return join([shortest_spans(values, separators)])
+
+
+def shortest_spans(values: Floats, separators: bytes) -> Spans:
+    """Write floats as `format_shortest` does, but give them as spans (n, c), each with its separator."""
+    rows, columns = values.shape
+    if len(separators) != columns:
+        raise ValueError(f"{columns} columns, but {len(separators)} separators")
+    flat = np.ascontiguousarray(values, np.float64).ravel()
+    with np.errstate(over="ignore", invalid="ignore"):
+        spans = _all_spans(flat)
+    return with_separators(spans, separators, rows)
+
+
+def _all_spans(flat: Floats) -> Spans:
+    size = np.abs(flat)
+    decimals = shortest_decimals(size)
+    powered, single = _unusual(size, decimals.unsure)
+    parts = _plain_parts(size, decimals)
+    exponents = _power_parts(parts, decimals, powered)
+    for part in parts:
+        part[single] = 0
+    fields = Fields(len(flat))
+    starts, ends = _write(fields, parts)
+    starts = fields.write_sign(starts, np.signbit(flat))
+    _write_exponents(fields, ends, powered, exponents)
+    return replaced(Spans(fields.data, starts, ends), single, [repr(value) for value in flat[single].tolist()])
+
+
+def _unusual(size: Floats, unsure: Ints) -> tuple[Ints, Ints]:
+    """Give the places written with an exponent, and those left to Python."""
+    single = unsure[size[unsure] != 0]
+    inner = size[size != 0] if not size.all() else size
+    if inner.min(initial=1) >= _LEAST_PLAIN and inner.max(initial=1) < GREATEST_WHOLE:
+        return np.empty(0, np.int64), single
+    powered = ((size < _LEAST_PLAIN) & (size > 0)) | (size >= _LEAST_POWER)
+    by_python = (size >= GREATEST_WHOLE) & ~powered
+    powered[single] = False
+    by_python[single] = True
+    return np.flatnonzero(powered), np.flatnonzero(by_python)
+
+
+def _plain_parts(size: Floats, decimals: Decimals) -> _Parts:
+    """Cut numbers at the point. A whole part is never rounded up: an integer in reach would be the float itself."""
+    whole = size.astype(np.int64)
+    digits, places = decimals.digits, decimals.places
+    fraction = digits - whole * TENS.take(places, mode="clip")
+    fraction *= TENS.take(_MOST_DIGITS - places, mode="clip")
+    zeros = np.maximum(places - _MOST_DIGITS, 0)
+    return _Parts(whole, fraction, zeros)
+
+
+def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
+    """Rewrite those with an exponent to one digit before the point; give their exponents."""
+    digits, places = decimals.digits[powered], decimals.places[powered]
+    behind = count_digits(digits) - 1
+    scale = TENS.take(behind)
+    whole = digits // scale
+    parts.whole[powered] = whole
+    parts.fraction[powered] = (digits - whole * scale) * TENS.take(_MOST_DIGITS - behind)
+    parts.zeros[powered] = 0
+    return behind - places
+
+
+def _write(fields: Fields, parts: _Parts) -> tuple[Ints, Ints]:
+    """Write all parts; give where each number starts, without its sign, and ends."""
+    fields.write_whole(parts.whole)
+    shown = significant_digits(fields.write_fraction(parts.fraction, _MOST_DIGITS))
+    starts = fields.whole_starts(parts.whole)
+    ends = fields.origins + (POINT + 1) + np.maximum(shown, 1)
+    small = np.flatnonzero(parts.zeros)
+    fields.words[small, 1] = _small_prefixes().take(parts.zeros[small])
+    starts[small] -= parts.zeros[small]
+    return starts, ends
+
+
+def _write_exponents(fields: Fields, ends: Ints, powered: Ints, exponents: Ints) -> None:
+    """Put the exponents behind their numbers; over the point and the 0 behind it, if nothing else follows the point."""
+    rows, lengths = _exponent_texts()
+    begins = ends[powered]
+    is_whole = (begins == fields.origins[powered] + POINT + 2) & (fields.data[begins - 1] == ord("0"))
+    begins -= 2 * is_whole
+    texts = rows[exponents + _MOST_EXPONENT]
+    for offset in range(texts.shape[1]):
+        fields.data[begins + offset] = texts[:, offset]
+    ends[powered] = begins + lengths[exponents + _MOST_EXPONENT]
+
+
+@cache
+def _small_prefixes() -> Words:
+    """Tabulate the word before the first digit that counts: `0.`, `0.0`, `0.00`, .."""
+    texts = [("0." + "0" * zeros).rjust(8) for zeros in range(6)]
+    return np.frombuffer("".join(texts).encode(), "<u8")
+
+
+@cache
+def _exponent_texts() -> tuple[Bytes, Ints]:
+    """Tabulate `e-330` .. `e+330` as rows of five bytes, with their lengths."""
+    texts = [f"e{exponent:+03d}" for exponent in range(-_MOST_EXPONENT, _MOST_EXPONENT + 1)]
+    rows = np.frombuffer("".join(text.ljust(5) for text in texts).encode(), np.uint8).reshape(-1, 5)
+    return rows, np.array([len(text) for text in texts])

@@ -1,0 +1,123 @@
+"""Streams as a shell runs them: pipes, files, signals, latency by order of events and not by the clock."""
+
+from __future__ import annotations
+
+import os
+import signal
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
+MOVE = ["apply", "--transform", "{xyz: [1, 2, 3]}"]
+ROWS = b"id,x,y,z\n007,1,2,3\n"
+MOVED = b"id,x,y,z\n007,2.0,4.0,6.0\n"
+
+
+def start(*arguments: str, **options: object) -> subprocess.Popen[bytes]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    return subprocess.Popen([*TOOL, *arguments], env=environment, **pipes)  # type: ignore[call-overload, no-any-return]
+
+
+def run(*arguments: str, text: bytes = b"") -> tuple[int, bytes, bytes]:
+    process = start(*arguments)
+    out, err = process.communicate(text)
+    return process.returncode, out, err
+
+
+@pytest.mark.parametrize("line", [b"1,2,3\n", b'{"x": 1, "y": 2, "z": 3}\n'])
+def test_a_typed_line_comes_out_before_the_next_is_typed(line: bytes) -> None:
+    with start(*MOVE) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        if b"{" not in line:
+            process.stdin.write(b"x,y,z\n")
+            process.stdin.flush()
+            assert process.stdout.readline() == b"x,y,z\n"
+        for _ in range(3):
+            process.stdin.write(line)
+            process.stdin.flush()
+            assert b"4.0" in process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 130
+
+
+def test_a_vanished_reader_ends_it_quietly(tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+    source.write_bytes(ROWS + b"1,1,2,3\n" * 300_000)
+    with start(*MOVE, "-i", str(source), stdin=subprocess.DEVNULL) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"id,x,y,z\n"
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == b""
+        assert process.wait() in (-signal.SIGPIPE, 141)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full disk at hand")
+def test_a_full_disk_is_told() -> None:
+    with Path("/dev/full").open("wb") as full:
+        process = start(*MOVE, stdout=full)
+        _, err = process.communicate(ROWS)
+    assert (process.returncode, err) == (5, b"frametool: standard output: no space left on device\n")
+
+
+def test_files_are_whole_or_not_there(tmp_path: Path) -> None:
+    source, target = tmp_path / "in.csv", tmp_path / "out.csv"
+    source.write_bytes(ROWS + b"x,?,0,0\n")
+    arguments = [*MOVE, "-i", str(source), "-o", str(target)]
+    assert run(*arguments)[0] == 1
+    assert not target.exists()
+    assert run(*arguments, "--on-error", "skip")[0] == 3
+    assert target.read_bytes() == MOVED
+    assert run(*arguments, "--on-error", "skip")[0] == 5
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in.csv", "out.csv"]
+
+
+def test_what_is_no_plain_file_is_written_to_and_not_replaced(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with subprocess.Popen(["cat", str(pipe)], stdout=subprocess.PIPE) as reader:
+        assert run(*MOVE, "-o", str(pipe), text=ROWS)[0] == 0
+        assert reader.communicate()[0] == MOVED
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+def test_a_form_is_told_only_when_it_was_found_out() -> None:
+    assert b"read as csv" in run(*MOVE, "-v", text=ROWS)[2]
+    assert run(*MOVE, "-v", "--in", "csv", text=ROWS) == (0, MOVED, b"")
+
+
+def test_a_few_records_need_no_numpy() -> None:
+    code = "import sys; from frametool.cli import run; run(['invert', '-']); print('numpy' in sys.modules, file=sys.stderr)"
+    record = b"name: a\nparent: b\nxyz: [1, 2, 3]\n"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], input=record, capture_output=True, check=True, env=environment)
+    assert done.stdout == b"name: b\nparent: a\nxyz: [-1.0, -2.0, -3.0]\n"
+    assert done.stderr == b"False\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text", "status", "message"),
+    [
+        ([*MOVE], b"", 1, b"frametool: stdin: nothing in it"),
+        ([*MOVE], b"hello\n", 1, b"frametool: stdin:1: cannot tell the form of 'hello'"),
+        ([*MOVE, "--columns", "a,b,c"], b"x,y,z\n1,2,3\n", 1, b"frametool: --columns: no column 'a'"),
+        ([*MOVE, "-i", "no.csv"], b"", 5, b"frametool: no.csv: no such file or directory"),
+        ([*MOVE, "-i", "a.csv", "1", "2", "3"], b"", 2, b"frametool: apply: -i FILE and records are two inputs"),
+        (["invert", "--in", "cvs"], b"", 2, b"frametool: invert: invalid value for '--in'"),
+        (["relative", "{xyz: [1, 2, 3]}"], b"", 2, b"frametool: relative: name A and B"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_one_line_with_their_status(
+    arguments: list[str], text: bytes, status: int, message: bytes
+) -> None:
+    code, out, err = run(*arguments, text=text)
+    assert (code, out) == (status, b"")
+    assert err.startswith(message)
+    assert err.count(b"\n") == 1

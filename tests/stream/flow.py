@@ -1,0 +1,48 @@
+"""Streams run in this process: text in, text out, what was told, and the exit status."""
+
+from __future__ import annotations
+
+import io
+from typing import NamedTuple
+
+from frametool.errors import FrametoolError
+from frametool.geometry.representations import notation
+from frametool.stream.detect import RECORDS
+from frametool.stream.documents import run_records
+from frametool.stream.faults import Policy
+from frametool.stream.operation import Operation
+from frametool.stream.request import Request
+from frametool.stream.run import run
+from frametool.stream.tables import run_table
+
+QUARTER = (1.0, 2.0, 3.0, 0.0, 0.0, 0.7071067811865476, 0.7071067811865476)
+MOVE = Request(Operation(left=QUARTER, moves=True), way=lambda _own: QUARTER)
+INVERT = Request(Operation(inverse=True))
+
+
+def convert(specs: str) -> Request:
+    return Request(notations=tuple(notation(spec) for spec in specs.split(",")))
+
+
+class Flow(NamedTuple):
+    text: bytes
+    told: list[str]
+    status: int
+
+
+def flow(
+    text: bytes, request: Request, form: str = "csv", *, header: bool = True, size: int = 0, jobs: int = 1
+) -> Flow:
+    out = io.BytesIO()
+    told: list[str] = []
+    policy = Policy("in", request.on_error, tell=told.append)
+    try:
+        if form in RECORDS:
+            outcomes = run_records(io.BytesIO(text), form, request, source="in", size=size, jobs=jobs)
+        else:
+            outcomes = run_table(io.BytesIO(text), form, request, source="in", header=header, size=size, jobs=jobs)
+        status = run(outcomes, lambda block: [out.write(block)].clear(), policy, lambda _rows, _size: None)
+    except FrametoolError as error:
+        told.append(str(error))
+        status = error.exit_code
+    return Flow(out.getvalue(), told, status)
