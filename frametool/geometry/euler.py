@@ -73,10 +73,14 @@ def from_quaternion(
     the middle angle from its sine, so that small ones keep their digits.
     """
     i, j, k, parity, symmetric, static = AXES[axes]
-    a, b, c, d = _pairs((x, y, z), w, i, j, k, parity, symmetric)
+    vector = x, y, z
+    a, b, c, d = _pairs(vector, w, i, j, k, parity, symmetric)
     squared_sum, squared_difference = a * a + b * b, c * c + d * d
-    middle = _middle((x, y, z), w, i, j, k, parity, symmetric, squared_sum, squared_difference, xp)
     radius = xp.sqrt(squared_sum * squared_difference)
+    if symmetric:
+        middle = 2.0 * xp.incline(xp.sqrt(squared_difference), xp.sqrt(squared_sum))
+    else:
+        middle = xp.incline(2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity), radius)
     if xp.some(xp.minimum(squared_sum, squared_difference) <= LOCK * (squared_sum + squared_difference)):
         a, b, c, d, radius = _without_third(a, b, c, d, squared_sum, squared_difference, radius, static, xp)
     ac, bd, ad, bc = a * c, b * d, a * d, b * c
@@ -103,17 +107,6 @@ def _pairs(
         return w, vi, vj, vk * parity
     signed = vj * parity
     return w + signed, vi + vk, w - signed, vi - vk
-
-
-def _middle(
-    vector: Vector, w: Number, i: int, j: int, k: int, parity: float, symmetric: bool,  # noqa: FBT001
-    squared_sum: Number, squared_difference: Number, xp: Namespace,
-) -> Number:  # fmt: skip
-    """Give the middle angle from the radii of the two pairs; its sine directly where the axes are three."""
-    if symmetric:
-        return 2.0 * xp.incline(xp.sqrt(squared_difference), xp.sqrt(squared_sum))
-    sine = 2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity)
-    return xp.incline(sine, xp.sqrt(squared_sum * squared_difference))
 
 
 def _without_third(
