@@ -145,7 +145,7 @@ def write_whole(path: str, text: str, *, force: bool = False) -> None:
     What is no regular file (a terminal, a pipe, /dev/null) is written to as it is; a link is followed; an old file's
     mode is kept.  Raises FileProblem when it exists and `force` is not given, or cannot be written.
     """
-    path = os.path.realpath(path)
+    name, path = path, os.path.realpath(path)
     temporary = f"{path}.{os.getpid()}.part"
     try:
         if os.path.exists(path) and not os.path.isfile(path):
@@ -154,7 +154,7 @@ def write_whole(path: str, text: str, *, force: bool = False) -> None:
             return
         mode = os.stat(path).st_mode & 0o7777 if os.path.lexists(path) else None
         if mode is not None and not force:
-            _refuse_to_replace(path)
+            _refuse_to_replace(name)
         with open(temporary, "x", encoding="utf-8", newline="") as stream:
             stream.write(text)
         if mode is not None:
@@ -165,7 +165,7 @@ def write_whole(path: str, text: str, *, force: bool = False) -> None:
     except OSError as error:
         if os.path.lexists(temporary):
             os.unlink(temporary)
-        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+        raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
 
 
 def _refuse_to_replace(path: str) -> None:

@@ -97,13 +97,12 @@ def samples_of(recording: Recording, report: Report | None = None) -> Iterator[S
 
 
 def open_messages(path: str) -> Recording | None:
-    """Open what begins with a stamped message, as text or JSON lines; None for anything else, nothing of it read."""
+    """Open what begins with a ROS message, as text or JSON lines; None for anything else, nothing of it read."""
     stream = _opened(path)
     head = stream.peek(HEAD)[:HEAD]  # type: ignore[attr-defined]
     if path != "-":
         stream.close()
-    stamped = b"header" in head and detect(head) in ("echo", "jsonl")
-    return Recording(path) if stamped else None
+    return Recording(path) if detect(head) in ("echo", "jsonl") else None
 
 
 def _raise(error: FormatError) -> None:

@@ -186,7 +186,7 @@ def test_what_tf2_refuses_in_a_recording_is_told_in_its_words_and_the_run_goes_o
     calls = [call for call in golden["calls"] if not call["static"] and call["child"] != "s"]
     logged = "".join(call["stderr"] for call in calls).replace('"auth"', '"default_authority"')
     expected = [line for line in logged.splitlines() if not line.startswith("         at line")]
-    outcome = run("tree", "-", "--tf2", "ros1", "-f", "json", stdin="".join(map(as_message, calls)))
+    outcome = run("tree", "-", "--tf2", "ros1", "-f", "tf2", stdin="".join(map(as_message, calls)))
     assert outcome.status == 0
     assert outcome.err.replace("authority default_authority", "authority auth").splitlines() == expected
 
