@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
-SMALL = 1 << 14  # bytes: a few records, which a person reads as text
-PATIENCE_MS = 50
 NAMES = (
     "input_path",
     "input_form",
@@ -110,8 +108,7 @@ class Stream:
                 click.echo(f"frametool: {name}: read as {form} ({STREAMS[form]}), known by {known_by}", err=True)
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
-            shown = output.style.form == "text" and _is_small(stream)
-            if form in RECORDS and (shown or (output.told or form) != form):
+            if form in RECORDS and (output.told or form) != form:
                 return Source(name, decode(stream.read(), name))
             if form not in RECORDS and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
                 raise click.UsageError(
@@ -168,22 +165,6 @@ class Stream:
         from frametool.stream.tables import run_table
 
         return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
-
-
-def _is_small(stream: BufferedReader) -> bool:
-    """Tell whether what is left is known to be little: a small file, or a pipe whose writer is done."""
-    import select
-    from stat import S_ISREG
-
-    try:
-        status = os.fstat(stream.fileno())
-        if S_ISREG(status.st_mode):
-            return status.st_size < SMALL
-        poll = select.poll()
-        poll.register(stream.fileno(), select.POLLHUP)
-        return bool(poll.poll(PATIENCE_MS))
-    except OSError:
-        return True
 
 
 def _table_form(output: Output) -> str:
