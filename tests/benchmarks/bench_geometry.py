@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     Case = tuple[str, float, Callable[[], Any], Callable[[], Any]]
 
-ROUNDS = 5
+ROUNDS = 7
 
 
 def inputs(rows: int) -> dict[str, Any]:
@@ -171,11 +171,19 @@ def scalar_cases() -> dict[str, Callable[[], Any]]:
     return cases
 
 
+def processor() -> str:
+    """Name the processor where Linux does."""
+    listed = Path("/proc/cpuinfo")
+    lines = listed.read_text().splitlines() if listed.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{models[0]} ({len(models)} cores)" if models else platform.machine()
+
+
 def main() -> None:
     """Print the tables."""
     rows = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     versions = f"Python {platform.python_version()}, numpy {np.__version__}, SciPy {scipy.__version__}"
-    print(f"{rows} rows; {platform.machine()}, {versions}\n")
+    print(f"{rows} rows; {processor()}, {versions}\n")
     data = inputs(rows)
     print("| operation | frametool, ns a row | SciPy | ratio | goal |\n|---|---|---|---|---|")
     for case in [*rotation_cases(data), *rigid_cases(data)]:
