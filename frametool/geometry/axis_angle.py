@@ -36,7 +36,12 @@ def from_quaternion(
 
 
 def check(
-    ax: float, ay: float, az: float, angle: float, *, normalize: bool = False  # noqa: ARG001 - any length is an axis
+    ax: float,
+    ay: float,
+    az: float,
+    angle: float,
+    *,
+    normalize: bool = False,  # noqa: ARG001 - any length is an axis
 ) -> tuple[float, float, float, float]:
     """Check one axis and angle at the door.
 

@@ -99,7 +99,13 @@ def locked(x: Number, y: Number, z: Number, w: Number, axes: str) -> Number:
 
 
 def _pairs(
-    vector: Vector, w: Number, i: int, j: int, k: int, parity: float, symmetric: bool  # noqa: FBT001
+    vector: Vector,
+    w: Number,
+    i: int,
+    j: int,
+    k: int,
+    parity: float,
+    symmetric: bool,  # noqa: FBT001
 ) -> Quaternion:
     """Give a, b, c, d: (a, b) points along half the sum of the outer angles, (c, d) along half their difference."""
     vi, vj, vk = vector[i], vector[j], vector[k]

@@ -25,7 +25,11 @@ def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -
 
 
 def check(
-    px: float, py: float, pz: float, *, normalize: bool = False  # noqa: ARG001 - every length is one
+    px: float,
+    py: float,
+    pz: float,
+    *,
+    normalize: bool = False,  # noqa: ARG001 - every length is one
 ) -> tuple[float, float, float]:
     """Check one at the door.
 

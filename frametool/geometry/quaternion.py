@@ -194,8 +194,13 @@ def check(x: float, y: float, z: float, w: float, *, normalize: bool = False) ->
     if problem:
         raise ValueInvalid(problem)
     if abs(norm - 1.0) > SILENT and not normalize:
-        warn(f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {norm:.6g} and was normalised")
+        warn(f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown(norm)} and was normalised")
     return normalized(x, y, z, w, floats)
+
+
+def _shown(norm: float) -> str:
+    """Write a norm with six digits, or as many as tell it from 1."""
+    return f"{norm:.6g}" if f"{norm:.6g}" != "1" else f"{norm:.9g}"
 
 
 def complaint(x: float, y: float, z: float, w: float, norm: float, *, normalize: bool) -> str:
@@ -207,8 +212,7 @@ def complaint(x: float, y: float, z: float, w: float, norm: float, *, normalize:
         return f"{shown} is not finite; give four finite numbers"
     if normalize or abs(norm - 1.0) <= TOLERATED:
         return ""
-    return f"{shown} has norm {norm:.6g}; a rotation needs norm 1 (normalize it with --normalize)"
-
+    return f"{shown} has norm {_shown(norm)}; a rotation needs norm 1 (normalize it with --normalize)"
 
 
 def between(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:

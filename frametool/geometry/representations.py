@@ -188,9 +188,7 @@ class Notation:
         unit = degrees if self.degrees is None else self.degrees
         return self.representation.to_quaternion(components, xp, degrees=unit, axes=self.bound_axes())
 
-    def from_quaternion(
-        self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False
-    ) -> Components:
+    def from_quaternion(self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False) -> Components:
         """Give the components of a unit quaternion; `degrees` counts where the notation itself says no unit."""
         unit = degrees if self.degrees is None else self.degrees
         return self.representation.from_quaternion(x, y, z, w, xp, degrees=unit, axes=self.bound_axes())
@@ -236,11 +234,18 @@ def checked_axes(axes: str) -> str:
     """Give the name of an Euler convention back if it is one; else raise ValueInvalid with those there are."""
     if axes in euler.AXES:
         return axes
-    near = did_you_mean(axes.lower(), euler.AXES) or ";"
+    near = _both_readings(axes.lower()) or did_you_mean(axes.lower(), euler.AXES) or ";"
     raise ValueInvalid(
         f"unknown Euler axes {axes!r}{near} s (static axes) or r (rotating axes) and three letters: "
         f"{', '.join(sorted(euler.AXES))}"
     )
+
+
+def _both_readings(letters: str) -> str:
+    """Name the two conventions that three bare letters may mean; nothing for other texts."""
+    if f"r{letters}" not in euler.AXES:
+        return ""
+    return f"; did you mean r{letters} (rotating axes, intrinsic) or s{letters} (static axes, extrinsic)?"
 
 
 def axes_name(order: str, frame: str) -> str:
@@ -248,4 +253,4 @@ def axes_name(order: str, frame: str) -> str:
     prefix = {"intrinsic": "r", "extrinsic": "s"}.get(frame)
     if prefix is None:
         raise ValueInvalid(f"unknown Euler frame {frame!r}; write intrinsic (rotating axes) or extrinsic (static axes)")
-    return checked_axes(prefix + order)
+    return checked_axes(prefix + order.lower())

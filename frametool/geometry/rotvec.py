@@ -36,7 +36,11 @@ def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace, *
 
 
 def check(
-    rx: float, ry: float, rz: float, *, normalize: bool = False  # noqa: ARG001 - every length is one
+    rx: float,
+    ry: float,
+    rz: float,
+    *,
+    normalize: bool = False,  # noqa: ARG001 - every length is one
 ) -> tuple[float, float, float]:
     """Check one at the door.
 

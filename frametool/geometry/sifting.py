@@ -56,6 +56,7 @@ def _made_unit(block: Array) -> bool:
 
 def _quaternion_sifter(given: Components, name: str, *, normalize: bool) -> Kernel:
     """Refuse or warn about whatever must be, over all rows; give the kernel that then normalises."""
+
     def grade(x: Any, y: Any, z: Any, w: Any) -> Components:
         squared = quaternion.squared_norm(x, y, z, w)
         if normalize:
@@ -128,6 +129,7 @@ def _projected(entries: Matrix, rough: Any) -> Matrix:
 
 def _matrix_sifter(given: Components, name: str, *, normalize: bool) -> Kernel:
     """Refuse or warn about whatever must be, over all rows; give the kernel that then projects and converts."""
+
     def grade(*block: Any) -> Components:
         entries: Matrix = block
         off = matrix.defect(*entries, arrays)

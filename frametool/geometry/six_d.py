@@ -15,9 +15,7 @@ if TYPE_CHECKING:
     from frametool.geometry.kinds import Components, Namespace, Number, Quaternion
 
 
-def to_quaternion(
-    ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace
-) -> Quaternion:
+def to_quaternion(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:
     """Give the quaternion of two columns, orthonormalised by Gram and Schmidt.
 
     The columns need be neither unit nor at right angles, but not parallel.
@@ -39,7 +37,14 @@ def from_quaternion(x: Number, y: Number, z: Number, w: Number) -> Components:
 
 
 def check(
-    ax: float, ay: float, az: float, bx: float, by: float, bz: float, *, normalize: bool = False  # noqa: ARG001
+    ax: float,
+    ay: float,
+    az: float,
+    bx: float,
+    by: float,
+    bz: float,
+    *,
+    normalize: bool = False,  # noqa: ARG001
 ) -> Components:
     """Check one pair of columns at the door; any two that span a plane will do.
 

@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 RANDOM = np.random.default_rng(0)
 SMALL = (10.0 ** RANDOM.uniform(-300.0, 0.0, 200)).tolist()
-TURNS = [sign * (k * math.pi / 2.0 + off) for k in range(5) for off in (-1e-8, 0.0, 1e-16, 1e-3) for sign in (1.0, -1.0)]
+TURNS = [
+    sign * (k * math.pi / 2.0 + off) for k in range(5) for off in (-1e-8, 0.0, 1e-16, 1e-3) for sign in (1.0, -1.0)
+]
 WITHIN = [*RANDOM.uniform(-math.pi, math.pi, 2000).tolist(), *SMALL, -math.pi, math.pi, 0.0, 5e-324]
 ANYWHERE = [*RANDOM.uniform(-1e3, 1e3, 1000).tolist(), *TURNS, 1e5, 4e6]
 BEYOND = [1e8, 1e15, -1e22]
