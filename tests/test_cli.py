@@ -255,7 +255,7 @@ WRONG = {
         "argument:1:14: quaternion [1, 0, 0, 0] has no order; write xyzw: [..], wxyz: [..] or {x:, y:, z:, w:}",
     ("convert '{xyz: [1,2]}'", 2): "argument:1:7: expected 3 numbers (x y z), found 2",
     ("convert '{xyz: [1,2,x]}'", 2): "argument:1:12: 'x' is not a number",
-    ("convert '{rpy_deg: [0,0,1], rotvec: [0,0,1]}'", 2):
+    ("convert '{rpy_deg: [0,0,1], rotvec: [0,0,1]}'", 1):
         "argument:1:28: two rotations in one entry disagree by 56.2958 degrees; keep one",
     ("convert {xyz:[1,2,3]}", 2): "argument:1:5: found unexpected ':'; write a blank after the colon",
     ("convert missing.yaml", 5): "missing.yaml: no such file or directory",
@@ -280,7 +280,7 @@ WRONG = {
         "keys.yaml:1:22: unknown key 'xzy', did you mean 'xyz'?; a pose has xyz and one rotation: quaternion, xyzw, "
         "wxyz, rpy, euler, axis_angle, rotvec, matrix, mrp, six_d",
     ("lookup rows.yaml a b", 1): "rows.yaml:1:30: the last row of a 4x4 pose is 0 0 0 1, found 0 0 0 2",
-    ("compose '{name: b, parent: a}' '{name: d, parent: c}'", 1):
+    ("compose '{name: b, parent: a, xyz: [0,0,0]}' '{name: d, parent: c, xyz: [0,0,0]}'", 1):
         "frames do not touch: a <- b is followed by c <- d; change the order, or invert one",
     ("loookup arm.yaml a b", 2): "no command 'loookup'; did you mean 'lookup'? commands: ",
     ("lookup arm.yaml base", 2):
@@ -387,3 +387,74 @@ def test_what_is_printed_reads_back_to_the_same_bits(run: Run, form: str, seed: 
     text = json.dumps({"xyz": pose.xyz.tolist(), "quaternion": dict(zip("xyzw", pose.xyzw.tolist(), strict=True))})
     first = run("convert", text, "--format", form).out
     assert run("convert", "-", "--format", form, stdin=first).out == first
+
+
+# --- what a hostile user found once --------------------------------------------------------------------------------
+
+
+def test_nothing_where_a_coordinate_is_expected_is_an_error(run: Run) -> None:
+    outcome = run("convert", '{"xyz": [null, 0, 0]}')
+    assert (outcome.status, outcome.err.splitlines()[0]) == (2, "frametool: argument:1:10: expected a number, found nothing")
+
+
+@pytest.mark.parametrize("form", ["json", "csv", "yaml", "ros2", "text"])
+def test_a_result_too_large_for_a_double_is_refused_in_every_form(run: Run, form: str) -> None:
+    far = '{"xyz": [1e308, 0, 0]}'
+    outcome = run("compose", far, far, "--format", form)
+    assert (outcome.status, outcome.out) == (1, "")
+    assert "not finite" in outcome.err
+
+
+def test_as_point_takes_a_vector_for_a_point(run: Run) -> None:
+    out = run("apply", "--transform", "{xyz: [1, 1, 1]}", "{vector: [1, 2, 3]}", "--as", "point", "--format", "json").out
+    assert json.loads(out) == {"point": [2.0, 3.0, 4.0]}
+
+
+def test_a_link_is_followed_and_a_mode_is_kept(run: Run, tmp_path: Any) -> None:
+    target = tmp_path / "private.yaml"
+    target.write_text("old")
+    target.chmod(0o600)
+    (tmp_path / "link.yaml").symlink_to(target)
+    assert run("convert", "--from", "rpy", "0", "0", "0", "-o", "link.yaml", "--force").status == 0
+    assert target.read_text().startswith("quaternion:")
+    assert (target.stat().st_mode & 0o777, (tmp_path / "link.yaml").is_symlink()) == (0o600, True)
+
+
+@pytest.mark.parametrize("form", ["ros1", "ros2"])
+def test_a_pose_without_names_goes_through_ros_text(run: Run, form: str) -> None:
+    text = run("convert", "{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}", "--format", form).out
+    assert json.loads(run("convert", "-", "--format", "json", stdin=text).out)["xyz"] == [1.0, 2.0, 3.0]
+
+
+def test_a_tree_too_deep_to_draw_and_a_long_cycle_are_told_shortly(run: Run) -> None:
+    chain = "\n".join(f"- {{name: f{n + 1}, parent: f{n}, xyz: [0, 0, 1]}}" for n in range(1500))
+    outcome = run("tree", "-", "--format", "text", stdin=chain)
+    assert (outcome.status, len(outcome.err) < 200) == (1, True)
+    outcome = run("tree", "-", stdin=f"{chain}\n- {{name: f0, parent: f1500, xyz: [0, 0, 1]}}")
+    assert outcome.status == 1
+    assert "(1486 more)" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("frames:\n  - name: b\n    parent:\u00a0a\n    xyz: [0, 0, 0]\n", "no-break space (U+00A0), invisible"),
+        ("frames:\n  a:\n    b:\n      xyz:1.5\n      rpy: [0, 0, 0]\n", "write a blank after 'xyz:'"),
+        ("{name: b, parent: a, rpy: [${radians(90)}, 0, 0]}", "is this xacro? expand it first"),
+    ],
+)
+def test_what_a_person_does_not_see_is_named(run: Run, text: str, hint: str) -> None:
+    outcome = run("lookup", "-", "a", "b", stdin=text)
+    assert outcome.status == 1
+    assert hint in outcome.err.splitlines()[0]
+
+
+def test_control_characters_in_names_do_not_reach_the_terminal(run: Run) -> None:
+    tree = 'frames: {"a\\e[31m": {b: {xyz: [0, 0, 0]}}}'
+    assert "\x1b" not in run("tree", "-", "--format", "text", stdin=tree).out
+    assert "\x1b" not in run("lookup", "-", "b", "c", stdin=tree).err
+
+
+def test_three_letters_of_euler_axes_name_both_readings(run: Run) -> None:
+    err = run("convert", "--from", "euler:zyx", "0", "0", "0").err
+    assert "did you mean rzyx (rotating axes, intrinsic) or szyx (static axes, extrinsic)?" in err

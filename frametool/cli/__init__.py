@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -117,6 +118,10 @@ def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
     import warnings
 
+    if sys.stdout is None:
+        return _complain("standard output is closed", 5)
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.encoding.lower() != "utf-8":
+        sys.stdout.reconfigure(encoding="utf-8")  # the same bytes in every locale
     warnings.simplefilter("always", FrametoolWarning)
     warnings.showwarning = _show_warning
     try:

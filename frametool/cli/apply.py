@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, announce, frame_name, load_tree
 from frametool.errors import FormatError, ValueInvalid
-from frametool.formats.numbers import parse_number
+from frametool.formats.numbers import NotFinite, parse_number
 from frametool.formats.points import Point, read_moveables
 from frametool.formats.pose import Pose
 from frametool.geometry import quaternion, rigid
@@ -34,7 +34,7 @@ CHOICES = ("point", "vector", "pose")
 @click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
 @click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
 @click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
-@click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
 @pose_options
 @result_options("points")
@@ -208,6 +208,8 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
         raise click.UsageError("a pose is a mapping, e.g. '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'")
     try:
         numbers = [parse_number(text) for text in texts]
+    except NotFinite:
+        raise
     except ValueInvalid as error:
         raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
     if len(numbers) % 3:

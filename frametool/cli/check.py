@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import TEXT, Command
+from frametool.cli.command import FILE, Command
 from frametool.cli.recordings import opened
 from frametool.cli.trees import verbose_option
 from frametool.formats.findings import RULES, WRITERS, Finding
@@ -34,7 +34,7 @@ class CheckCommand(Command):
 
 
 @click.command(cls=CheckCommand, name="check")
-@click.argument("files", nargs=-1, required=True, type=TEXT)
+@click.argument("files", nargs=-1, required=True, type=FILE)
 @click.option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
               help="how findings are written")  # fmt: skip
 @click.option("--strict", is_flag=True, help="let warnings fail too")

@@ -11,6 +11,7 @@ from frametool.cli.help import WithHelp
 from frametool.errors import ValueInvalid
 from frametool.formats import writers
 from frametool.formats.numbers import parse_number
+from frametool.geometry.euler import AXES
 from frametool.geometry.representations import REPRESENTATIONS, notation
 
 if TYPE_CHECKING:
@@ -54,6 +55,18 @@ class Text(click.ParamType[str]):
         return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
 
 
+class File(Text):
+    """A file's name, which the shell completes."""
+
+    name = "file"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Leave it to the shell."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+
 class Number(Text):
     """A finite number."""
 
@@ -89,10 +102,14 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
         from click.shell_completion import CompletionItem
 
         done, comma, begun = incomplete.rpartition(",")
-        return [CompletionItem(done + comma + name) for name in REPRESENTATIONS if name.startswith(begun)]
+        names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
+        if begun.startswith("euler"):
+            names += [f"{begun.partition(':')[0]}:{axes}" for axes in AXES]
+        return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
 
 
 TEXT = Text()
+FILE = File()
 
 
 def result_options(what: str) -> Callable[[Function], Function]:
@@ -112,7 +129,7 @@ def result_options(what: str) -> Callable[[Function], Function]:
             help="digits after the point  [default: the shortest text that reads back to the same bits]",
         ),
         click.option(
-            "-o", "--output", type=TEXT, metavar="FILE", help="write there instead of stdout, whole or not at all"
+            "-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all"
         ),
         click.option("--force", is_flag=True, help="let --output replace an existing file"),
     ]

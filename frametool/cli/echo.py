@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, result_options, rotation_options
+from frametool.cli.command import FILE, Command, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.times import Time, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
@@ -29,7 +29,7 @@ STAMP = Time(latest=False)
 
 
 @click.command(cls=Command, name="echo")
-@click.argument("tree", type=TEXT)
+@click.argument("tree", type=FILE)
 @click.argument("target", type=FRAME)
 @click.argument("source", type=FRAME)
 @click.option("--rate", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, metavar="HZ",
@@ -37,7 +37,7 @@ STAMP = Time(latest=False)
 @click.option("--start", type=STAMP, metavar="T", help="begin there  [default: when all edges have data]")
 @click.option("--stop", type=STAMP, metavar="T", help="end there  [default: when the first edge has no more]")
 @click.option("-l", "--limit", type=click.IntRange(1), metavar="N", help="at most so many blocks")
-@click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this file too; may be repeated")
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this file too; may be repeated")
 @rules_options
 @verbose_option
 @rotation_options

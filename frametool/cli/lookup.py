@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, result_options, rotation_options
+from frametool.cli.command import FILE, Command, result_options, rotation_options
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Command, name="lookup")
-@click.argument("tree", type=TEXT)
+@click.argument("tree", type=FILE)
 @click.argument("target", type=FRAME, required=False, metavar="TARGET")
 @click.argument("source", type=FRAME, required=False, metavar="SOURCE")
-@click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns, or latest  [default: latest]")
 @click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE, where --at is that at TARGET")
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")

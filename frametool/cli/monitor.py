@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, result_options
+from frametool.cli.command import FILE, TEXT, Command, result_options
 from frametool.cli.output import Output
 from frametool.cli.recordings import opened
 from frametool.cli.trees import verbose_option
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @click.command(cls=Command, name="monitor")
 @click.argument("recording", type=TEXT)
 @click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
-@click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="read this file too; may be repeated")
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
 @verbose_option
 @result_options("report")
 def command(recording: str, frames: Sequence[str], more: Sequence[str], **options: Any) -> None:

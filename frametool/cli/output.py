@@ -61,8 +61,8 @@ class Output:
                 [Result(each).mapping(self.style) if isinstance(each, Pose) else each.mapping() for each in records]
             )
 
-    def tree(self, tree: FrameTree | TransformBuffer) -> None:
-        """Write a tree; on a terminal, in colour.  A form made of poses gets every sample of what moves."""
+    def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
+        """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
         if not isinstance(tree, FrameTree) and "poses" in self._writes and self.style.form not in ("yaml", "json"):
             self.poses(sample_results(tree))
             return
@@ -71,8 +71,8 @@ class Output:
             return
         from frametool.view.tree_text import print_tree, write_tree
 
-        if self.path is None and sys.stdout.isatty():
-            print_tree(tree, self.style)
+        if self.path is None and (sys.stdout.isatty() or color == "always"):
+            print_tree(tree, self.style, color)
         else:
             self.text(write_tree(tree, self.style))
 

@@ -35,7 +35,7 @@ def source_of(argument: str | Source) -> Source:
         return Source(INLINE, argument)
     if argument != "-":
         return Source(argument, read_text(argument))
-    if sys.stdin.isatty():
+    if sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or give values")
     return Source("stdin", read_text("-"))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, result_options, rotation_options
+from frametool.cli.command import FILE, Command, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import load_tree, verbose_option
@@ -17,15 +17,17 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Command, name="tree")
-@click.argument("tree", type=TEXT)
-@click.option("--with", "more", multiple=True, type=TEXT, metavar="FILE", help="merge this tree too; may be repeated")
+@click.argument("tree", type=FILE)
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest of each edge]")
+@click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
+              help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
 @rules_options
 @verbose_option
 @rotation_options
 @result_options("tree")
 def command(
-    tree: str, more: Sequence[str], at: int | str | None, moving: bool, cache: int | None, tf2: str | None,
+    tree: str, more: Sequence[str], at: int | str | None, color: str, moving: bool, cache: int | None, tf2: str | None,
     **options: Any,
 ) -> None:  # fmt: skip
     """Draw the frames of TREE, each with its pose in its parent; those that move with their rate and interval too.
@@ -47,4 +49,4 @@ def command(
         from frametool.frames.listing import tree_at
 
         frames = tree_at(frames, stamp)
-    output.tree(frames)
+    output.tree(frames, color)

@@ -83,8 +83,11 @@ class Frame(Text):
 
         from frametool.errors import FrametoolError
 
+        named = ctx.params.get("tree") or next(iter(ctx.params.get("arguments") or ()), None)
+        if named is None and "arguments" in ctx.params:
+            return [CompletionItem(incomplete, type="file")]
         try:
-            tree = load_tree(ctx.params.get("tree") or ".")
+            tree = load_tree(named or ".", ctx.params.get("more") or ())
         except (FrametoolError, click.UsageError):
             return []  # nothing to offer, and a completion must not print
         return [CompletionItem(frame) for frame in tree.frames if frame.startswith(incomplete)]

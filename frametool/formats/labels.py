@@ -30,8 +30,8 @@ def edge_label(transform: Transform, style: Style) -> tuple[str, str]:
 
 
 def graphviz(text: str) -> str:
-    """Write a text as it stands between double quotes; a backslash would begin one of graphviz's own escapes."""
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    """Write a text as it stands between double quotes; & and a backslash would begin escapes of graphviz."""
+    return text.replace("&", "&amp;").replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
 
 
 def _short(values: Iterable[float], decimals: int) -> str:

@@ -30,6 +30,10 @@ _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 _LONGEST_SHOWN = 60
 
 
+class NotFinite(ValueInvalid):
+    """Report nan, inf, or a number beyond the range of doubles."""
+
+
 def parse_number(text: str) -> float:
     """Read a finite decimal number, correctly rounded.
 
@@ -43,7 +47,7 @@ def parse_number(text: str) -> float:
         else:
             if -_INFINITE < value < _INFINITE:
                 return value
-    raise ValueInvalid(explain_number(text))
+    raise _refusal(text, explain_number(text))
 
 
 def parse_angle(text: str) -> Angle:
@@ -59,7 +63,12 @@ def parse_angle(text: str) -> Angle:
         return parse_number(match[1]), _UNITS[match[2]]
     if (match := re.fullmatch(_MULTIPLE_OF_PI, text)) and not re.match(_BARE_STAR, text):
         return _degrees_of_pi(text, match[1], match[2], match[3]), "deg"
-    raise ValueInvalid(explain_angle(text))
+    raise _refusal(text, explain_angle(text))
+
+
+def _refusal(text: str, message: str) -> ValueInvalid:
+    """Make the error: what reads as a number and is none that can be used is told from what is no number."""
+    return NotFinite(message) if _reason(text) == _NOT_FINITE else ValueInvalid(message)
 
 
 def _degrees_of_pi(text: str, sign: str, factor: str | None, divisor: str | None) -> float:

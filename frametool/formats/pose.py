@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean
 from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS, read_rotation
-from frametool.formats.values import Misfit, Reading, kind, read_numbers
+from frametool.formats.values import Misfit, NotARotation, Reading, kind, read_numbers
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import REPRESENTATIONS
 
@@ -147,7 +147,7 @@ def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
         return second
     apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
     if apart > AGREEMENT * (1.0 + max(map(abs, first))):
-        raise Misfit(f"two positions in one entry disagree by {apart:.6g} m; keep one")
+        raise NotARotation(f"two positions in one entry disagree by {apart:.6g} m; keep one")
     return first
 
 
@@ -157,7 +157,7 @@ def _agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
 
     apart = quaternion.distance(*first, *second, floats)
     if apart > AGREEMENT:
-        raise Misfit(f"two rotations in one entry disagree by {math.degrees(apart):.6g} degrees; keep one")
+        raise NotARotation(f"two rotations in one entry disagree by {math.degrees(apart):.6g} degrees; keep one")
     return first
 
 

@@ -70,6 +70,9 @@ def read_one_pose(value: Any, reading: Reading) -> Pose:
     if type(value) is not dict:
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(value)}")
     if "child_frame_id" in value:
-        parent, child, position, rotation, _ = ros.read_transform(value, reading)
-        return Pose(position, rotation, child, parent)
-    return read_pose(value, reading)
+        parent, child, position, rotation, _ = ros.read_transform(value, reading, may_be_nameless=True)
+        return Pose(position, rotation, child or None, parent or None)
+    pose = read_pose(value, reading)
+    if pose.position is None and pose.rotation is None:
+        reading.note("neither position nor rotation: taken as the identity")
+    return pose

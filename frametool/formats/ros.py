@@ -61,8 +61,13 @@ def messages(value: dict[str, Any], path: Path) -> Iterator[tuple[dict[str, Any]
             yield within((*here, index), as_mapping, entry, "a TransformStamped"), (*here, index)
 
 
-def read_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str, Vector, Quaternion, int | None]:
-    """Read one TransformStamped as (parent, child, position, rotation, stamp_ns); no stamp is None."""
+def read_transform(
+    message: dict[str, Any], reading: Reading, *, may_be_nameless: bool = False
+) -> tuple[str, str, Vector, Quaternion, int | None]:
+    """Read one TransformStamped as (parent, child, position, rotation, stamp_ns); no stamp is None.
+
+    may_be_nameless: as a pose it needs no frames; their names are then "".
+    """
     if foxglove.is_frame_transform(message):
         return foxglove.read_transform(message, reading)
     only(message, ("header", "child_frame_id", "transform"))
@@ -73,8 +78,9 @@ def read_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str,
     position, rotation = within(("transform",), read_rigid, transform, ("translation", "rotation"), reading)
     if STALE in transform:
         _warn_of_stale_angles(transform[STALE], rotation, reading)
-    parent = frame_of(header, "frame_id", ("header",), reading)
-    return parent, frame_of(message, "child_frame_id", (), reading), position, rotation, header_stamp(header)
+    parent = frame_of(header, "frame_id", ("header",), reading, may_be_empty=may_be_nameless)
+    child = frame_of(message, "child_frame_id", (), reading, may_be_empty=may_be_nameless)
+    return parent, child, position, rotation, header_stamp(header)
 
 
 def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) -> None:

@@ -32,9 +32,13 @@ def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
     return inner
 
 
-def frame_of(mapping: dict[str, Any], key: str, path: Path, reading: Reading) -> str:
+def frame_of(
+    mapping: dict[str, Any], key: str, path: Path, reading: Reading, *, may_be_empty: bool = False
+) -> str:
     """Read a frame's name; one leading `/` goes, as tf2 does it, and is noted."""
     name = mapping.get(key)
+    if may_be_empty and name in ("", None) and key in mapping:
+        return ""
     here = (*path, key) if key in mapping else path
     if type(name) is not str or not name:
         raise Misfit(f"{key} must name a frame, found {kind(name or None)}", here)

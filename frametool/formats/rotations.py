@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, overheard
-from frametool.formats.numbers import parse_angle, parse_number
+from frametool.formats.numbers import NotFinite, parse_angle, parse_number
 from frametool.formats.values import INDICES, Misfit, NotARotation, Reading, kind, read_texts
 from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, Notation, axes_name, notation
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 ALIASES = {"rotation": "quaternion", "orientation": "quaternion"}  # as ROS messages name it
 AXES_KEY = "axes"  # a constant rotation by name instead of numbers
 TURN = 2.0 * math.pi
-NOT_FINITE = r"(?i)[-+]?\.?(nan|inf|infinity)"
 
 
 def _rotation_keys() -> dict[str, Notation]:
@@ -120,7 +118,7 @@ def _read_one_by_one(
             if index in angles:
                 units.append(_unit_for(unit, text, form))
         except ValueInvalid as error:
-            misfit = NotARotation if type(text) is str and re.fullmatch(NOT_FINITE, text) else Misfit
+            misfit = NotARotation if isinstance(error, NotFinite) else Misfit
             raise misfit(str(error), places[index]) from None
         numbers.append(number)
     return numbers, _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
@@ -190,8 +188,12 @@ def _euler(form: Notation, value: Any) -> Shape:
 
 
 def _axis_angle(form: Notation, value: Any) -> Shape:
-    if type(value) is not dict or set(value) != {"axis", "angle"}:
+    if type(value) is not dict:
         raise Misfit(f"expected {{axis: [x, y, z], angle: a}}, found {kind(value)}")
+    if wrong := [key for key in value if key not in ("axis", "angle")]:
+        raise Misfit(f"unknown key {wrong[0]!r}; expected axis and angle (90deg has its unit)", (wrong[0],), key=True)
+    if missing := [key for key in ("axis", "angle") if key not in value]:
+        raise Misfit(f"missing {missing[0]}; expected axis and angle")
     axis = value["axis"]
     places = [("axis", index if type(axis) is list else name) for index, name in enumerate("xyz")]
     return form, [*read_texts(axis, ("x", "y", "z")), value["angle"]], [*places, ("angle",)]
@@ -222,6 +224,7 @@ def read_homogeneous(
     """Read a 4x4 matrix: the whole pose."""
     m, _ = read_components(form, texts, places, reading)
     if m[12:] != [0.0, 0.0, 0.0, 1.0]:
-        raise Misfit(f"the last row of a 4x4 pose is 0 0 0 1, found {' '.join(f'{number:g}' for number in m[12:])}")
+        found = " ".join(f"{number:g}" for number in m[12:])
+        raise NotARotation(f"the last row of a 4x4 pose is 0 0 0 1, found {found}")
     rows = [*m[0:3], *m[4:7], *m[8:11]]
     return (m[3], m[7], m[11]), _checked(form, rows, reading)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
-from frametool.formats.numbers import parse_number
+from frametool.formats.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -129,5 +129,6 @@ def misfit_among(texts: Sequence[Any], value: Any, names: Sequence[str], read: C
         except Misfit as error:
             return error.below(names[index] if type(value) is dict else index)
         except ValueInvalid as error:
-            return Misfit(str(error), (names[index] if type(value) is dict else index,))
+            misfit = NotARotation if isinstance(error, NotFinite) else Misfit
+            return misfit(str(error), (names[index] if type(value) is dict else index,))
     return Misfit("expected numbers")

@@ -6,6 +6,7 @@ import re
 
 from yaml.error import MarkedYAMLError
 
+from frametool.formats.numbers import odd_characters
 from frametool.formats.source import Source, error_at, line_of, placed_error
 
 TYPE_CHECKING = False
@@ -30,11 +31,24 @@ def translated(source: Source, error: Exception) -> FormatError:
     """Make our error of the parser's: lower case, placed, with a hint where one is known."""
     if isinstance(error, MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
         line, column = mark.line + 1, mark.column + 1
-        return placed_error(source, line, column, _message(error, line_of(source.text, line), column))
+        message = _message(error, line_of(source.text, line), column)
+        return placed_error(source, line, column, message + _suspicion(source, line))
     if odd := _UNREADABLE.search(source.text):
         code = f"U+{ord(odd[0]):04X}"
         return error_at(source, odd.start(), f"the character {code} may not stand in YAML or JSON; is this text?")
     return error_at(source, 0, _one_line(str(error)) or type(error).__name__)
+
+
+def _suspicion(source: Source, line: int) -> str:
+    """Name what people do not see in the line of an error or the one before: odd characters, a missing blank, xacro."""
+    for text in (line_of(source.text, line), line_of(source.text, line - 1) if line > 1 else ""):
+        if odd := odd_characters(text):
+            return f"; the line has {odd}"
+        if "${" in text:
+            return "; is this xacro? expand it first"
+        if match := re.match(r"\s*(?:- +)*([\w./-]+):(?=[^\s:/])", text):
+            return f"; write a blank after '{match[1]}:'"
+    return ""
 
 
 def _one_line(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool.errors import printable
 from frametool.formats.results import is_locked, rotation_entry, rotation_numbers
 from frametool.frames.stamps import format_stamp
 from frametool.geometry.representations import notation
@@ -70,10 +71,11 @@ def _heading(result: Result) -> str:
     if pose.name is None or pose.parent is None:
         return ""
     at, source_at, fixed = (result.extras.get(key) for key in ("stamp_ns", "source_stamp_ns", "fixed"))
-    source = pose.name if source_at is None else f"{pose.name} at {format_stamp(source_at)}"
-    target = pose.parent if at is None else f"{pose.parent} at {format_stamp(at)}"
+    name, parent = printable(pose.name), printable(pose.parent)
+    source = name if source_at is None else f"{name} at {format_stamp(source_at)}"
+    target = parent if at is None else f"{parent} at {format_stamp(at)}"
     across = "" if fixed is None else f" with {fixed} standing still"
-    return f"{source} seen from {target}{across}  (maps points in {pose.name} to points in {pose.parent})\n"
+    return f"{source} seen from {target}{across}  (maps points in {name} to points in {parent})\n"
 
 
 def _rotation_lines(pose: Pose, form: Notation, style: Style) -> Iterator[Line]:

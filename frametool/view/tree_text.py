@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, NamedTuple
 
+from frametool.errors import ValueInvalid, printable
 from frametool.formats.labels import edge_label
 from frametool.frames.tree import FrameTree
 
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from frametool.formats.results import Style
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.transform import Transform
+
+
+DEEPEST = 1000  # levels; the lines of a drawing grow with its depth
 
 
 class Line(NamedTuple):
@@ -31,12 +35,15 @@ def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     )
 
 
-def print_tree(tree: FrameTree | TransformBuffer, style: Style) -> None:
-    """Draw a tree on the terminal, in colour where it has any."""
+def print_tree(tree: FrameTree | TransformBuffer, style: Style, color: str = "auto") -> None:
+    """Draw a tree on the terminal, in colour where it has any, or as `color` says: always or never."""
     from rich.console import Console
     from rich.text import Text
 
-    console = Console(file=sys.stdout, highlight=False, soft_wrap=True)
+    console = Console(
+        file=sys.stdout, highlight=False, soft_wrap=True, no_color=True if color == "never" else None,
+        force_terminal=True if color == "always" else None, color_system="auto" if color == "auto" else "standard",
+    )  # fmt: skip
     for line, pad in _padded(tree, style):
         name = "bold green" if not line.label else "bold"
         console.print(Text.assemble((line.branch, "dim"), (line.frame, name), pad, ("  ".join(line.label), "cyan")))
@@ -56,11 +63,20 @@ def _label(tree: FrameTree | TransformBuffer, child: str, transform: Transform, 
 def _padded(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[tuple[Line, str]]:
     """Give the lines with the blanks that bring their poses below one another."""
     lines = list(_lines(tree, style))
-    width = max((len(line.branch) + len(line.frame) for line in lines), default=0)
+    width = max((len(line.branch) + cells(line.frame) for line in lines), default=0)
     firsts = max((len(line.label[0]) for line in lines if line.label), default=0)
     for line in lines:
         label = (f"{line.label[0]:<{firsts}}", *line.label[1:]) if line.label else ()
-        yield line._replace(label=label), " " * bool(label) * (width - len(line.branch) - len(line.frame) + 2)
+        yield line._replace(label=label), " " * bool(label) * (width - len(line.branch) - cells(line.frame) + 2)
+
+
+def cells(text: str) -> int:
+    """Count the cells a text takes on a terminal: wide characters take two."""
+    if text.isascii():
+        return len(text)
+    from unicodedata import combining, east_asian_width
+
+    return sum(0 if combining(each) else 2 if east_asian_width(each) in "WF" else 1 for each in text)
 
 
 def _lines(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[Line]:
@@ -71,7 +87,9 @@ def _lines(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[Line]:
     pending: list[tuple[str, tuple[str, ...], str, str]] = [(root, (), "", "") for root in reversed(tree.roots)]
     while pending:
         frame, label, branch, below = pending.pop()
-        yield Line(branch, frame, label)
+        if len(branch) > 4 * DEEPEST:
+            raise ValueInvalid(f"the tree is more than {DEEPEST} frames deep, too deep to draw; use --format json")
+        yield Line(branch, printable(frame), label)
         inner = children.get(frame, ())
         for at in range(len(inner) - 1, -1, -1):
             last = at == len(inner) - 1
