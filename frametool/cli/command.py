@@ -108,6 +108,15 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
         return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
 
 
+VERBOSE = "frametool.verbose"  # where a command's context keeps that -v was given
+
+
+def be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> bool:
+    """Remember that -v was given, for whatever opens files."""
+    context.meta[VERBOSE] = chosen
+    return chosen
+
+
 TEXT = Text()
 FILE = File()
 

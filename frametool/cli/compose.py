@@ -15,13 +15,12 @@ from frametool.errors import ValueInvalid
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result
 from frametool.geometry import rigid
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.formats.source import Source
+    from frametool.stream.operation import Operation
 
     Rename = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
@@ -48,6 +47,8 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
         at = poses.index("-")
         fixed = [None if each == "-" else one_pose(each, degrees=deg, normalize=normalize) for each in poses]
         operation, rename = _around(fixed[:at], fixed[at + 1 :])
+        from frametool.stream.request import Request
+
         wishes = Request(operation, degrees=deg, normalize=normalize, rename=rename)
         outcome = stream.run(wishes, output)
         if isinstance(outcome, int):
@@ -63,6 +64,8 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
 def _around(left: Sequence[Pose | None], right: Sequence[Pose | None]) -> tuple[Operation, Rename]:
     """Give the operation that puts each row between two products, and what it does to frames."""
     before, after = (reduce(product, filter(None, poses)) if poses else None for poses in (left, right))
+
+    from frametool.stream.operation import Operation
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         result = reduce(product, filter(None, (before, Pose(name=name, parent=parent), after)))

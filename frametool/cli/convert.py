@@ -15,8 +15,6 @@ from frametool.formats.pose import Pose
 from frametool.formats.results import Result
 from frametool.geometry import quaternion
 from frametool.geometry.representations import notation
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from frametool.formats.values import Quaternion
@@ -66,6 +64,9 @@ def command(
     if stream.path or values == ("-",) or not (values or axes):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
+        from frametool.stream.operation import Operation
+        from frametool.stream.request import Request
+
         operation = Operation(right=None if turn is None else (0.0, 0.0, 0.0, *turn))
         forms = output.notations or (notation("quaternion"),)
         outcome = stream.run(

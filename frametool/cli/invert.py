@@ -12,8 +12,6 @@ from frametool.cli.poses import poses_from
 from frametool.cli.streaming import Stream, stream_options
 from frametool.formats.pose import inverted
 from frametool.formats.results import Result
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from frametool.formats.source import Source
@@ -38,6 +36,9 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
     source: str | Source = pose
     output = Output("poses", deg=deg, **options)
     if stream.is_wanted(pose):
+        from frametool.stream.operation import Operation
+        from frametool.stream.request import Request
+
         wishes = Request(
             Operation(inverse=True), degrees=deg, normalize=normalize, rename=lambda parent, name: (name, parent)
         )

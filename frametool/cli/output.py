@@ -11,7 +11,6 @@ from frametool.errors import FileProblem, ValueInvalid
 from frametool.formats import FORMATS, writers
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result, Style, is_locked, sample_results
-from frametool.frames.tree import FrameTree
 from frametool.geometry.representations import notation
 
 if TYPE_CHECKING:
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from frametool.formats.points import Point
     from frametool.formats.stamped import Stamped
     from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.tree import FrameTree
     from frametool.geometry.representations import Notation
 
 
@@ -63,6 +63,8 @@ class Output:
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
+        from frametool.frames.tree import FrameTree
+
         if not isinstance(tree, FrameTree) and "poses" in self._writes and self.style.form not in ("yaml", "json"):
             self.poses(sample_results(tree))
             return

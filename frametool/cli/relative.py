@@ -15,11 +15,10 @@ from frametool.errors import ValueInvalid
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result
 from frametool.geometry import floats, quaternion, rigid
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from frametool.formats.source import Source
+    from frametool.stream.request import Request
 
 
 @click.command(cls=Command, name="relative")
@@ -64,6 +63,9 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
 
 def _wishes(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, normalize: bool) -> Request:
     """Say what a stream's rows are compared with: a fixed A or B, the row before, or the row's own second pose."""
+    from frametool.stream.operation import Operation
+    from frametool.stream.request import Request
+
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")

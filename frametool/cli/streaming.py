@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Notations
-from frametool.cli.trees import be_verbose
+from frametool.cli.command import TEXT, Notations, be_verbose
 from frametool.errors import FileProblem, FormatError
 from frametool.formats.source import Source, decode
 from frametool.stream.detect import RECORDS, STREAMS, form_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import Text
+from frametool.cli.command import VERBOSE, Text, be_verbose
 from frametool.cli.poses import is_inline, source_of
 from frametool.errors import warn
 from frametool.formats.load import load_sources, open_source
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from frametool.formats.source import Source
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
-
-VERBOSE = "frametool.verbose"
 
 
 def load_tree(argument: str, more: Sequence[str] = (), rules: Rules | None = None) -> FrameTree | TransformBuffer:
@@ -49,12 +47,6 @@ def announce(source: Source | Recording) -> None:
     if context is not None and context.meta.get(VERBOSE):
         described = getattr(source, "described", f"{source.name}: a tree in YAML or JSON")
         click.echo(f"frametool: {described}", err=True)
-
-
-def be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> bool:
-    """Remember that -v was given, for whatever opens files."""
-    context.meta[VERBOSE] = chosen
-    return chosen
 
 
 verbose_option = click.option(

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
 from frametool.formats.pose import Pose
-from frametool.frames.tree import FrameTree
 from frametool.geometry import euler, floats, quaternion
 
 if TYPE_CHECKING:
@@ -14,6 +13,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.track import Track
+    from frametool.frames.tree import FrameTree
     from frametool.geometry.representations import Notation
 
 
@@ -94,6 +94,8 @@ class Result:
 
 def tree_entries(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[dict[str, Any]]:
     """Give a tree as the entries of its list form: roots, then edges; moving ones with their samples."""
+    from frametool.frames.tree import FrameTree
+
     yield from ({"name": root} for root in tree.roots)
     for parent, child, transform in tree.edges():
         track = None if isinstance(tree, FrameTree) else tree.track(child)

@@ -133,7 +133,8 @@ def second_moment(components: Components, heavy: Array | None) -> Array:
     total = np.zeros((4, 4))
     for start, stop in arrays.blocks(flat[0].size):
         block = np.stack([part[start:stop] for part in flat])
-        total += (block if mass is None else block * mass[start:stop]) @ block.T
+        weighted = block if mass is None else block * mass[start:stop]
+        total += np.einsum("in,jn->ij", weighted, block)  # not @: BLAS would start threads
     return total
 
 

@@ -21,8 +21,9 @@ STREAMS = {
 }
 RECORDS = frozenset(("json", "yaml"))
 
-_JSON = re.compile(rb'\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))')
-_YAML = re.compile(rb"---(?:\s|$)|%YAML|- |(?:[\w./-]+|\"[^\"\n]*\"):(?:\s|$)|[\[{]")
+# compiled when first needed, not at start-up
+_JSON = rb'\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))'
+_YAML = rb"---(?:\s|$)|%YAML|- |(?:[\w./-]+|\"[^\"\n]*\"):(?:\s|$)|[\[{]"
 _MARK = b"\xef\xbb\xbf"
 
 
@@ -41,9 +42,9 @@ def form_of(begin: bytes, name: str, *, told: str = "") -> tuple[str, str]:
 
 def _by_content(begin: bytes, name: str) -> str:
     line = _first_line(begin)
-    if _JSON.match(begin):
+    if re.match(_JSON, begin):
         return "json"
-    if _YAML.match(line) and not _is_table(line):
+    if re.match(_YAML, line) and not _is_table(line):
         return "yaml"
     for delimiter, form in ((b"\t", "tsv"), (b",", "csv")):
         if delimiter in line:
