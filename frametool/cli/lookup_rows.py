@@ -9,7 +9,6 @@ import click
 from frametool.cli.command import TEXT
 from frametool.cli.trees import frame_name
 from frametool.geometry.representations import notation
-from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,6 +66,8 @@ class RowFrames:
         fixed_source = fixed_source and frame_name(fixed_source, tree)
         frames = tuple(name for name in (self.target, self.source) if name is not None)
         forms = output.notations or (notation("quaternion"),)
+        from frametool.stream.request import Request
+
         wishes = Request(poses=0, frames=frames, edge_of=edge_of, notations=forms, degrees=output.style.degrees)
         status = stream.run(wishes, output, tables_only=True)
         return status if isinstance(status, int) else 0

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from frametool.formats.values import Path, Quaternion, Reading, Vector
 
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
-_INTEGER = re.compile(r" *[-+]?\d{1,25}", re.ASCII)
-_LEFT_OUT = re.compile("<(array|sequence) type: .*>")
+_INTEGER = r"(?a) *[-+]?\d{1,25}"
+_LEFT_OUT = "<(array|sequence) type: .*>"
 
 
 def only(mapping: dict[str, Any], known: tuple[str, ...]) -> None:
@@ -72,14 +72,14 @@ def read_stamp(value: Any) -> int:
 
 def _whole(stamp: dict[str, Any], key: str) -> int:
     text = stamp[key]
-    if type(text) is not str or not _INTEGER.fullmatch(text):
+    if type(text) is not str or not re.fullmatch(_INTEGER, text):
         raise Misfit(f"{key} must be a whole number, found {kind(text)}", (key,))
     return int(text)
 
 
 def whole_list(value: Any, what: str) -> list[Any]:
     """Take a value for a list that was printed whole; the tools cut long ones unless told otherwise."""
-    if type(value) is str and _LEFT_OUT.fullmatch(value):
+    if type(value) is str and re.fullmatch(_LEFT_OUT, value):
         raise Misfit(f"the numbers are not there, only {value!r}: record without --no-arr (--noarr)")
     if type(value) is not list:
         raise Misfit(f"expected {what}, found {kind(value)}")

@@ -13,9 +13,10 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.errors import FormatError
 
-_UNREADABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
-_ABOUT_TABS = re.compile("cannot start any token|tab character")
-_ABOUT_BEGINNINGS = re.compile("cannot start any token|scanning a directive")
+# compiled when an error asks for them, not at start-up
+_UNREADABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
+_ABOUT_TABS = "cannot start any token|tab character"
+_ABOUT_BEGINNINGS = "cannot start any token|scanning a directive"
 _NEVER_FIRST = ("@", "`", "%")
 _LONGEST_SHOWN = 40
 _HINTS = {
@@ -33,7 +34,7 @@ def translated(source: Source, error: Exception) -> FormatError:
         line, column = mark.line + 1, mark.column + 1
         message = _message(error, line_of(source.text, line), column)
         return placed_error(source, line, column, message + _suspicion(source, line))
-    if odd := _UNREADABLE.search(source.text):
+    if odd := re.search(_UNREADABLE, source.text):
         code = f"U+{ord(odd[0]):04X}"
         return error_at(source, odd.start(), f"the character {code} may not stand in YAML or JSON; is this text?")
     return error_at(source, 0, _one_line(str(error)) or type(error).__name__)
@@ -60,11 +61,11 @@ def _message(error: MarkedYAMLError, line: str, column: int) -> str:
     """Say what is wrong at a column of a line, after the parser's problem and context."""
     problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
     word = line[column - 1 :].split(maxsplit=1)[0] if line[column - 1 :].strip() else ""
-    if "\t" in (line[column - 1 : column], *line[: column - 1].split(" ")) and _ABOUT_TABS.search(problem):
+    if "\t" in (line[column - 1 : column], *line[: column - 1].split(" ")) and re.search(_ABOUT_TABS, problem):
         return "a tab cannot indent YAML; use blanks"
     if "scanning a directive" in context:
         word = line.split(maxsplit=1)[0] if line.strip() else ""
-    if word.startswith(_NEVER_FIRST) and _ABOUT_BEGINNINGS.search(problem + context):
+    if word.startswith(_NEVER_FIRST) and re.search(_ABOUT_BEGINNINGS, problem + context):
         name = word.rstrip(":,]}")[:_LONGEST_SHOWN]
         return f'nothing can begin with {word[0]!r} here; quote the name: "{name}"'
     if word == ":" and problem == "did not find expected key":

@@ -43,8 +43,8 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _ITEM = object()  # stands for the key while a list is filled
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
 _ODD_KEYS = frozenset(("", "<<"))
-_OPENCV_HEAD = re.compile(r"%YAML:1\.[0-9]+[^\r\n]*")
-_OPENCV_TIGHT = re.compile(r"^([ \t]*[\w.]+):(?=\S)", re.MULTILINE)
+_OPENCV_HEAD = r"%YAML:1\.[0-9]+[^\r\n]*"
+_OPENCV_TIGHT = r"(?m)^([ \t]*[\w.]+):(?=\S)"
 _OPENCV_TAGS = frozenset(("tag:yaml.org,2002:opencv-matrix",))
 _PLACE_KINDS: dict[type, int] = {
     ScalarEvent: LEAF,
@@ -80,8 +80,8 @@ def readable_yaml(source: Source) -> Source:
     text = source.text
     if text.count("\n%TAG") > _MOST_DIRECTIVES:
         raise error_at(source, text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
-    head = _OPENCV_HEAD.match(text)
-    return source if head is None else Source(source.name, _OPENCV_TIGHT.sub(r"\1: ", text[head.end() :]))
+    head = re.match(_OPENCV_HEAD, text) if text.startswith("%YAML:") else None
+    return source if head is None else Source(source.name, re.sub(_OPENCV_TIGHT, r"\1: ", text[head.end() :]))
 
 
 def yaml_marks(source: Source, paths: Sequence[Path]) -> dict[Path, tuple[tuple[int, int], tuple[int, int]]]:
@@ -105,7 +105,7 @@ def _place(mark: Any) -> tuple[int, int]:
 
 def _widened(text: str) -> Iterator[tuple[int, int]]:
     """Give line and column of each colon that got a blank."""
-    return (place_of(text, match.end() - 1) for match in _OPENCV_TIGHT.finditer(text))
+    return (place_of(text, match.end() - 1) for match in re.finditer(_OPENCV_TIGHT, text))
 
 
 def _unshift(place: tuple[int, int], shifts: dict[int, int]) -> tuple[int, int]:
