@@ -189,7 +189,8 @@ def test_fast_and_full_reading_agree_on_names_that_yaml_knows(tmp_path: Path) ->
 
 def write_bag(path: Path, kind: str) -> None:
     """Write the two samples as /tf, and one more as /tf_static."""
-    stores = pytest.importorskip("rosbags.typesys")
+    from rosbags import typesys as stores
+
     store = stores.get_typestore(stores.Stores.ROS2_HUMBLE if kind != "ros1" else stores.Stores.ROS1_NOETIC)
     name = "tf2_msgs/msg/TFMessage"
     if name not in store.types:
