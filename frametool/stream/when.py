@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from frametool.formats.values import Path
     from frametool.geometry.kinds import Components, Rigid
 
-NANOSECONDS = ("%time", "ns", "nsec", "stamp.nanoseconds")  # `rostopic echo -p` writes %time so
+NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
 LARGEST = (1 << 63) - 1
 
 
@@ -31,7 +31,7 @@ class Timed(NamedTuple):
     @property
     def in_ns(self) -> bool:
         """Tell whether the name says that stamps are integer nanoseconds."""
-        return self.name.endswith("_ns") or self.name in NANOSECONDS or self.name.startswith("field.header.stamp")
+        return self.name.endswith("_ns") or self.name in NANOSECONDS
 
     def pose(self, frame: str | None, stamp_ns: int) -> Rigid:
         """Give the pose at one time, to the bit as `many` does; raises FrametoolError where there is none."""

@@ -33,7 +33,7 @@ PANDAS_POINTS = """
 import pandas, sys, numpy as np
 from scipy.spatial.transform import Rotation as R
 d = pandas.read_csv(sys.argv[1])
-d[["x", "y", "z"]] = R.from_euler("z", 90, degrees=True).apply(d[["x", "y", "z"]].to_numpy()) + [1, 2, 3]
+d[["x", "y", "z"]] = R.from_euler("z", 90, degrees=True).apply(d[["x", "y", "z"]].to_numpy(copy=True)) + [1, 2, 3]
 d.to_csv(sys.stdout, index=False, float_format="%.6f")
 """
 SCIPY_RPY = """
