@@ -62,6 +62,13 @@ class Group(WithHelp, click.Group):
         except BrokenPipeError:
             raise ReaderGone from None
 
+    def make_context(self, *arguments: Any, **options: Any) -> click.Context:
+        """Parse the arguments; for a closed pipe as `invoke`, since --help and --version print here."""
+        try:
+            return super().make_context(*arguments, **options)
+        except BrokenPipeError:
+            raise ReaderGone from None
+
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Name the commands, in the table's order."""
         return list(self.table)
@@ -125,8 +132,19 @@ def run(arguments: list[str]) -> int:
     warnings.simplefilter("always", FrametoolWarning)
     warnings.showwarning = _show_warning
     try:
-        status = group.main(arguments, prog_name="frametool", standalone_mode=False)
+        status = _run(arguments)
         sys.stdout.flush()
+    except (ReaderGone, BrokenPipeError):
+        return _die_of_closed_pipe()
+    except OSError as error:
+        return _complain(f"{error.strerror or error}", 5)
+    return status
+
+
+def _run(arguments: list[str]) -> int:
+    """Run one command; a closed pipe and other trouble with stdout are the caller's."""
+    try:
+        status = group.main(arguments, prog_name="frametool", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.ctx.get_help() if error.ctx else "")
         return 0
@@ -136,10 +154,6 @@ def run(arguments: list[str]) -> int:
         return 130
     except FrametoolError as error:
         return _report(error, arguments)
-    except (ReaderGone, BrokenPipeError):
-        return _die_of_closed_pipe()
-    except OSError as error:
-        return _complain(f"{error.strerror or error}", 5)
     return status if isinstance(status, int) else 0
 
 

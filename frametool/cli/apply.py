@@ -11,6 +11,7 @@ from frametool.cli.command import FILE, TEXT, Command, pose_options, result_opti
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, announce, frame_name, load_tree
 from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.numbers import NotFinite, parse_number
@@ -19,13 +20,15 @@ from frametool.formats.pose import Pose
 from frametool.geometry import quaternion, rigid
 from frametool.stream.operation import Operation
 from frametool.stream.request import Request
+from frametool.stream.when import Timed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.formats.assembly import Rules
     from frametool.formats.recordings import Recording
     from frametool.formats.source import Source
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.kinds import Components, Rigid
 
 CHOICES = ("point", "vector", "pose")
 
@@ -45,6 +48,15 @@ CHOICES = ("point", "vector", "pose")
     metavar="NAME",
     help="without SOURCE, the column that names each row's frame",
 )
+@click.option(
+    "--time-column",
+    "time_column",
+    type=TEXT,
+    metavar="NAME",
+    help="move each row at its own time: the column or key of its stamp, seconds; nanoseconds where it ends in _ns",
+)
+@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest; messages: their own]")
+@rules_options
 @stream_options
 def command(
     arguments: tuple[str, ...],
@@ -54,6 +66,11 @@ def command(
     normalize: bool,
     kind: str | None,
     frame_column: str | None,
+    time_column: str | None,
+    at: int | str | None,
+    moving: bool,
+    cache: int | None,
+    tf2: str | None,
     **options: Any,
 ) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
@@ -74,19 +91,29 @@ def command(
     of each header; the stamp and all other fields stay. Each 3x3 block C of a pose's covariance becomes R C R^T. A
     wrench is that about TARGET's origin: force R f, torque R m + t x R f. A twist is the velocity of the same rigid
     body at TARGET's origin: angular R w, linear R v + t x R w.
+
+    \b
+      printf 'stamp,x,y,z\n0.5,1,0,0\n2.5,1,0,0\n' | frametool apply examples/drive.yaml map lidar --time-column stamp
+
+    Stamps are decimal seconds (12.5) or nanoseconds (12500000000ns, or a name like stamp_ns), exact to the nanosecond.
+    A row at a time without data is a bad row, as --on-error says.
     """
     stream = Stream(options)
     output = Output("points", deg=deg, **options)
     if pose is None:
-        way, rest = _way_by_tree(arguments, more)
+        way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2), at)
+    elif time_column is not None or at is not None:
+        raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
         way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
-    if rest in ((), ("-",)) and (recording := _messages(stream.path)) is not None:
+    if time_column is not None:
+        _check_timed(rest, at)
+    elif rest in ((), ("-",)) and (recording := _messages(stream.path)) is not None:
         _move_messages(recording, kind, way, output, normalize=normalize)
         return 0
     if rest in ((), ("-",)):
-        wishes = _wishes(way, frame_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
-        outcome = stream.run(wishes, output)
+        wishes = _wishes(way, frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
+        outcome = stream.run(wishes, output, as_spelled=time_column is not None)
         if isinstance(outcome, int):
             return outcome
         rest = (outcome,)
@@ -97,17 +124,27 @@ def command(
     return 0
 
 
-def _wishes(way: Way, frame_column: str | None) -> Request:
-    """Say how a stream's rows move: all from one frame, or each from the one it names."""
-    fixed = way.from_frame(None, None) if way.has_source and frame_column is None else None
-    frames = () if fixed else (frame_column or "",)
+def _check_timed(records: tuple[str | Source, ...], at: int | str | None) -> None:
+    """Refuse what does not belong together with each row's own time."""
+    if at is not None:
+        raise click.UsageError("--time-column gives each row its own time; leave --at out")
+    if records not in ((), ("-",)):
+        raise click.UsageError("--time-column is for the rows of a stream; give records on the command line --at TIME")
+
+
+def _wishes(way: Way, frame_column: str | None, time_column: str | None) -> Request:
+    """Say how a stream's rows move: all from one frame, or each from the one it names; all alike, or in time."""
+    has_source = way.has_source and frame_column is None
+    timed = None if time_column is None else Timed(time_column, way.at_times, way.from_frame)
+    fixed = way.from_frame(None, None) if has_source and timed is None else None
+    frames = () if has_source else (frame_column or "",)
 
     def edge_of(own: str | None) -> Rigid:
         return way.from_frame(own, None)
 
     return Request(
-        Operation(left=fixed, moves=True), frames=frames, edge_of=None if fixed else edge_of, way=edge_of,
-        told=way.target,
+        Operation(left=fixed, moves=True), frames=frames, edge_of=edge_of if frames else None, way=edge_of,
+        timed=timed, told=way.target,
     )  # fmt: skip
 
 
@@ -125,6 +162,7 @@ class Way(NamedTuple):
 
     target: str | None
     from_frame: Callable[[str | None, int | None], Rigid]
+    at_times: Callable[[str | None, Any], Components]  # columns of such transforms, nan where there is no data
     has_source: bool  # whether all come from one frame
 
 
@@ -139,33 +177,46 @@ def move(record: Pose | Point, target_from_source: Rigid, target: str | None) ->
     return record._replace(position=(x, y, z), frame=target)
 
 
-def _way_by_tree(arguments: tuple[str, ...], more: Sequence[str]) -> tuple[Way, tuple[str | Source, ...]]:
-    """Take tree, target and, if one is named, source from the arguments; the rest are records."""
+def _way_by_tree(
+    arguments: tuple[str, ...], more: Sequence[str], chosen_rules: Rules, chosen: int | str | None
+) -> tuple[Way, tuple[str | Source, ...]]:
+    """Take tree, target and, if one is named, source from the arguments; the rest are records.
+
+    chosen: the time of all lookups, where one was chosen.
+    """
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
-    tree = load_tree(arguments[0], more)
+    tree = load_tree(arguments[0], more, chosen_rules)
     target, rest = frame_name(arguments[1], tree), arguments[2:]
     source = None
     if rest and not is_record(rest[0]):
         source, rest = frame_name(rest[0], tree), rest[1:]
 
-    def from_frame(own: str | None, at_ns: int | None) -> Rigid:
-        start = _settled(own, source)
-        if start is None:
-            raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
-        return tree.lookup(target, start, at_ns).components
+    if not {target, source or target} <= set(tree.frames):
+        tree.lookup(target, source or target)  # raises, and names the nearest frames
 
-    return Way(target, from_frame, source is not None), rest
+    def start(own: str | None) -> str:
+        if (settled := _settled(own, source)) is None:
+            raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
+        return settled
+
+    def from_frame(own: str | None, own_ns: int | None) -> Rigid:
+        return tree.lookup(target, start(own), own_ns if chosen is None else at_ns(chosen)).components
+
+    def at_times(own: str | None, times_ns: Any) -> Components:
+        return tree.lookup_many(target, start(own), times_ns, missing="nan").components
+
+    return Way(target, from_frame, at_times, source is not None), rest
 
 
 def _way_by_pose(pose: Pose) -> Way:
     """Move everything by one pose; where it names its frames, records must be given in its name."""
 
-    def from_frame(own: str | None, _at_ns: int | None) -> Rigid:
+    def from_frame(own: str | None, _own_ns: int | None = None) -> Rigid:
         _settled(own, pose.name)
         return pose.components
 
-    return Way(pose.parent, from_frame, has_source=True)
+    return Way(pose.parent, from_frame, lambda own, _times_ns: from_frame(own), has_source=True)
 
 
 def own_frame(record: Pose | Point) -> str | None:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
 
 
+PIECE = 1 << 14  # characters
+
+
 class Output:
     """Where results go and how they look: what the options of a command say."""
 
@@ -123,16 +126,22 @@ class Output:
         """Write text as it comes; into a file, whole or not at all."""
         if self.path is None or self.path == "-":
             for piece in pieces:
-                sys.stdout.write(piece)
+                _to_stdout(piece)
         else:
             write_whole(self.path, "".join(pieces), force=self.force)
 
     def text(self, text: str) -> None:
         """Write text to stdout, or to the file whole or not at all."""
         if self.path is None or self.path == "-":
-            sys.stdout.write(text)
+            _to_stdout(text)
         else:
             write_whole(self.path, text, force=self.force)
+
+
+def _to_stdout(text: str) -> None:
+    """Write to stdout in pieces: where it has no buffer, Python passes over what a closed pipe took only in part."""
+    for start in range(0, len(text), PIECE):
+        sys.stdout.write(text[start : start + PIECE])
 
 
 def _form_by_suffix(path: str | None, what: str) -> str | None:

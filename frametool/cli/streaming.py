@@ -97,8 +97,13 @@ class Stream:
             raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
         return self.path is not None or argument in (None, "-")
 
-    def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int | Source:
-        """Run the stream and give its exit status; or give the text of a few records that are to be shown otherwise."""
+    def run(
+        self, request: Request, output: Output, *, tables_only: bool = False, as_spelled: bool = False
+    ) -> int | Source:
+        """Run the stream and give its exit status; or give the text of a few records that are to be shown otherwise.
+
+        as_spelled: records cannot be shown otherwise than they are spelled.
+        """
         name = self.path or "stdin"
         with _opened(self.path) as stream:
             begin = stream.peek()
@@ -107,9 +112,10 @@ class Stream:
                 click.echo(f"frametool: {name}: read as {form} ({STREAMS[form]}), known by {known_by}", err=True)
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
-            if form in RECORDS and (output.told or form) != form:
+            if form in RECORDS and not as_spelled and (output.told or form) != form:
                 return Source(name, decode(stream.read(), name))
-            if form not in RECORDS and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
+            stays = as_spelled or form not in RECORDS
+            if stays and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
                 raise click.UsageError(
                     f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
                 )

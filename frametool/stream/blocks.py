@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FrametoolError, ValueInvalid
+from frametool.errors import ValueInvalid
 from frametool.formats.numbers import explain_angle, explain_number, parse_angle
 from frametool.geometry import arrays, rigid
 from frametool.stream.faults import NULL, STOP, Fault
+from frametool.stream.movers import NOWHERE, by_frame, by_time
 from frametool.stream.pieces import Const, Out
 from frametool.stream.rotations import read_rotations
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
@@ -25,10 +26,9 @@ if TYPE_CHECKING:
     from frametool.stream.pieces import Piece
     from frametool.stream.rows import Block
     from frametool.stream.shape import Shape, Target
+    from frametool.stream.when import Timed
     from frametool.text.arrays import Flags, Floats, Ints
     from frametool.text.spans import Spans
-
-NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 
 
 class Plan(NamedTuple):
@@ -37,6 +37,7 @@ class Plan(NamedTuple):
     shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
     pieces: the text of a result; null: what stands for each number of a row without one
     edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
+    timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
     yaml: numbers need a point before the exponent
     """
 
@@ -53,6 +54,8 @@ class Plan(NamedTuple):
     unwrap: bool = False
     yaml: bool = False
     edges: tuple[Rigid | None, ...] = ()
+    timed: Timed | None = None
+    sources: tuple[str | None, ...] = ()
 
 
 class State:
@@ -83,9 +86,9 @@ class Run:
         self.doubted: list[tuple[int, str]] = []
         self.count = len(block.places)
         numbers = self._read()
-        edge = None if plan.edge_of is None or not self.count else self._edges(plan.edge_of)
+        movers = self._movers()
         with np.errstate(all="ignore"):
-            moved = self._compute(list(np.ascontiguousarray(numbers.T)), edge, state)
+            moved = self._compute(list(np.ascontiguousarray(numbers.T)), movers, state)
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
         if self.reasons:
@@ -117,28 +120,24 @@ class Run:
             column -= shape.size
         return None
 
-    def _edges(self, edge_of: Callable[[str], Rigid]) -> Rigid:
-        """Give the edge of each row by its frame's name; a row whose frame has none is bad."""
-        table: list[Rigid] = []
-        known: dict[str, tuple[int, str]] = {}
-        for row, name in enumerate(self.block.frames):
-            if name not in known:
-                edge, problem = _edge(edge_of, name)
-                known[name] = len(table), problem
-                table.append(edge)
-            if known[name][1]:
-                self._blame(row, "", known[name][1])
-        chosen_rows = np.array([known[name][0] for name in self.block.frames], np.int64)
-        return tuple(np.array(column)[chosen_rows] for column in zip(*table, strict=True))  # type: ignore[return-value]
+    def _movers(self) -> list[Rigid | None]:
+        """Give the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
+        plan, block = self.plan, self.block
+        shapes = max(len(plan.shapes), 1)
+        if plan.timed is not None and self.count:
+            frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
+            return [by_time(plan.timed, *each, self._blame) for each in zip(block.stamps, frames, strict=True)]
+        if plan.edge_of is not None and self.count:
+            return [by_frame(plan.edge_of, block.frames, self._blame)] * shapes
+        return list(plan.edges) or [None] * shapes
 
-    def _compute(self, columns: list[Floats], edge: Rigid | None, state: State) -> list[Components]:
+    def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
         shapes, operation, moved = self.plan.shapes, self.plan.operation, []
         poses: list[Rigid] = []
         first = 0
-        for index, shape in enumerate(shapes):
+        for shape, mover in zip(shapes, movers, strict=False):
             numbers = columns[first : first + shape.size]
-            mover = edge if edge is not None else self.plan.edges[index] if self.plan.edges else None
             if shape.kind != POSE:
                 moved.append(operation.point(shape.kind, shape.position(numbers), mover))
             else:
@@ -148,7 +147,7 @@ class Run:
                     moved.append(operation.pose(self._with_previous(poses.pop(), state), mover, arrays))
             first += shape.size
         if poses or not shapes:
-            moved.append(operation.pose(poses or [NOWHERE], edge, arrays))
+            moved.append(operation.pose(poses or [NOWHERE], movers[0], arrays))
         return moved
 
     def _with_previous(self, pose: Rigid, state: State) -> list[Rigid]:
@@ -257,14 +256,6 @@ def _read_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001
     if unit is None or (unit == "deg") == degrees:
         return value
     return math.degrees(value) if degrees else math.radians(value)
-
-
-def _edge(edge_of: Callable[[str], Rigid], name: str) -> tuple[Rigid, str]:
-    """Give the edge of a frame, or why there is none."""
-    try:
-        return edge_of(name), ""
-    except FrametoolError as error:
-        return NOWHERE, str(error)
 
 
 def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.stream.blocks import Plan, Run, State
-from frametool.stream.documents import NULLS, attempt, end_of_record
-from frametool.stream.faults import NULL, STOP, Fault
+from frametool.stream.documents import attempt, end_of_record, null_of
+from frametool.stream.faults import NULL, SKIP, STOP, Fault
 from frametool.stream.pieces import In
 from frametool.stream.rows import Block, written
 from frametool.stream.run import Outcome
+from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
@@ -127,6 +128,8 @@ class Work:
                 problem = attempt(chunk[begin:stop], self.form, self.request, self.source, line, self._remember)
                 if isinstance(problem, Fault):
                     faults.append((start + begin, problem))
+                    if self.request.on_error == NULL:
+                        odd.append((start + begin, null_of(chunk[begin:stop]) + chunk[stop:after]))
                     continue
                 match = self._match(chunk, begin, stop)
             if match is None:
@@ -169,6 +172,8 @@ class Work:
                 runs.append((run, cut))
                 mended += len(run.mended)
                 bad = [int(cut.starts[row, 0]) for row in run.reasons]
+                if self.request.on_error == NULL:
+                    odd += [(int(cut.starts[row, 0]), _null_row(cut, row, text)) for row in run.reasons]
                 found += [
                     (int(cut.starts[row, 0]), Fault(run.block.line_of(row), *reason))
                     for row, reason in run.reasons.items()
@@ -178,8 +183,6 @@ class Work:
                     end = min(bad) if end is None else min(end, *bad)
         for run, _ in runs:
             groups += run.groups(end)
-        if self.request.on_error == NULL:
-            odd += [(place, NULLS[self.form]) for place, _ in faults]
         odd = [(place, piece) for place, piece in odd if end is None or place < end]
         if odd:
             from frametool.stream.rows import texts_as_rows
@@ -198,7 +201,8 @@ class Work:
         def line_of(row: int) -> int:
             return text.count(b"\n", 0, int(cut.starts[row, 0])) + learned.line
 
-        block = Block(numbers, parts, cut.starts[:, 0], line_of)
+        stamps = [without_quotes(parts[index]) for index in learned.stamps]
+        block = Block(numbers, parts, cut.starts[:, 0], line_of, stamps=stamps)
         return [Run(self._plan(learned), block, self.state)]
 
     def _plan(self, learned: Learned) -> Plan:
@@ -210,9 +214,11 @@ class Work:
         return plan._replace(
             normalize=request.normalize,
             precision=request.precision,
-            on_error=request.on_error,
+            on_error=SKIP if request.on_error == NULL else request.on_error,
             unwrap=request.unwrap,
             yaml=self.form == "yaml",
+            timed=request.timed,
+            sources=tuple(entry.holder.parent[0] for entry in learned.entries),
         )
 
 
@@ -236,6 +242,12 @@ def _cut_chunk(learned: Learned, chunk: bytes, offset: int) -> tuple[Cut | None,
 def _as_cut(learned: Learned, spans: Sequence[tuple[tuple[int, int], ...]]) -> Cut:
     found = np.fromiter(chain.from_iterable(chain.from_iterable(spans)), np.int64).reshape(len(spans), -1, 2)
     return Cut(learned, np.ascontiguousarray(found[:, :, 0]), np.ascontiguousarray(found[:, :, 1]))
+
+
+def _null_row(cut: Cut, row: int, text: bytes) -> bytes:
+    """Give what stands for a record without a result, with what parts it from the next."""
+    begin, end, after = int(cut.starts[row, 0]), int(cut.starts[row, -1]), int(cut.ends[row, -1])
+    return null_of(text[begin:end]) + text[end:after]
 
 
 def _numbers(learned: Learned, data: np.ndarray, starts: Ints, ends: Ints) -> Spans:

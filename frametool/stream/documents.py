@@ -6,7 +6,8 @@ import re
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, FrametoolError
-from frametool.stream.faults import NULL, STOP, Fault
+from frametool.stream.faults import NULL, SKIP, STOP, Fault
+from frametool.stream.json_array import with_commas_between
 from frametool.stream.learned import learn
 from frametool.stream.run import Outcome, mapped
 from frametool.stream.single import result_of
@@ -20,10 +21,8 @@ if TYPE_CHECKING:
 
 FEW = 16  # records at the end of which a stream that is already complete needs no numpy
 SMALL = 1 << 14  # bytes
-NULLS = {"json": b"null\n", "yaml": b"null\n---\n"}
 _DOCUMENT_END = re.compile(rb"^---[ \t]*\r?\n", re.MULTILINE)
-_ARRAY = re.compile(rb"\s*\[\s*(?:\{|$)")
-_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|[{}\[\]]', re.DOTALL)
+_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*(?:"|\\?\Z)|[{}\[\]]', re.DOTALL)  # a string that is cut off hides its brackets
 _SEVERAL = re.compile(rb"\}\s*,?\s*\{")
 _LINE = re.compile(rb"[^\n]*\n|[^\n]+\Z")
 _AFTER_RECORD = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
@@ -35,6 +34,16 @@ def run_records(
     stream: Source, form: str, request: Request, *, source: str, jobs: int = 1, size: int = 0
 ) -> Generator[Outcome]:
     """Give the outcomes of a stream of records."""
+    outcomes = _outcomes(stream, form, request, source=source, jobs=jobs, size=size)
+    try:
+        yield from with_commas_between(outcomes) if form == "json" and request.on_error == SKIP else outcomes
+    finally:
+        outcomes.close()  # ends the processes of several jobs
+
+
+def _outcomes(
+    stream: Source, form: str, request: Request, *, source: str, jobs: int, size: int
+) -> Generator[Outcome]:
     options = {"size": size} if size else {}
     splitter = Splitter(form)
     blocks = read_blocks(stream, whole=splitter.whole, **options)
@@ -49,9 +58,8 @@ def run_records(
     from frametool.stream.bulk import Work
 
     work = Work(splitter, form, request, source)
-    yield from mapped(
-        work, _again(first, second, blocks), 1 if request.operation.of == "previous" or request.unwrap else jobs
-    )
+    jobs = 1 if request.operation.of == "previous" or request.unwrap else jobs
+    yield from mapped(work, _again(first, second, blocks), jobs)
 
 
 def _again(first: bytes, second: bytes | None, blocks: Iterator[bytes]) -> Iterator[bytes]:
@@ -81,7 +89,6 @@ class Splitter:
         """Know the form; whether JSON's records are lines shows in the first one."""
         self.form = form
         self.lines: bool | None = None if form == "json" else False
-        self.depth = 0
 
     def whole(self, text: bytes) -> int:
         """Give how many bytes are whole records."""
@@ -89,8 +96,9 @@ class Splitter:
             ends = [found.end() for found in _DOCUMENT_END.finditer(text)]
             return ends[-1] if ends else 0
         if self.lines is None:
-            self.lines = _first_line_is_whole(text)
-            self.depth = int(not self.lines and bool(_ARRAY.match(text.removeprefix(MARK))))
+            self.lines = _first_line_is_whole(text[: whole_lines(text)])
+        if self.lines is None:
+            return 0
         return whole_lines(text) if self.lines else self._pretty(text)[1]
 
     def records(self, text: bytes) -> list[tuple[int, int]]:
@@ -98,7 +106,7 @@ class Splitter:
         if self.form == "yaml":
             return _documents(text)
         if self.lines is None:
-            self.whole(text)
+            self.lines = _first_line_is_whole(text)
         if not self.lines:
             return self._pretty(text)[0]
         return [span for found in _LINE.finditer(text) for span in self._in_line(text, found.start(), found.end())]
@@ -127,8 +135,8 @@ class Splitter:
         return found, end
 
 
-def _first_line_is_whole(text: bytes) -> bool:
-    """Tell whether JSON comes as one record a line, as in JSON Lines or an array written so."""
+def _first_line_is_whole(text: bytes) -> bool | None:
+    """Tell whether JSON comes as one record a line, as in JSON Lines or an array of lines; None if none begins."""
     for line in text.removeprefix(MARK).splitlines():
         inner = line.strip().removeprefix(b"[").strip(b" \t,")
         if inner in (b"", b"]"):
@@ -139,7 +147,7 @@ def _first_line_is_whole(text: bytes) -> bool:
             if depth < 0:
                 break
         return depth <= 0
-    return True
+    return None
 
 
 def _trimmed(text: bytes, start: int, end: int) -> tuple[int, int] | None:
@@ -182,16 +190,22 @@ def _singly(text: bytes, records: list[tuple[int, int]], form: str, request: Req
         result = attempt(text[start:end], form, request, source, line, _rendered(request))
         if isinstance(result, Fault):
             faults.append(result)
-            out.append(b"null" if request.on_error == NULL else b"")
-            if request.on_error != NULL:
+            if request.on_error == NULL:
+                out.append(null_of(text[start:end]))
+            else:
                 at = end_of_record(text, end, form)
             if request.on_error == STOP:
-                out.pop()
                 at = len(text)
                 break
         else:
             out.append(result)
     yield Outcome(b"".join([*out, text[at:]]), faults, len(records), text.count(b"\n"), size=len(text))
+
+
+def null_of(record: bytes) -> bytes:
+    """Give what stands for a record without a result; its line end, if it has one, stays."""
+    body = record.rstrip(b"\r\n")
+    return b"null" + record[len(body) :]
 
 
 def _rendered(request: Request) -> Callable[..., bytes]:
@@ -211,6 +225,7 @@ def attempt(
     text: bytes, form: str, request: Request, source: str, line: int, use: Callable[..., bytes]
 ) -> bytes | Fault:
     """Learn from a record and use it, or say what is wrong with it; `line` counts from 0."""
+    record = None
     try:
         record = learn(_decoded(text, source, line), request, json=form == "json", source=source, line=line + 1)
         if record is None:
@@ -220,7 +235,8 @@ def attempt(
         column = getattr(error, "column_name", "") or (str(error.column) if error.column else "")
         return Fault(max(error.line, 1) - 1, column, error.message)
     except FrametoolError as error:
-        return Fault(line, "", str(error))
+        below = record.line if record else 0
+        return Fault(line + below, getattr(error, "column_name", ""), str(error))
 
 
 def _decoded(text: bytes, source: str, line: int) -> str:

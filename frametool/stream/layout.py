@@ -41,7 +41,7 @@ Column: TypeAlias = Kept | New | Told
 class Layout(NamedTuple):
     """The columns of the output, and from where in a row its pieces come.
 
-    places: the columns our numbers are read from; frames: those that name frames
+    places: the columns our numbers are read from; frames: those that name frames; time: that of the stamps
     stretches: (first, last column, where it begins, where it ends) of the text that passes
     """
 
@@ -52,6 +52,7 @@ class Layout(NamedTuple):
     stretches: tuple[Stretch, ...]
     delimiter: bytes
     null: bytes
+    time: int | None = None
 
     def header(self, raw: Sequence[bytes]) -> bytes:
         """Give the output's header, the kept names as they were written."""

@@ -18,6 +18,7 @@ from frametool.formats.values import Misfit, NotARotation, Reading
 from frametool.stream.edits import Editor, target_of
 from frametool.stream.holders import find_holders
 from frametool.stream.pieces import In, Out
+from frametool.stream.when import stamp_path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,17 +47,19 @@ SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 
 
 class Entry(NamedTuple):
-    """One point or pose of a record: what it is, how its result is written, and the pose that moves it, if one does."""
+    """One point or pose of a record: what it is, how its result is written, and its mover, or its stamp."""
 
     holder: Holder
     target: Target
     edge: Rigid | None
+    stamp: tuple[str | int, ...] | None = None
 
 
 class Learned:
     """A record, and what holds for all that are alike.
 
-    segments: the stretches of its text; numbers: those that hold our numbers, in order; pieces: of the result
+    segments: the stretches of its text; numbers: those that hold our numbers, in order; stamps: those of each entry's
+    stamp; pieces: of the result
     """
 
     def __init__(
@@ -68,11 +71,14 @@ class Learned:
         self.json = json
         self._nodes = nodes
         slots = _slots(entries, nodes)
+        stamps = [_span(nodes, entry.stamp) for entry in entries if entry.stamp is not None]
         number = re.compile(JSON_NUMBER if json else YAML_NUMBER)
         self.regular = all(slot is not None and number.fullmatch(text, *slot) for slot in slots)
         self.values = tuple(value for entry in entries for value in entry.holder.values)
-        self.stretches, self.pieces = _cut(text, sorted({slot for slot in slots if slot is not None}), edits)
+        cuts = sorted({slot for slot in (*slots, *stamps) if slot is not None})
+        self.stretches, self.pieces = _cut(text, cuts, edits)
         self.numbers = tuple(self.stretches.index(slot) for slot in slots if slot is not None)
+        self.stamps = tuple(self.stretches.index(stamp) for stamp in stamps)
         first = min((slot[0] for slot in slots if slot is not None), default=0)
         self.line = text.count("\n", 0, first)
 
@@ -144,6 +150,12 @@ def _slots(entries: Sequence[Entry], nodes: Sequence[Node]) -> list[tuple[int, i
             node = _node(nodes, path) if path is not None else None
             found.append(None if node is None else (node.start + bool(node.quote), node.end - bool(node.quote)))
     return found
+
+
+def _span(nodes: Sequence[Node], path: tuple[str | int, ...]) -> tuple[int, int]:
+    """Give where a scalar stands, with its quotes."""
+    node = _node(nodes, path)
+    return node.start, node.end
 
 
 def _node(nodes: Sequence[Node], path: tuple[str | int, ...]) -> Node:
@@ -247,10 +259,12 @@ def _entries(document: Any, request: Request, source: Source) -> list[Entry]:
         made = []
         for holder in holders:
             placed = _below_document(holder, document.index)
-            edge = request.way(placed.parent[0]) if request.way else None
+            timed = request.timed
+            stamp = (document.index, *stamp_path(document.value, holder.path, timed.name)) if timed else None
+            edge = request.way(placed.parent[0]) if request.way and not timed else None
             if request.way is None and request.rename:
                 request.rename(placed.parent[0], placed.name[0])
-            made.append(Entry(placed, target_of(placed, request), edge))
+            made.append(Entry(placed, target_of(placed, request), edge, stamp))
     except Misfit as misfit:
         error = format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key)
         error.__cause__ = misfit if isinstance(misfit, NotARotation) else None

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.kinds import Rigid
     from frametool.geometry.representations import Notation
+    from frametool.stream.when import Timed
 
 
 class Request(NamedTuple):
@@ -22,7 +23,8 @@ class Request(NamedTuple):
     notations: those of the result (none: as read); columns: which are ours, one entry a pose
     keep, prefix: results beside what they come from, under other names
     frames: columns that name a row's frame, edge_of: the pose that moves from it; told: the frame results are in
-    way: the pose that moves a record given in a frame; rename: a record's parent and name to those of its result
+    way: the pose that moves a record given in a frame; timed: those that do so in time, in place of both
+    rename: a record's parent and name to those of its result
     """
 
     operation: Operation = Operation()
@@ -40,6 +42,7 @@ class Request(NamedTuple):
     frames: tuple[str, ...] = ()
     edge_of: Callable[[str], Rigid] | None = None
     way: Callable[[str | None], Rigid] | None = None
+    timed: Timed | None = None
     rename: Callable[[str | None, str | None], tuple[str | None, str | None]] | None = None
     told: str | None = None
     unwrap: bool = False

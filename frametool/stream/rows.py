@@ -37,7 +37,7 @@ class Block(NamedTuple):
     numbers: (n, c) the cells with our numbers; parts: spans (n,) that pieces refer to
     places: (n,) where each row stands among all that the block holds; line_of: the line of a row, from 0
     odd: place and text of what passes as it is; broken: rows that have no numbers
-    frames: the name of the frame each row is given in, if rows say so
+    frames: the name of the frame each row is given in, if rows say so; stamps: spans (n,), one for each shape
     """
 
     numbers: Spans
@@ -47,6 +47,7 @@ class Block(NamedTuple):
     odd: Sequence[tuple[int, bytes]] = ()
     broken: Sequence[Broken] = ()
     frames: Sequence[str] = ()
+    stamps: Sequence[Spans] = ()
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:

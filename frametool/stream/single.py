@@ -5,10 +5,11 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from frametool.errors import ValueInvalid
+from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import floats, rigid
 from frametool.stream.pieces import Const, In, Out
 from frametool.stream.shape import IDENTITY, POSE, pose_of
+from frametool.stream.when import read_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,9 +24,9 @@ def result_of(record: Learned, request: Request) -> str:
     numbers: list[float] = []
     locked = False
     first = 0
-    for entry in record.entries:
+    for entry, edge in zip(record.entries, _edges(record, request), strict=True):
         count = len(entry.holder.values)
-        parts = _moved(entry, record.values[first : first + count], request)
+        parts = _moved(entry, edge, record.values[first : first + count], request)
         pose = parts[:7] if len(parts) > 3 else parts
         numbers += [*entry.target.numbers(pose, floats), *parts[7:]]
         locked = locked or bool(entry.target.locked(pose))
@@ -36,16 +37,29 @@ def result_of(record: Learned, request: Request) -> str:
     return _text(record, [write(number) for number in numbers], locked=locked)
 
 
-def _moved(entry: Entry, values: Sequence[float], request: Request) -> Components:
+def _edges(record: Learned, request: Request) -> list[Rigid | None]:
+    """Give the poses that move the entries, at their own times if they have such."""
+    timed, segments = request.timed, record.segments()
+    if timed is None:
+        return [entry.edge for entry in record.entries]
+    try:
+        stamps = [read_stamp(segments[index], in_ns=timed.in_ns) for index in record.stamps]
+        return [timed.pose(entry.holder.parent[0], at) for entry, at in zip(record.entries, stamps, strict=True)]
+    except FrametoolError as error:
+        error.column_name = timed.name  # type: ignore[attr-defined]
+        raise
+
+
+def _moved(entry: Entry, edge: Rigid | None, values: Sequence[float], request: Request) -> Components:
     shape = entry.holder.shape
     if shape.kind != POSE:
-        return request.operation.point(shape.kind, shape.position(values), entry.edge)
+        return request.operation.point(shape.kind, shape.position(values), edge)
     rotation: Components = IDENTITY
     if shape.notation is not None:
         given = shape.rotation(values)
         rotation = shape.notation.checked_quaternion(given, floats, degrees=shape.degrees, normalize=request.normalize)
     pose: Rigid = pose_of(shape.position(values), rotation)
-    return request.operation.pose([rigid.inverse(*pose) if shape.inverse else pose], entry.edge, floats)
+    return request.operation.pose([rigid.inverse(*pose) if shape.inverse else pose], edge, floats)
 
 
 def number_writer(precision: int | None, *, yaml: bool) -> Callable[[float], str]:

@@ -129,6 +129,7 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
     if layout.frames:
         named = [_texts(cells, place) for place in layout.frames]
         frames = ["\0".join(names) for names in zip(*named, strict=True)]
+    stamps = [] if layout.time is None else [without_quotes(cells.column(layout.time))]
     odd, broken = [], []
     if len(cells.rows) < len(cells.counts):
         for line in cells.odd_lines().tolist():
@@ -137,7 +138,9 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
                 odd.append((line, raw))
             else:
                 broken.append(_broken(table, layout, cells, line, raw))
-    return Block(numbers, parts, cells.rows, lambda row: cells.lines_before(int(cells.rows[row])), odd, broken, frames)
+    return Block(
+        numbers, parts, cells.rows, lambda row: cells.lines_before(int(cells.rows[row])), odd, broken, frames, stamps
+    )
 
 
 def _as_slice(places: Sequence[int]) -> slice | list[int]:

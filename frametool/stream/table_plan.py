@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, did_you_mean
+from frametool.errors import FormatError, alternatives
 from frametool.geometry.representations import notation
 from frametool.stream.blocks import Plan
 from frametool.stream.header import Pose, find_poses, named_pose
@@ -37,9 +37,11 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     if table.header:
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
+    layout = layout._replace(time=_time_column(table, request, source))
     return Plan(
         shapes, (target,), request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         request.edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
+        timed=request.timed,
     ), layout  # fmt: skip
 
 
@@ -113,14 +115,19 @@ def _target(shapes: Sequence[Shape], request: Request) -> Target:
 def _only_turns_around(request: Request) -> bool:
     """Tell whether rows without a rotation have none afterwards."""
     operation = request.operation
-    return operation.left is None and operation.right is None and not operation.of and request.edge_of is None
+    return operation.left is operation.right is None and not operation.of and not _by_row(request)
+
+
+def _by_row(request: Request) -> bool:
+    """Tell whether each row has its own pose that moves it."""
+    return request.edge_of is not None or request.timed is not None
 
 
 def _shifts(request: Request) -> bool:
     """Tell whether rows without a position may have one afterwards."""
     operation = request.operation
     fixed = (operation.left, operation.right, operation.fixed)
-    return request.edge_of is not None or any(pose is not None and any(pose[:3]) for pose in fixed)
+    return _by_row(request) or any(pose is not None and any(pose[:3]) for pose in fixed)
 
 
 def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ...]:
@@ -137,9 +144,18 @@ def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ..
         return (names.index(found[0]),)
     for name in request.frames:
         if name not in names:
-            near = did_you_mean(name, names)
-            raise FormatError(f"no column {name!r}{near}; columns: {', '.join(names)}", source=source, line=1)
+            raise FormatError(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
     return tuple(names.index(name) for name in request.frames)
+
+
+def _time_column(table: Table, request: Request, source: str) -> int | None:
+    """Find the column of the stamps, by its name or, where there are none, by its number from 1."""
+    if request.timed is None:
+        return None
+    name, names = request.timed.name, table.names or tuple(map(str, range(1, table.width + 1)))
+    if name not in names:
+        raise FormatError(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
+    return names.index(name)
 
 
 def _columns(

@@ -30,7 +30,7 @@ _GREATEST_EXPONENT = 240
 _MINUS, _PLUS, _SMALL_E = b"-+e"
 _LOWER_CASE = 0x20
 # The lowest 0 .. 8 bytes of a word.
-_LOWEST = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
+LOWEST = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
 
 
 class _Mantissa(NamedTuple):
@@ -52,7 +52,7 @@ def parse_floats(cells: Spans) -> tuple[Floats, Ints]:
     starts, ends = cells.starts.ravel(), cells.ends.ravel()
     # Where the first cell begins with a blank, all but a few do.
     if starts.size and _is_blank(cells.data[starts[:1]])[0]:
-        starts, ends = _trimmed(cells.data, starts, ends)
+        starts, ends = trimmed(cells.data, starts, ends)
     values, sure = _parse_plain(cells.data, starts, ends)
     rest = np.flatnonzero(~sure)
     if rest.size:
@@ -87,7 +87,7 @@ def _parse_plain(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
 
 def _parse_decorated(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
     """Read cells with blanks around them or with exponents, as `_parse_plain` does."""
-    starts, ends = _trimmed(data, starts, ends)
+    starts, ends = trimmed(data, starts, ends)
     begins, negative = _after_sign(data, starts)
     ends, exponents, sure = _split_exponent(data, begins, ends)
     mantissa, is_number = _read_mantissa(data, begins, ends)
@@ -105,7 +105,7 @@ def _after_sign(data: Bytes, starts: Ints) -> tuple[Ints, Flags]:
     return starts + (negative | (first == _PLUS)), negative
 
 
-def _trimmed(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints]:
+def trimmed(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints]:
     """Leave out the blanks and tabs around cells."""
     while (blank := _is_blank(data.take(starts)) & (starts < ends)).any():
         starts = starts + blank
@@ -163,7 +163,7 @@ def _fraction_digits(data: Bytes, starts: Ints, length: Ints, words: int) -> lis
     characters = windows(data, 8 * words)[starts].view("<u8").reshape(-1, words)
     digits = []
     for word in range(words):
-        kept = _LOWEST.take(length - 8 * word, mode="clip")
+        kept = LOWEST.take(length - 8 * word, mode="clip")
         kept &= characters[:, word] ^ ZEROS
         digits.append(kept)
     return digits

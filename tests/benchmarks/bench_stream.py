@@ -7,6 +7,7 @@ out. Ratios of one run count; seconds do not travel. `--rows N`, `--rounds N`.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import resource
 import shutil
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+START_NS = 1_700_000_000_000_000_000
 ROOT = Path(__file__).parents[2]
 TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
 POSE = "{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
@@ -31,7 +33,7 @@ PANDAS_POINTS = """
 import pandas, sys, numpy as np
 from scipy.spatial.transform import Rotation as R
 d = pandas.read_csv(sys.argv[1])
-d[["x", "y", "z"]] = R.from_euler("z", 90, degrees=True).apply(d[["x", "y", "z"]].to_numpy()) + [1, 2, 3]
+d[["x", "y", "z"]] = R.from_euler("z", 90, degrees=True).apply(d[["x", "y", "z"]].to_numpy(copy=True)) + [1, 2, 3]
 d.to_csv(sys.stdout, index=False, float_format="%.6f")
 """
 SCIPY_RPY = """
@@ -55,6 +57,18 @@ for d in yaml.load_all(open(sys.argv[1]), yaml.CSafeLoader):
 """
 
 
+def chain(rng: np.random.Generator) -> str:
+    """Give a chain of ten edges that move for 100 s, 100 samples each, as records."""
+    records = [
+        {"name": f"f{edge + 1}", "parent": f"f{edge}", "samples": [
+            {"stamp_ns": START_NS + sample * 10**9, "xyz": rng.normal(size=3).tolist(), "rpy": rng.normal(size=3).tolist()}
+            for sample in range(101)
+        ]}
+        for edge in range(10)
+    ]  # fmt: skip
+    return json.dumps(records)
+
+
 def generate(folder: Path, rows: int) -> dict[str, Path]:
     """Write the inputs, once."""
     rng = np.random.default_rng(1)
@@ -63,8 +77,15 @@ def generate(folder: Path, rows: int) -> dict[str, Path]:
     turns /= np.linalg.norm(turns, axis=1)[:, None]
     files = {
         name: folder / name
-        for name in ("points.csv", "long.csv", "turns.csv", "points.jsonl", "points.yaml", "points.txt")
+        for name in ("points.csv", "long.csv", "turns.csv", "points.jsonl", "points.yaml", "points.txt", "chain.json")
     }
+    files["stamped.csv"] = folder / "stamped.csv"
+    files["chain.json"].write_text(chain(rng))
+    with files["stamped.csv"].open("w") as out:
+        out.write("stamp,x,y,z,tag\n")
+        for i, (x, y, z) in enumerate(points.tolist()):
+            at = START_NS + i * 10**11 // rows
+            out.write(f"{at // 10**9}.{at % 10**9:09d},{x:.6f},{y:.6f},{z:.6f},t{i % 1000:03d}\n")
     with (
         files["points.csv"].open("w") as six,
         files["long.csv"].open("w") as long,
@@ -95,7 +116,7 @@ def generate(folder: Path, rows: int) -> dict[str, Path]:
 
 def contests(files: dict[str, Path]) -> list[tuple[str, int, dict[str, tuple[list[str], float | None]]]]:
     """List name, divisor of the rows, and the commands with the goal each peer sets."""
-    csv, long, turns, lines, documents, plain = (str(files[name]) for name in files)
+    csv, long, turns, lines, documents, plain, tree, stamped = (str(files[name]) for name in files)
     move = [*TOOL, "apply", "--transform", POSE, "-i"]
     python = [sys.executable, "-c"]
     six = ["--precision", "6"]
@@ -130,6 +151,9 @@ def contests(files: dict[str, Path]) -> list[tuple[str, int, dict[str, tuple[lis
         }),
         ("YAML documents", 10, {
             "frametool": ([*move, documents], None), "yaml": ([*python, YAML_DOCUMENTS, documents], 3.0),
+        }),
+        ("stamped points through ten moving edges, each at its own time", 1, {
+            "frametool": ([*TOOL, "apply", tree, "f0", "f10", "--time-column", "stamp", "-i", stamped, *six], None),
         }),
     ]  # fmt: skip
 

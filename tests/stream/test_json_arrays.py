@@ -1,0 +1,50 @@
+"""JSON arrays stay JSON whichever records are left out, in every layout and for every size of block."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from flow import MOVE, flow
+from hypothesis import given
+from hypothesis import strategies as st
+
+GOOD, TEXT, HUGE = '{"id": "a,]", "x": 1, "y": 2, "z": 3}', '{"x": "a", "y": 2, "z": 3}', '{"x": 1e999, "y": 2, "z": 3}'
+LAYOUTS = [
+    "[{},{}]\n", "[\n{},\n{}\n]\n", "[{},\n {}]", "[\n  {} ,\n  {}\n]\n", "[\n{}\n,{}\n]\n", "[ {} , {} ]\n", "[{}\n,\n{}\n]",
+]  # fmt: skip
+
+
+def array(layout: str, records: list[str]) -> str:
+    begin, between, end = layout.split("{}")
+    return begin + between.join(records) + end
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("is_broken_up", [False, True])
+@given(
+    records=st.lists(st.sampled_from([GOOD, TEXT, HUGE]), min_size=1, max_size=24), size=st.sampled_from([0, 1, 30, 200])
+)
+def test_what_is_left_is_an_array(layout: str, records: list[str], size: int, *, is_broken_up: bool) -> None:
+    shown = [record.replace(', "y"', ',\n"y"') for record in records] if is_broken_up else records
+    text = array(layout, shown).encode()
+    kept = flow(text, MOVE._replace(on_error="skip"), "json", size=size)
+    good = records.count(GOOD)
+    assert json.loads(kept.text) == [{"id": "a,]", "x": -1.0, "y": 3.0, "z": 6.0}] * good
+    assert kept.status == (0 if good == len(records) else 3)
+    nulls = flow(text, MOVE._replace(on_error="null"), "json", size=size)
+    assert [each is not None for each in json.loads(nulls.text)] == [record == GOOD for record in records]
+
+
+@given(records=st.lists(st.sampled_from([GOOD, TEXT, HUGE]), min_size=1, max_size=24), size=st.sampled_from([0, 1, 100]))
+def test_each_line_without_a_result_is_null(records: list[str], size: int) -> None:
+    outcome = flow("".join(f"{record}\n" for record in records).encode(), MOVE._replace(on_error="null"), "json", size=size)
+    assert [json.loads(line) is not None for line in outcome.text.splitlines()] == [each == GOOD for each in records]
+
+
+@given(records=st.lists(st.sampled_from([GOOD, TEXT, HUGE]), min_size=1, max_size=24), size=st.sampled_from([0, 1, 100]))
+def test_each_document_without_a_result_is_null(records: list[str], size: int) -> None:
+    text = "".join(f"{record}\n---\n" for record in records).encode()
+    outcome = flow(text, MOVE._replace(on_error="null"), "yaml", size=size)
+    documents = outcome.text.decode().removesuffix("\n---\n").split("\n---\n")
+    assert [document != "null" for document in documents] == [record == GOOD for record in records]
