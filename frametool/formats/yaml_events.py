@@ -25,6 +25,7 @@ from frametool.formats.limits import DEEPEST, MOST_CONTAINERS, too_much
 from frametool.formats.places import END, LEAF, LIST, MAP, find_marks
 from frametool.formats.source import Source, error_at, place_of, placed_error
 from frametool.formats.yaml_errors import translated
+from frametool.formats.yaml_lines import put_back, split_run
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -67,12 +68,24 @@ def parse_yaml(source: Source, allowed_tags: frozenset[str]) -> list[Value]:
     tags = allowed_tags if readable is source else allowed_tags | _OPENCV_TAGS
     try:
         with paused_collector():
-            return _Builder(readable, tags).build()
+            return _read_by_lines(readable, tags) or _Builder(readable, tags).build()
     except FormatError as error:
         if readable is source:
             raise
         place = _unshift((error.line, error.column), dict(_widened(source.text)))
         raise placed_error(source, *place, error.message) from None
+
+
+def _read_by_lines(source: Source, tags: frozenset[str]) -> list[Value] | None:
+    """Read a text that ends in a long list of plain flow maps; None for others and for mistakes."""
+    split = split_run(source.text)
+    if split is None:
+        return None
+    try:
+        values = _Builder(Source(source.name, split[0]), tags).build()
+    except FormatError:
+        return None
+    return values if put_back(values, split[1]) else None
 
 
 def readable_yaml(source: Source) -> Source:
