@@ -102,6 +102,17 @@ def test_echo_tells_of_times_without_data_and_goes_on(run: Run) -> None:
     assert "2 times without data" in found.err
 
 
+@pytest.mark.parametrize("times", [("--start", "1800000000"), ("--stop", "0"), ("--start", "1", "--stop", "2")])
+def test_echo_without_any_data_is_a_failed_lookup(run: Run, times: tuple[str, ...]) -> None:
+    found = run("echo", *BOTH, "map", "cam", *times, files=FILES)
+    assert (found.status, found.out) == (4, "")
+    assert "no data for map -> base" in found.err
+
+
+def test_echo_cannot_stop_before_it_starts(run: Run) -> None:
+    assert run("echo", *BOTH, "map", "cam", "--start", "3", "--stop", "1", files=FILES).status == 2
+
+
 def test_echo_of_what_stands_still_has_no_time(run: Run) -> None:
     out = run("echo", "tf_static.txt", "base", "cam", files=FILES).out
     assert "At any time: the frames stand still" in out
@@ -155,6 +166,18 @@ def test_static_refuses_what_moves_and_what_is_no_rotation(run: Run) -> None:
     assert run("static", "tf.txt", files=FILES).err == "frametool: frames move and cannot be published as static: base\n"
     assert run("static", "--qz", "0.5", "--frame-id", "a", "--child-frame-id", "b").status == 1
     assert run("static", "1", "2", "3").status == 2
+
+
+@pytest.mark.parametrize("names", [("a", ""), ("", "a")])
+def test_static_refuses_an_empty_name_in_either_spelling(run: Run, names: tuple[str, str]) -> None:
+    assert run("static", *"000000", "1", *names).status == 2
+    assert run("static", "--frame-id", names[0], "--child-frame-id", names[1]).status == 2
+
+
+@pytest.mark.parametrize("command", ["", "rosrun tf static_transform_publisher "])
+def test_calls_in_the_background_are_read_from_scripts(run: Run, command: str) -> None:
+    text = f"{command}1 0 0 0 0 0 1 a b 100 &\n"
+    assert run("tree", "-", stdin=text).out == run("tree", "-", stdin=text.replace(" &", "")).out != ""
 
 
 # --- apply ---------------------------------------------------------------------------------------------------------
@@ -282,6 +305,10 @@ def test_errors_fail_and_warnings_fail_when_strict(run: Run, rule: str, plain: i
     files = {"in.txt": (TREES | RECORDINGS)[rule]}
     assert run("check", "in.txt", files=files).status == plain
     assert run("check", "in.txt", "--strict", files=files).status == strict
+
+
+def test_the_summary_is_there_for_notes_alone(run: Run) -> None:
+    assert run("check", "in.txt", files={"in.txt": TREES["several-roots"]}).err == "frametool: 1 note\n"
 
 
 def test_findings_are_lines_that_editors_and_github_understand(run: Run) -> None:
