@@ -137,6 +137,28 @@ def test_monitor_tells_the_common_interval_of_a_chain(run: Run) -> None:
     assert (chain["kind"], chain["first_ns"], chain["last_ns"]) == ("chain", EPOCH + BILLION, EPOCH + 2 * BILLION + 1)
 
 
+def test_a_gap_is_between_stamps_whatever_order_they_came_in(run: Run) -> None:
+    text = moving(*((at, 0.1 * at) for at in (0, 1, 5, 2, 3, 4, 6)))
+    entry = json.loads(run("monitor", "-", "-f", "json", stdin=text).out)
+    assert (entry["gap_s"], entry["gap_until_ns"]) == (1.0, EPOCH + BILLION)
+    assert entry["backward"] == 3
+    assert "comes after a later stamp (and 2 more of these)" in run("check", "-", stdin=text).out
+
+
+def test_monitor_names_each_parent_once_and_counts_the_changes(run: Run) -> None:
+    entry = json.loads(run("monitor", "-", "-f", "json", stdin=moving(*STEADY, parents="mo")).out)
+    assert (entry["parents"], entry["parent_changes"]) == ("map, odom", 19)
+    header, row = run("monitor", "-", "-f", "text", stdin=moving(*STEADY, parents="mo")).out.splitlines()
+    assert (header.split()[-1], row.split()[-1]) == ("reparented", "19")
+
+
+@pytest.mark.parametrize("begin", [1, 9])
+def test_monitor_says_whether_the_edges_of_a_chain_overlap(run: Run, begin: int) -> None:
+    late = dump(*(transform("base", "arm", EPOCH + (begin + at) * BILLION) for at in range(5)))
+    found = run("monitor", "tf.txt", "--with", "arm.txt", "map", "arm", "-f", "json", files=FILES | {"arm.txt": late})
+    assert [json.loads(line)["overlap"] for line in found.out.splitlines()] == [None, None, begin < 2]
+
+
 def test_monitor_knows_the_delay_from_a_csv_recording(run: Run) -> None:
     rows = [f"{EPOCH + at + 2_000_000},0,{EPOCH + at},map,base,0,0,0,0,0,0,1" for at in (0, BILLION)]
     text = "\n".join(["%time,field.transforms0.header.seq,rest", *rows]) + "\n"
@@ -259,6 +281,7 @@ RECORDINGS = {
     "backward": moving(*STEADY, (0.55, 0.055)),
     "gap": moving(*STEADY, (5.0, 0.2)),
     "jump": moving(*STEADY, (2.0, 7.0)),
+    "disagreement": moving(*((at + late, x + 9 * (late > 0)) for at, x in STEADY for late in (0, 5e-9))),
     "reparented": moving(*STEADY[:2]) + moving(*STEADY[2:], parents="o"),
     "flicker": moving(*STEADY, parents="mo"),
     "static-and-moving": moving(*STEADY),
@@ -289,6 +312,17 @@ def test_a_sound_tree_and_a_sound_recording_have_no_findings(run: Run) -> None:
 
 def test_every_rule_but_the_rest_is_tested() -> None:
     assert {*TREES, *RECORDINGS} == set(RULES) - {"odd"}
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2])
+def test_check_and_lookup_report_a_cycle_alike(run: Run, turn: int) -> None:
+    edges = [("a", "b"), ("b", "c"), ("c", "a")]
+    order = [*edges[turn:], *edges[:turn]]
+    text = dump(*(transform(*edge, EPOCH + at) for edge in order for at in range(2)))
+    (cycle,) = (each for each in findings(run, text) if each["rule"] == "cycle")
+    error = json.loads(run("lookup", "-", "a", "c", "-f", "json", stdin=text).err)
+    assert error["line"] == cycle["line"]
+    assert error["message"].endswith(cycle["message"])
 
 
 def test_one_bad_entry_does_not_hide_the_others(run: Run) -> None:
