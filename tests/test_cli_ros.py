@@ -102,6 +102,17 @@ def test_echo_tells_of_times_without_data_and_goes_on(run: Run) -> None:
     assert "2 times without data" in found.err
 
 
+@pytest.mark.parametrize("times", [("--start", "1800000000"), ("--stop", "0"), ("--start", "1", "--stop", "2")])
+def test_echo_without_any_data_is_a_failed_lookup(run: Run, times: tuple[str, ...]) -> None:
+    found = run("echo", *BOTH, "map", "cam", *times, files=FILES)
+    assert (found.status, found.out) == (4, "")
+    assert "no data for map -> base" in found.err
+
+
+def test_echo_cannot_stop_before_it_starts(run: Run) -> None:
+    assert run("echo", *BOTH, "map", "cam", "--start", "3", "--stop", "1", files=FILES).status == 2
+
+
 def test_echo_of_what_stands_still_has_no_time(run: Run) -> None:
     out = run("echo", "tf_static.txt", "base", "cam", files=FILES).out
     assert "At any time: the frames stand still" in out
@@ -124,6 +135,28 @@ def test_monitor_tells_the_common_interval_of_a_chain(run: Run) -> None:
     found = run("monitor", "tf.txt", "--with", "arm.txt", "map", "arm", files=FILES | {"arm.txt": late})
     chain = list(yaml.safe_load_all(found.out))[-1]
     assert (chain["kind"], chain["first_ns"], chain["last_ns"]) == ("chain", EPOCH + BILLION, EPOCH + 2 * BILLION + 1)
+
+
+def test_a_gap_is_between_stamps_whatever_order_they_came_in(run: Run) -> None:
+    text = moving(*((at, 0.1 * at) for at in (0, 1, 5, 2, 3, 4, 6)))
+    entry = json.loads(run("monitor", "-", "-f", "json", stdin=text).out)
+    assert (entry["gap_s"], entry["gap_until_ns"]) == (1.0, EPOCH + BILLION)
+    assert entry["backward"] == 3
+    assert "comes after a later stamp (and 2 more of these)" in run("check", "-", stdin=text).out
+
+
+def test_monitor_names_each_parent_once_and_counts_the_changes(run: Run) -> None:
+    entry = json.loads(run("monitor", "-", "-f", "json", stdin=moving(*STEADY, parents="mo")).out)
+    assert (entry["parents"], entry["parent_changes"]) == ("map, odom", 19)
+    header, row = run("monitor", "-", "-f", "text", stdin=moving(*STEADY, parents="mo")).out.splitlines()
+    assert (header.split()[-1], row.split()[-1]) == ("reparented", "19")
+
+
+@pytest.mark.parametrize("begin", [1, 9])
+def test_monitor_says_whether_the_edges_of_a_chain_overlap(run: Run, begin: int) -> None:
+    late = dump(*(transform("base", "arm", EPOCH + (begin + at) * BILLION) for at in range(5)))
+    found = run("monitor", "tf.txt", "--with", "arm.txt", "map", "arm", "-f", "json", files=FILES | {"arm.txt": late})
+    assert [json.loads(line)["overlap"] for line in found.out.splitlines()] == [None, None, begin < 2]
 
 
 def test_monitor_knows_the_delay_from_a_csv_recording(run: Run) -> None:
@@ -155,6 +188,18 @@ def test_static_refuses_what_moves_and_what_is_no_rotation(run: Run) -> None:
     assert run("static", "tf.txt", files=FILES).err == "frametool: frames move and cannot be published as static: base\n"
     assert run("static", "--qz", "0.5", "--frame-id", "a", "--child-frame-id", "b").status == 1
     assert run("static", "1", "2", "3").status == 2
+
+
+@pytest.mark.parametrize("names", [("a", ""), ("", "a")])
+def test_static_refuses_an_empty_name_in_either_spelling(run: Run, names: tuple[str, str]) -> None:
+    assert run("static", *"000000", "1", *names).status == 2
+    assert run("static", "--frame-id", names[0], "--child-frame-id", names[1]).status == 2
+
+
+@pytest.mark.parametrize("command", ["", "rosrun tf static_transform_publisher "])
+def test_calls_in_the_background_are_read_from_scripts(run: Run, command: str) -> None:
+    text = f"{command}1 0 0 0 0 0 1 a b 100 &\n"
+    assert run("tree", "-", stdin=text).out == run("tree", "-", stdin=text.replace(" &", "")).out != ""
 
 
 # --- apply ---------------------------------------------------------------------------------------------------------
@@ -236,6 +281,7 @@ RECORDINGS = {
     "backward": moving(*STEADY, (0.55, 0.055)),
     "gap": moving(*STEADY, (5.0, 0.2)),
     "jump": moving(*STEADY, (2.0, 7.0)),
+    "disagreement": moving(*((at + late, x + 9 * (late > 0)) for at, x in STEADY for late in (0, 5e-9))),
     "reparented": moving(*STEADY[:2]) + moving(*STEADY[2:], parents="o"),
     "flicker": moving(*STEADY, parents="mo"),
     "static-and-moving": moving(*STEADY),
@@ -268,6 +314,17 @@ def test_every_rule_but_the_rest_is_tested() -> None:
     assert {*TREES, *RECORDINGS} == set(RULES) - {"odd"}
 
 
+@pytest.mark.parametrize("turn", [0, 1, 2])
+def test_check_and_lookup_report_a_cycle_alike(run: Run, turn: int) -> None:
+    edges = [("a", "b"), ("b", "c"), ("c", "a")]
+    order = [*edges[turn:], *edges[:turn]]
+    text = dump(*(transform(*edge, EPOCH + at) for edge in order for at in range(2)))
+    (cycle,) = (each for each in findings(run, text) if each["rule"] == "cycle")
+    error = json.loads(run("lookup", "-", "a", "c", "-f", "json", stdin=text).err)
+    assert error["line"] == cycle["line"]
+    assert error["message"].endswith(cycle["message"])
+
+
 def test_one_bad_entry_does_not_hide_the_others(run: Run) -> None:
     text = f"frames:\n- {TREES['degrees']}\n- {TREES['mirrored']}\n- {TREES['not-finite']}\n"
     assert [(each["line"], each["rule"]) for each in findings(run, text)] == [
@@ -282,6 +339,10 @@ def test_errors_fail_and_warnings_fail_when_strict(run: Run, rule: str, plain: i
     files = {"in.txt": (TREES | RECORDINGS)[rule]}
     assert run("check", "in.txt", files=files).status == plain
     assert run("check", "in.txt", "--strict", files=files).status == strict
+
+
+def test_the_summary_is_there_for_notes_alone(run: Run) -> None:
+    assert run("check", "in.txt", files={"in.txt": TREES["several-roots"]}).err == "frametool: 1 note\n"
 
 
 def test_findings_are_lines_that_editors_and_github_understand(run: Run) -> None:

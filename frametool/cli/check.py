@@ -75,6 +75,6 @@ def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:
     """Count on stderr, and tell whether the files pass."""
     counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
     said = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
-    if counts["error"] or counts["warning"]:
+    if said:
         click.echo(f"frametool: {said}", err=True)
     return bool(counts["error"] or (strict and counts["warning"]))

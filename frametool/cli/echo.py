@@ -59,6 +59,8 @@ def command(
     other way round and then does the same. Blocks are text unless --format or the suffix of --output says otherwise;
     they have 3 decimals unless --precision says otherwise. Stamps are seconds with nine decimals.
     """
+    if start is not None and stop is not None and start > stop:
+        raise click.UsageError("--start is after --stop")
     form = format_name or (None if output else "text")
     out = Output("poses", format_name=form, output=output, **options)
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
@@ -92,8 +94,9 @@ def _times(
         return
     begin = span[0] if start is None else start
     end = span[1] if stop is None else stop
-    if begin > end and start is None and stop is None:
-        frames.lookup(target, source, begin)  # says which edges never overlap
+    if begin > end:
+        frames.lookup(target, source, begin if stop is None else stop)  # says what has no data there
+        raise click.UsageError("--stop is before the first time at which all edges have data; give --start")
     count = 0
     while (at_ns := begin + round(count * BILLION / rate)) <= end:
         yield at_ns
@@ -103,15 +106,22 @@ def _times(
 def _results(
     frames: FrameTree | TransformBuffer, target: str, source: str, times: Iterator[int | None], failures: list[NoDataAt]
 ) -> Iterator[Result]:
-    """Look up at each time; where there is no data, keep the error and go on."""
+    """Look up at each time; where there is no data, keep the error and go on.
+
+    Raises NoDataAt where no time has any.
+    """
+    missing = True
     for at_ns in times:
         try:
             found = frames.lookup(target, source, at_ns)
         except NoDataAt as error:
             failures.append(error)
             continue
+        missing = False
         extras = {} if at_ns is None else {"stamp_ns": at_ns}
         yield Result(Pose.of(found.components, source, target), extras)
+    if missing and failures:
+        raise failures[0]
 
 
 def _limited(results: Iterator[Result], limit: int | None) -> Iterator[Result]:

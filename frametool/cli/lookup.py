@@ -54,13 +54,16 @@ def command(
 
     TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. --deg is about the angles of
     the result; the tree's own are what its file says. Between two samples of a moving frame positions are interpolated
-    along the line and rotations by slerp, edge by edge, as tf2 does; nothing is extrapolated.
+    along the line and rotations by slerp, edge by edge, as tf2 does; nothing is extrapolated. With --times, --on-error
+    is stop (the default) or skip: times without data are left out; null is for tables.
     """
     by_row, stream = RowFrames(options), Stream(options)
     output = Output("poses", **options)
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
+    if times is not None and stream.options["on_error"] == "null":
+        raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
     if by_row or target is None or source is None:
         return by_row.run(stream, output, frames, target=target, source=source, at=at_ns(at))
@@ -68,7 +71,10 @@ def command(
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
     if times is not None:
-        results = _many(frames, target, source, read_times(times), skip=stream.options["on_error"] == "skip")
+        asked = read_times(times)
+        results = _many(frames, target, source, asked, skip=stream.options["on_error"] == "skip")
+        skipped = [at for at, result in zip(asked, results, strict=True) if result is None]
+        _tell_skipped(frames, (target, source), skipped, len(asked), in_json=output.told == "json")
         output.poses(found := [result for result in results if result is not None])
         return 3 if len(found) < len(results) else 0
     if fixed is not None:
@@ -107,25 +113,28 @@ def _across(
 def _many(
     frames: FrameTree | TransformBuffer, target: str, source: str, times: Sequence[int], *, skip: bool
 ) -> list[Result | None]:
-    """Look up at many times; None, and a word on stderr, for those without data that are skipped."""
+    """Look up at many times; None for those without data that are skipped."""
     found = frames.lookup_many(target, source, times, missing="nan" if skip else "raise")
     rows = zip(*(column.tolist() for column in found.components), strict=True)
     results = [Result(Pose.of(row, source, target), {"stamp_ns": at}) for at, row in zip(times, rows, strict=True)]
-    there = [result if isfinite(result.pose.components[6]) else None for result in results]
-    if skip:
-        skipped = [at for at, each in zip(times, there, strict=True) if each is None]
-        _tell_skipped(frames, target, source, skipped, len(times))
-    return there
+    return [result if isfinite(result.pose.components[6]) else None for result in results]
 
 
 def _tell_skipped(
-    frames: FrameTree | TransformBuffer, target: str, source: str, skipped: Sequence[int], asked: int, most: int = 10
-) -> None:
-    """Say why times were skipped: the reasons of the first, then how many."""
+    frames: FrameTree | TransformBuffer, ends: tuple[str, str], skipped: Sequence[int], asked: int, *,
+    in_json: bool, most: int = 10,
+) -> None:  # fmt: skip
+    """Say why times were skipped: the reasons of the first, then how many; each as an object if results are JSON."""
+    if not skipped:
+        return
+    from frametool.cli.failures import as_json
+    from frametool.formats.json_form import dump
+
     for at in skipped[:most]:
         try:
-            frames.lookup(target, source, at)
+            frames.lookup(*ends, at)
         except LookupFailed as error:
-            click.echo(f"frametool: {error} (skipped)", err=True)
-    if skipped:
-        click.echo(f"frametool: {len(skipped)} of {asked} times skipped", err=True)
+            click.echo(as_json(error) if in_json else f"frametool: {error} (skipped)", err=True)
+    total = f"{len(skipped)} of {asked} times skipped"
+    whole = {"error": "times_skipped", "message": total, "skipped": len(skipped), "asked": asked}
+    click.echo(dump(whole) if in_json else f"frametool: {total}", err=True)

@@ -37,7 +37,8 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], **option
 
     With TARGET and SOURCE only the edges between them are told, and the interval in which all of them have data.
     Rates are in stamp time: what the recorder's clock did is the delay, known from bags and `rostopic echo -p` only.
-    A gap is the longest pause between two stamps. A jump is a step 10 times the median one and longer than 0.1 m or
+    A gap is the longest pause between two stamps, in the order of time; back counts samples that come after a later
+    stamp, reparented the changes of parent. A jump is a step 10 times the median one and longer than 0.1 m or
     0.2 rad.
     """
     if len(frames) not in (0, 2):

@@ -10,7 +10,7 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.output import Output
 from frametool.cli.trees import load_tree
 from frametool.errors import ValueInvalid, warn
-from frametool.formats.publisher import FLAGS, read_flags, read_positional
+from frametool.formats.publisher import FLAGS, moving_frames, read_flags, read_positional
 from frametool.formats.source import Source
 from frametool.formats.values import NotARotation, Reading
 from frametool.frames.tree import FrameTree
@@ -56,8 +56,7 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
         output = Output("tree", format_name=form or "static2", deg=deg, **options)
         tree = load_tree(arguments[0])
         if not isinstance(tree, FrameTree):
-            moving = ", ".join(track.child for track in tree.tracks() if not track.standing)
-            raise ValueInvalid(f"frames move and cannot be published as static: {moving}")
+            raise ValueInvalid(moving_frames(track.child for track in tree.tracks() if not track.standing))
         output.tree(tree)
         return
     output = Output("tree", format_name=form, deg=deg, **options)

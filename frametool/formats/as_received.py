@@ -15,7 +15,9 @@ from frametool.frames.stamps import BILLION
 if TYPE_CHECKING:
     from frametool.geometry.kinds import Rigid
 
-ODD = {"nan": "nan", ".nan": "nan", "inf": "inf", ".inf": "inf", "-inf": "-inf", "-.inf": "-inf"}
+ODD = {"nan": "nan", ".nan": "nan"} | {
+    f"{sign}{word}": f"{sign}inf" for sign in ("", "+", "-") for word in ("inf", ".inf", "infinity")
+}
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))
 
 

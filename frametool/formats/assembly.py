@@ -78,7 +78,11 @@ class Assembly:
 
     def add_root(self, frame: str) -> None:
         """Make a frame known that has no parent (yet)."""
-        (self.tree if self.buffer is None else self.buffer).add_root(frame)
+        (self.tree if self.buffer is None else self.buffer).add_root(self._kept(frame))
+
+    def _kept(self, name: str) -> str:
+        """Give the name under which the buffer keeps a frame: tf2 strips one slash."""
+        return name if self.rules.policy == "frametool" else name.removeprefix("/")
 
     def add(self, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: Place) -> None:
         """Add one edge, or one sample of it.
@@ -133,6 +137,7 @@ class Assembly:
         self, buffer: TransformBuffer, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: Place
     ) -> None:
         """Add a sample, or a standing edge beside samples."""
+        received, child = child, self._kept(child)
         track = buffer.track(child)
         settled = track is not None and child not in self._moves and (track.standing or stamp_ns is None)
         if track is not None and settled and (track.parent, track.samples[-1]) == (parent, components):
@@ -142,7 +147,7 @@ class Assembly:
             self._moves.add(child)
         elif stamp_ns is not None and track is not None and self.rules.policy != "frametool":
             self._moves.add(child)  # tf2 takes no stamp twice: what comes twice was not latched
-        replaced = buffer.insert_components(parent, child, components, stamp_ns)
+        replaced = buffer.insert_components(parent, received, components, stamp_ns)
         if stamp_ns is not None:
             places = self._places.setdefault(child, {})
             if replaced:
@@ -165,7 +170,7 @@ class Assembly:
             what = f"frame {each.child!r} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
             warn(f"{self.name}: {what}; the last one holds")
         if len(self._replaced) > most:
-            warn(f"{self.name}: {len(self._replaced) - most} more frames with two poses at one stamp")
+            warn(f"{self.name}: {len(self._replaced) - most} more stamps with two poses of one frame")
 
     def _check_standing(self, buffer: TransformBuffer) -> None:
         """Hold all that stands still to a tree's rules."""

@@ -41,7 +41,7 @@ _FLOW_ECHO = re.compile(r"(?:transforms|header): *[\[{]")
 _CSV2 = re.compile(r"-?\d+,\d+,[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$")
 # the command's name, flags, or numbers and two names: poses of a trajectory are numbers only
 _CALL = re.compile(
-    r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]|[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*$"
+    r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]|[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"
 )
 _MESSAGE_KEY = re.compile(r'"(?:child_frame_id|transforms|frame_id|op)"')
 

@@ -38,6 +38,7 @@ RULES = {
     "backward": ("warning", "samples of a frame that come after later ones"),
     "gap": ("warning", "a pause more than 5 times the usual one"),
     "jump": ("warning", "a step more than 10 times the usual one, and longer than 0.1 m or 0.2 rad"),
+    "disagreement": ("error", "a frame that goes far and back all the time: two publishers that disagree"),
     "reparented": ("note", "a frame whose parent changes once or twice"),
     "flicker": ("error", "a frame whose parent goes back and forth: two publishers that disagree"),
 }

@@ -21,10 +21,11 @@ FLICKER = 3  # so many changes of parent are no picking up and putting down
 class Child:
     """Everything that was seen of one child frame."""
 
-    def __init__(self, first: Seen) -> None:
-        """Begin with the first edge or sample."""
+    def __init__(self, first: Seen, number: int) -> None:
+        """Begin with the first edge or sample; `number` counts all that were read."""
         self.first = first
         self.newest = first
+        self.since = (number, first)  # where the newest parent took over
         self.log = EdgeLog(first.child)
         self.stands: Seen | None = None
         self.changes: list[Seen] = []
@@ -35,7 +36,7 @@ class Child:
         self.clashes: list[Seen] = []
         self.backward: list[Seen] = []
 
-    def add(self, seen: Seen) -> None:
+    def add(self, seen: Seen, number: int) -> None:
         """Take in one more."""
         if seen.stamp_ns is None:
             self._stand(seen)
@@ -43,6 +44,7 @@ class Child:
             self._move(seen, seen.stamp_ns)
         if seen.parent != self.newest.parent:
             self.changes.append(seen)
+            self.since = (number, seen)
             self.other_parent = self.other_parent or seen
         elif seen.components != self.newest.components:
             self.other_pose = self.other_pose or seen
@@ -58,7 +60,7 @@ class Child:
         known = self.stamps.setdefault(stamp_ns, fresh)
         if known is not fresh:
             (self.again if known[0] == data else self.clashes).append(seen)
-        elif self.newest.stamp_ns is not None and stamp_ns < self.newest.stamp_ns:
+        if self.log.is_late(stamp_ns):
             self.backward.append(seen)
 
     @property
@@ -70,17 +72,17 @@ class Child:
 def lint(everything: Iterable[Seen]) -> Iterator[Finding]:
     """Apply the rules to all edges of all files together."""
     children: dict[str, Child] = {}
-    for seen in everything:
+    for number, seen in enumerate(everything):
         if seen.parent == seen.child:
             yield seen.finding("self", f"frame {seen.child!r} is its own parent")
             continue
         child = children.get(seen.child)
         if child is None:
-            child = children[seen.child] = Child(seen)
+            child = children[seen.child] = Child(seen, number)
         if seen.looks_w_first and (child.first is seen or not child.first.looks_w_first):
             message = f"frame {seen.child!r} is turned by exactly 180 degrees about x; did you mean w first?"
             yield seen.finding("w-first", message)
-        child.add(seen)
+        child.add(seen, number)
     for child in children.values():
         yield from _child(child)
     yield from _cycles(children)
@@ -132,7 +134,7 @@ def _moving(child: Child, name: str) -> Iterator[Finding]:
 
 def _reparented(child: Child, name: str) -> Finding:
     """Tell a frame that was picked up from one whose publishers disagree."""
-    parents = " -> ".join(repr(parent) for parent in child.log.parents[:4])
+    parents = " -> ".join(repr(each.parent) for each in (child.first, *child.changes[:3]))
     if len(child.changes) < FLICKER:
         return child.changes[0].finding("reparented", f"frame {name!r} changes its parent: {parents}")
     message = f"frame {name!r} changes its parent {len(child.changes)} times: {parents} ..; two publishers disagree"
@@ -146,6 +148,11 @@ def _steps(child: Child, name: str) -> Iterator[Finding]:
         pause = gaps[0].pause_ns / BILLION
         message = f"{edge}: no data for {pause:g} s before {format_stamp(gaps[0].stamp_ns)}"
         yield _at_step(child, gaps[0]).finding("gap", message + _more(gaps))
+    if returns := child.log.returns():
+        step = returns[0]
+        apart = f"{step.metres:.3g} m and {step.radians:.3g} rad"
+        message = f"{edge}: goes back and forth by {apart} at {format_stamp(step.stamp_ns)}; two publishers disagree"
+        yield _at_step(child, step).finding("disagreement", message + _more(returns))
     if jumps := child.log.jumps():
         step = jumps[0]
         message = f"{edge}: jumps by {step.metres:.3g} m and {step.radians:.3g} rad at {format_stamp(step.stamp_ns)}"
@@ -167,9 +174,10 @@ def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
             line.append(frame)
             frame = children[frame].newest.parent
         if frame in line:
-            circle = [*line[line.index(frame) :], frame]
-            last = max((children[each].newest for each in circle[:-1]), key=lambda seen: (seen.source, seen.line))
-            yield last.finding("cycle", cycle_message(circle))
+            circle = line[line.index(frame) :]
+            _, last = max(children[each].since for each in circle)
+            at = circle.index(last.parent)
+            yield last.finding("cycle", cycle_message([*circle[at:], *circle[:at], last.parent]))
 
 
 def _roots(children: dict[str, Child]) -> Iterator[Finding]:

@@ -32,6 +32,8 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
         "jumps": len(log.jumps()),
         "backward": log.backward,
         "parents": ", ".join(log.parents),
+        "parent_changes": log.changes,
+        "overlap": None,
     }
 
 
@@ -55,6 +57,8 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
         "jumps": sum(entry["jumps"] for entry in entries),
         "backward": sum(entry["backward"] for entry in entries),
         "parents": " <- ".join([target, *_frames_between(target, logs)]),
+        "parent_changes": sum(log.changes for log in logs),
+        "overlap": None if interval is None else interval[0] <= interval[1],
     }
 
 

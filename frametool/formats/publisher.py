@@ -38,8 +38,25 @@ _FORMS = "x y z qx qy qz qw PARENT CHILD, or x y z yaw pitch roll PARENT CHILD"
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Give one line a pose; it must say which frame it is in which."""
-    return "".join(f"{_line(result.pose, style)}\n" for result in results)
+    """Give one line a pose; it must say which frame it is in which, and no frame may have two poses.
+
+    Raises ValueInvalid.
+    """
+    poses: dict[str, Pose] = {}
+    lines, moving = [], []
+    for pose in (result.pose for result in results):
+        lines.append(f"{_line(pose, style)}\n")
+        known = poses.setdefault(pose.name or "", pose)
+        if (known.parent, known.components) != (pose.parent, pose.components):
+            moving.append(known.name or "")
+    if moving:
+        raise ValueInvalid(moving_frames(dict.fromkeys(moving)))
+    return "".join(lines)
+
+
+def moving_frames(names: Iterable[str]) -> str:
+    """Say that frames have more than one pose."""
+    return f"frames move and cannot be published as static: {', '.join(names)}"
 
 
 def write_tree(tree: FrameTree, style: Style) -> str:
@@ -84,6 +101,8 @@ def read_call(line: str, reading: Reading) -> Pose:
         raise ValueInvalid(f"a quote is not closed ({str(error).lower()})") from None
     starts = [index for index, word in enumerate(words) if word.rsplit("/", 1)[-1] == CALL]
     words = words[starts[-1] + 1 :] if starts else words
+    if words[-1:] == ["&"]:  # a script starts the tool in the background
+        del words[-1]
     if any(word.startswith("--") for word in words):
         return read_flags(_flags(words), reading)
     return read_positional(words, reading)
@@ -136,6 +155,8 @@ def _pose(
     """Check the numbers of a call."""
     x, y, z = map(read_number, position)
     turned = rotation_of(ROTATION_KEYS[key], rotation, INDICES, reading)
+    if not parent or not child:
+        raise ValueInvalid(f"an empty frame name; {CALL} takes {_FORMS}")
     if parent == child:
         raise ValueInvalid(f"frame {child!r} is its own parent")
     return Pose((x, y, z), turned, child, parent)

@@ -187,12 +187,14 @@ class TransformBuffer(TrackStore):
         self.require(target, source)
 
         try:
-            return edges_between(target, source, lambda frame: self.parent(frame, at_ns))
+            found = edges_between(target, source, lambda frame: self.parent(frame, at_ns))
         except NotConnected as error:
             raise self._unconnected(error, target, source, at_ns) from None
         except BadTopology as error:
             self._loops = self._varies = True
             return self.policy.looped(self, error, target, source, at_ns)
+        self.policy.refuse_depth(self, target, source, at_ns)
+        return found
 
     def require(self, target: str, source: str) -> None:
         """Raise UnknownFrame unless both frames are there."""

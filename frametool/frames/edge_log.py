@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from array import array
+from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import UnknownFrame
@@ -19,14 +22,23 @@ JUMP_METRES, JUMP_RADIANS = 0.1, 0.2  # .. and also longer than what noise and s
 GAP_FACTOR = 5.0  # a gap is a pause so many times the median pause
 
 
+LEAST_RETURNS = 3  # so many times there and back are no accident
+RETURN_FACTOR = 0.1  # a way there and back ends so near to its begin, measured by the step there
+
+
 class Step(NamedTuple):
-    """The way from one sample to the next in time: where it ends, how far and how long it was."""
+    """The way from one stamp to the next: where it ends, how far and how long it was, and whether it leads back.
+
+    Under another parent there is no distance: metres and radians are 0.  `returns` says that the two steps up to here
+    both went far and end near to where they began.
+    """
 
     stamp_ns: int
     line: int
     metres: float
     radians: float
     pause_ns: int
+    returns: bool
 
 
 class EdgeLog:
@@ -35,42 +47,78 @@ class EdgeLog:
     def __init__(self, child: str) -> None:
         """Begin without samples."""
         self.child = child
-        self.parents: list[str] = []  # in the order they took over
+        self.parent = ""  # the newest
+        self.parents: dict[str, int] = {}  # each once, numbered as it was first named
+        self.changes = 0
         self.count = 0
         self.standing = False
         self.first_ns: int | None = None
         self.last_ns: int | None = None
-        self.steps: list[Step] = []
-        self.backward = 0
+        self.backward = 0  # samples that came after a later stamp
         self.delays_ns: list[int] = []
-        self._newest: Rigid | None = None
+        self._stamps: list[int] = []  # of any size: what a broken clock says is no less data
+        self._lines = array("q")
+        self._under = array("q")  # the number of the parent
+        self._poses = array("d")  # seven numbers a sample
 
     def add(
         self, parent: str, components: Rigid, stamp_ns: int | None, line: int = 0, received_ns: int | None = None
     ) -> None:
         """Take one sample in; without a stamp the frame stands still."""
+        self.changes += self.count > 0 and parent != self.parent
         self.count += 1
-        if not self.parents or self.parents[-1] != parent:
-            self.parents.append(parent)
-            self._newest = None
+        self.parent = parent
+        under = self.parents.setdefault(parent, len(self.parents))
         if stamp_ns is None:
             self.standing = True
             return
         if received_ns is not None:
             self.delays_ns.append(received_ns - stamp_ns)
-        if self.last_ns is not None and stamp_ns < self.last_ns:
-            self.backward += 1
-        elif self._newest is not None and self.last_ns is not None and stamp_ns > self.last_ns:
-            metres, radians = rigid.distance(*self._newest, *components, xp=floats)
-            self.steps.append(Step(stamp_ns, line, metres, radians, stamp_ns - self.last_ns))
+        self.backward += self.is_late(stamp_ns)
         self.first_ns = stamp_ns if self.first_ns is None else min(self.first_ns, stamp_ns)
-        if self.last_ns is None or stamp_ns >= self.last_ns:
-            self.last_ns, self._newest = stamp_ns, components
+        self.last_ns = stamp_ns if self.last_ns is None else max(self.last_ns, stamp_ns)
+        self._stamps.append(stamp_ns)
+        self._lines.append(line)
+        self._under.append(under)
+        self._poses.extend(components)
 
-    @property
-    def parent(self) -> str:
-        """Give the newest parent."""
-        return self.parents[-1]
+    def is_late(self, stamp_ns: int) -> bool:
+        """Tell a stamp that comes after a later one."""
+        return self.last_ns is not None and stamp_ns < self.last_ns
+
+    @cached_property
+    def steps(self) -> list[Step]:
+        """Give the ways between stamps in the order of time, once all are in; the last of equal stamps counts."""
+        last = {stamp: at for at, stamp in enumerate(self._stamps)}
+        order = [last[stamp] for stamp in sorted(last)]
+        found: list[Step] = []
+        for number, (before, at) in enumerate(pairwise(order)):
+            metres, radians = self._apart(before, at)
+            back = number > 0 and self._is_return(order[number - 1], at, found[-1], (metres, radians))
+            pause = self._stamps[at] - self._stamps[before]
+            found.append(Step(self._stamps[at], self._lines[at], metres, radians, pause, back))
+        return found
+
+    def _apart(self, before: int, at: int) -> tuple[float, float]:
+        """Give metres and radians between two samples; 0 under different parents."""
+        if self._under[before] != self._under[at]:
+            return 0.0, 0.0
+        metres, radians = rigid.distance(*self._pose(before), *self._pose(at), xp=floats)
+        return metres, radians
+
+    def _pose(self, at: int) -> Rigid:
+        """Give the components of a sample."""
+        tx, ty, tz, x, y, z, w = self._poses[7 * at : 7 * at + 7]
+        return tx, ty, tz, x, y, z, w
+
+    def _is_return(self, begin: int, end: int, there: Step, back: tuple[float, float]) -> bool:
+        """Tell a way far off and back again from one that goes on."""
+        far = there.metres, there.radians
+        least = JUMP_METRES, JUMP_RADIANS
+        return any(
+            min(far[kind], back[kind]) > least[kind] and self._apart(begin, end)[kind] < RETURN_FACTOR * far[kind]
+            for kind in (0, 1)
+        )
 
     @property
     def moves(self) -> bool:
@@ -99,6 +147,11 @@ class EdgeLog:
         metres, radians = (_median([step[field] for step in self.steps]) for field in (2, 3))
         far, turned = max(JUMP_METRES, JUMP_FACTOR * metres), max(JUMP_RADIANS, JUMP_FACTOR * radians)
         return [step for step in self.steps if step.metres > far or step.radians > turned]
+
+    def returns(self) -> list[Step]:
+        """Give the steps back where an edge goes back and forth all the time, as of two publishers that disagree."""
+        back = [step for step in self.steps if step.returns]
+        return back if len(back) >= max(LEAST_RETURNS, len(self.steps) / 3) else []
 
 
 def _median(values: list[float]) -> float:

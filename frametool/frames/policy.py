@@ -96,6 +96,11 @@ class Policy:
             raise error
         return edges_between(target, source, lambda frame: buffer.parent_exactly(frame, at_ns))
 
+    def refuse_depth(
+        self, buffer: TransformBuffer, target: str, source: str, at_ns: int | None,
+    ) -> None:  # fmt: skip
+        """Refuse ways that are too long: none is."""
+
     def missing(
         self, buffer: TransformBuffer, target: str, source: str, at_ns: int, way: list[Track],  # noqa: ARG002
     ) -> LookupFailed:

@@ -9,6 +9,7 @@ from math import isnan, nan, sqrt
 from typing import TYPE_CHECKING
 
 from frametool.errors import BadTopology, LookupFailed, NotConnected, UnknownFrame, ValueInvalid
+from frametool.frames.path import to_root
 from frametool.frames.policy import Policy
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
@@ -131,10 +132,18 @@ class Ros1(Policy):
         """Find the way as far as tf2 does, which stops once it meets the other end; else say that there is a loop."""
         up, down = (_climb(buffer, *ends, at_ns) for ends in ((source, target), (target, source)))
         if up is None and down is None:
-            known = (f"Frame {track.child} exists with parent {track.parent}." for track in buffer.tracks())
-            text = "\n".join(("The tf tree is invalid because it contains a loop.", *known, ""))
-            raise LookupFailed(text) from error
+            raise _loop(buffer) from error
         return ([], up) if up is not None else ((down or [])[::-1], [])
+
+    def refuse_depth(self, buffer: TransformBuffer, target: str, source: str, at_ns: int | None) -> None:
+        """Take a way of more than a thousand edges for a loop, on the source's side first."""
+        for frame, other in ((source, target), (target, source)):
+            line = to_root(frame, lambda each: buffer.parent(each, at_ns))
+            met = other in line
+            if (line.index(other) if met else len(line) - 1) > MOST_EDGES:
+                raise _loop(buffer)
+            if met:
+                return
 
     def missing(self, buffer: TransformBuffer, target: str, source: str, at_ns: int, way: list[Track]) -> LookupFailed:
         """Blame the edge that tf2 blames."""
@@ -222,6 +231,12 @@ class Ros2(Ros1):
 
 
 TF2: dict[str, Policy] = {"ros1": Ros1(), "ros2": Ros2()}
+
+
+def _loop(buffer: TransformBuffer) -> LookupFailed:
+    """Report what tf2 takes for a loop, with all frames."""
+    known = (f"Frame {track.child} exists with parent {track.parent}." for track in buffer.tracks())
+    return LookupFailed("\n".join(("The tf tree is invalid because it contains a loop.", *known, "")))
 
 
 def _blamed(buffer: TransformBuffer, target: str, source: str, at_ns: int) -> Track | None:

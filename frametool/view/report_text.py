@@ -32,14 +32,16 @@ COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "delay_max_s": ("max s", _seconds),
     "jumps": ("jumps", str),
     "backward": ("back", str),
+    "parent_changes": ("reparented", str),
 }
+RARE = ("parent_changes",)  # left out where all are 0
 LEFT = ("parent", "child")
 
 
 def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noqa: ARG001 - the numbers here are for reading
     """Give the edges as an aligned table; columns that say nothing are left out."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
-    shown = [key for key in COLUMNS if any(entry[key] is not None for entry in edges)]
+    shown = [key for key in COLUMNS if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
     rows = [[COLUMNS[key][0] for key in shown], *([COLUMNS[key][1](entry[key]) for key in shown] for entry in edges)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     sides = ["<" if key in LEFT else ">" for key in shown]

@@ -123,7 +123,22 @@ def test_an_unknown_frame_and_a_bad_file_have_fields_too(ask: Run) -> None:
 def test_times_without_data_can_be_skipped(ask: Run) -> None:
     outcome = ask("map", "base", "--times", "1:4:1", "--on-error", "skip")
     assert (outcome.status, len(outcome.out.splitlines())) == (3, 2)
+    told = [json.loads(line) for line in outcome.err.splitlines()]
+    assert [each.get("at_ns") for each in told] == [3 * 10**9, 4 * 10**9, None]
+    assert (told[-1]["skipped"], told[-1]["asked"]) == (2, 4)
+
+
+def test_skipped_times_are_told_in_words_beside_other_forms(ask: Run) -> None:
+    outcome = ask("map", "base", "--times", "1:4:1", "--on-error", "skip", "-f", "csv")
     assert outcome.err.endswith("frametool: 2 of 4 times skipped\n")
+
+
+@pytest.mark.parametrize("form", ["static1", "static2"])
+def test_what_moves_is_no_call_of_static_transform_publisher(ask: Run, run: Run, form: str) -> None:
+    looked_up = ask("map", "base", "--times", "0:2:1", "-f", form)
+    drawn = run("tree", "-", "-f", form, stdin=DRIVE)
+    assert [(each.status, each.out) for each in (looked_up, drawn)] == [(1, "")] * 2
+    assert drawn.err == "frametool: frames move and cannot be published as static: base, hand\n"
 
 
 def test_without_skipping_the_first_time_without_data_ends_it(ask: Run) -> None:
@@ -141,6 +156,7 @@ def test_without_skipping_the_first_time_without_data_ends_it(ask: Run) -> None:
         (["--times", "1:0:1"], "STEP must be positive and STOP not before START"),
         (["--times", "0:x:1"], "'x' is not a time"),
         (["--times", "0:1:1", "--at", "1"], "--times says all the times"),
+        (["--times", "0:1:1", "--on-error", "null"], "with --times it is stop or skip"),
         (["--cache", "-1"], "not less than 0"),
     ],
 )
@@ -189,6 +205,40 @@ def test_what_tf2_refuses_in_a_recording_is_told_in_its_words_and_the_run_goes_o
     outcome = run("tree", "-", "--tf2", "ros1", "-f", "tf2", stdin="".join(map(as_message, calls)))
     assert outcome.status == 0
     assert outcome.err.replace("authority default_authority", "authority auth").splitlines() == expected
+
+
+@pytest.mark.parametrize("rules", ["ros1", "ros2"])
+def test_a_slash_before_its_name_does_not_hold_a_frame_still(run: Run, rules: str) -> None:
+    calls = ({"parent": "/a", "child": "/b", "stamp_ns": at, "t": (at, 0, 0), "q": (0, 0, 0, 1)} for at in (1, 3, 5))
+    stdin = "".join(map(as_message, calls))
+    found = (
+        answer(run("lookup", "-", "a", "b", "--at", f"{at}ns", "--tf2", rules, "-f", "json", stdin=stdin)) for at in (1, 2, 4)
+    )
+    assert [each["xyz"][0] for each in found] == [1.0, 2.0, 4.0]
+
+
+@pytest.mark.parametrize("word", ["Infinity", "-.inf", "inf"])
+def test_tf2_takes_infinity_and_answers_at_other_times(run: Run, word: str) -> None:
+    calls = [{"parent": "a", "child": "b", "stamp_ns": at, "t": (at, 0, 0), "q": (0, 0, 0, 1)} for at in (1, 3)]
+    stdin = "".join(map(as_message, calls)).replace("x: 1.0", f"x: {word}", 1)
+    assert answer(run("lookup", "-", "a", "b", "--tf2", "ros1", "-f", "json", stdin=stdin))["xyz"] == [3.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("source", "target"), [(1, 0), (0, 1)])
+def test_tf2_takes_more_than_a_thousand_edges_for_a_loop(run: Run, source: int, target: int) -> None:
+    """A chain of 1000 works and one of 1001 does not: tf2 0.7.6, observed."""
+    edges = "".join(f"- {{name: f{at + 1}, parent: f{at}, xyz: [1, 0, 0]}}\n" for at in range(1001))
+    whole, less = (
+        run("lookup", "-", f"f{target * last}", f"f{source * last}", "--tf2", "ros1", stdin=edges) for last in (1001, 1000)
+    )
+    assert (whole.status, less.status) == (4, 0)
+    assert "The tf tree is invalid because it contains a loop.\nFrame f1 exists with parent f0." in whole.err
+
+
+def test_many_stamps_with_two_poses_are_counted_as_stamps(run: Run) -> None:
+    samples = ", ".join(f"{{stamp: {at}, xyz: [{x}, 0, 0]}}" for at in range(12) for x in (0, 1))
+    err = run("tree", "-", stdin=f"- {{name: b, parent: a, samples: [{samples}]}}").err
+    assert "2 more stamps with two poses of one frame" in err
 
 
 def test_a_cache_forgets_what_is_older(ask: Run) -> None:
