@@ -11,13 +11,12 @@ Metres and radians a second, times in seconds. What has no time comes one period
 from __future__ import annotations
 
 import re
-import sys
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, ValueInvalid, alternatives
 from frametool.formats.documents import format_error, parse_documents
 from frametool.formats.numbers import parse_number
-from frametool.formats.source import Source, decode, placed_error
+from frametool.formats.source import Source, placed_error
 from frametool.formats.values import Misfit, as_mapping, kind, read_number, read_numbers, within
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp
 from frametool.sim.leaders import KEYS
@@ -104,16 +103,6 @@ def read_twists(lines: Iterable[str], name: str, *, period_ns: int = BILLION) ->
             raise chunk.error(str(misfit), misfit.path, key=misfit.key) from None
         except FormatError as error:
             error.line += chunk.line - 1
-            raise
-
-
-def stdin_lines() -> Iterator[str]:
-    """Give the lines of standard input as they arrive."""
-    for number, data in enumerate(sys.stdin.buffer):
-        try:
-            yield decode(data, "stdin")
-        except FormatError as error:
-            error.line += number
             raise
 
 
