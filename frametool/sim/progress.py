@@ -29,6 +29,7 @@ class Progress:
         self.walls: dict[str, int] = {}
         self.distances: dict[str, float] = {}
         self.reached_ns: dict[str, int] = {}
+        self.gone: dict[str, tuple[str, int]] = {}  # follower -> who of the two left the world, and when
         self._follows = scene.followers
 
     def watch(self, step: Step) -> None:
@@ -42,6 +43,9 @@ class Progress:
                 self.distances[name] = distance
                 if distance <= self.reach:
                     self.reached_ns.setdefault(name, step.t_ns)
+            elif step.is_tick and name in self.distances:
+                del self.distances[name]
+                self.gone[name] = (follow.leader if name in step.states else name, step.t_ns)
 
     def lines(self) -> Iterator[str]:
         """Give the summary: one line a follower, then the walls."""
@@ -51,12 +55,15 @@ class Progress:
 
     def _line(self, name: str, follow: Follow) -> str:
         target = follow.leader if follow.target == "leader" else f"the {follow.target} of {follow.leader}"
-        if name not in self.distances:
+        if name not in self.distances and name not in self.gone:
             return f"{name}: never in the world together with {follow.leader}"
         reached = self.reached_ns.get(name)
         near = f"within {self.reach:g} m"
         soon = f"never {near}" if reached is None else f"{near} after {_seconds(reached)}"
-        return f"{name}: final distance to {target} {self.distances[name]:.4f} m; {soon}"
+        if name in self.distances:
+            return f"{name}: final distance to {target} {self.distances[name]:.4f} m; {soon}"
+        who, when_ns = self.gone[name]
+        return f"{name}: no final distance, {who} left the world at {_seconds(when_ns)}; {soon}"
 
 
 def goal(leader: State, follow: Follow, now_ns: int) -> State:
