@@ -39,6 +39,7 @@ FOLLOW_KEYS = ("follow", "law", *CONTROLLER_KEYS, "target", "delay")
 TURTLE_KEYS = ("spawn", "leader", *FOLLOW_KEYS)
 NAMES = frozenset(("turtle", "name"))
 ANGLES = frozenset(("theta", "angular"))
+BYTES = frozenset(("r", "g", "b", "width"))
 DURATION_S = "20"
 RADIANS = 3.141592653589793 / 180.0
 
@@ -186,6 +187,9 @@ def _arguments(service: str, value: Any) -> dict[str, float | str]:
 
 
 def _argument(key: str) -> Callable[[Any], Any]:
+    """Give the reader of an argument."""
+    if key in BYTES:
+        return _byte
     return _name if key in NAMES else _angle if key in ANGLES else _flag if key == "off" else _number
 
 
@@ -270,7 +274,15 @@ def _integer(text: str) -> int:
     return int(text)
 
 
+def _pen_byte(text: str) -> float:
+    value = parse_number(text)
+    if not (0.0 <= value <= 255.0 and value.is_integer()):
+        raise ValueInvalid(f"expected a whole number 0 .. 255, found {text}")
+    return value
+
+
 _number = _guarded(parse_number, "a number")
+_byte = _guarded(_pen_byte, "a whole number 0 .. 255")
 _angle = _guarded(_radians, "an angle in radians, or like 90deg")
 _stamp = _guarded(_not_negative, "a time in seconds")
 _duration = _guarded(_endless, "a duration in seconds, or inf")
