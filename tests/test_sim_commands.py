@@ -102,6 +102,9 @@ def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> Non
         (("follow", "-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
         (("follow", "--plot", "nowhere/f.svg"), 5, "nowhere/f.svg: no directory nowhere"),
         (("sweep", "-o", "nowhere/f.csv"), 5, "nowhere/f.csv: no directory nowhere"),
+        (("follow", "--holonomic"), 2, "--holonomic is for --turtlesim ros2"),
+        (("follow", "--gain-linear", "1e308"), 1, "turtle2: gain_linear 1e+308"),
+        (("sweep", "--gain-linear", "1e308"), 2, "gain_linear 1e+308"),
         (("folow",), 2, "did you mean 'follow'?"),
         (("run", "bad.yaml"), 1, "bad.yaml:1:23: "),
         (("run", "{turtles: {a: {folow: b}}}"), 2, "unknown key 'folow'"),
@@ -117,6 +120,25 @@ def test_what_cannot_be_is_one_line_on_stderr(run: Run, arguments: tuple[str, ..
     assert (outcome.status, outcome.out) == (status, "")
     assert outcome.err.startswith("frametool: ")
     assert message in outcome.err.splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("event", "said"),
+    [
+        ("{t: 0.5, kill: turtle1}", "turtle2: no final distance, turtle1 left the world at 0.512 s; never within 0.5 m"),
+        ("{t: 0.5, kill: turtle2}", "turtle2: no final distance, turtle2 left the world at 0.512 s; never within 0.5 m"),
+        ("{t: 0.5, reset: }", "turtle2: no final distance, turtle2 left the world at 0.512 s; never within 0.5 m"),
+        ("{t: 3, clear: }", "warning: s.yaml, event 1 (clear) never happens, the run ends at 1 s"),
+    ],
+)
+def test_the_summary_tells_who_left_and_a_warning_what_never_happens(run: Run, event: str, said: str) -> None:
+    outcome = run("sim", "run", "s.yaml", files={"s.yaml": f"{SCENE}events: [{event}]\n"})
+    assert f"frametool: {said}\n" in outcome.err
+
+
+def test_teleop_says_that_it_is_endless_and_follow_that_it_is_not(run: Run) -> None:
+    defaults = [re.findall(r"or inf\s+\[default:\s+(\w+)", run("sim", name, "--help").out) for name in ("teleop", "follow")]
+    assert defaults == [["inf"], ["20"]]
 
 
 def test_files_are_written_whole_in_the_form_of_their_suffix(run: Run, tmp_path: Path) -> None:
