@@ -25,7 +25,7 @@ class Progress:
     def __init__(self, scene: Scene, reach: float = 0.5) -> None:
         """Begin before the first step."""
         self.reach = reach
-        self.t_ns = 0
+        self.t_ns: int | None = None  # of the last step
         self.walls: dict[str, int] = {}
         self.distances: dict[str, float] = {}
         self.reached_ns: dict[str, int] = {}
@@ -49,6 +49,9 @@ class Progress:
 
     def lines(self) -> Iterator[str]:
         """Give the summary: one line a follower, then the walls."""
+        if self.t_ns is None:
+            yield "ended before the first step"
+            return
         yield from (self._line(name, follow) for name, follow in self._follows.items())
         hits = ", ".join(f"{name} {count}" for name, count in sorted(self.walls.items()))
         yield f"{_seconds(self.t_ns)} simulated; wall hits: {sum(self.walls.values())}" + (f" ({hits})" if hits else "")
