@@ -100,6 +100,11 @@ def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> Non
         (("follow", "--plot", "a.gif"), 2, "--plot takes .svg, .html, .png"),
         (("follow", "--plot", "taken.svg"), 5, "taken.svg: exists; give --force"),
         (("follow", "-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
+        (("follow", "--plot", "nowhere/f.svg"), 5, "nowhere/f.svg: no directory nowhere"),
+        (("sweep", "-o", "nowhere/f.csv"), 5, "nowhere/f.csv: no directory nowhere"),
+        (("follow", "--holonomic"), 2, "--holonomic is for --turtlesim ros2"),
+        (("follow", "--gain-linear", "1e308"), 1, "turtle2: gain_linear 1e+308"),
+        (("sweep", "--gain-linear", "1e308"), 2, "gain_linear 1e+308"),
         (("folow",), 2, "did you mean 'follow'?"),
         (("run", "bad.yaml"), 1, "bad.yaml:1:23: "),
         (("run", "{turtles: {a: {folow: b}}}"), 2, "unknown key 'folow'"),
@@ -115,6 +120,25 @@ def test_what_cannot_be_is_one_line_on_stderr(run: Run, arguments: tuple[str, ..
     assert (outcome.status, outcome.out) == (status, "")
     assert outcome.err.startswith("frametool: ")
     assert message in outcome.err.splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("event", "said"),
+    [
+        ("{t: 0.5, kill: turtle1}", "turtle2: no final distance, turtle1 left the world at 0.512 s; never within 0.5 m"),
+        ("{t: 0.5, kill: turtle2}", "turtle2: no final distance, turtle2 left the world at 0.512 s; never within 0.5 m"),
+        ("{t: 0.5, reset: }", "turtle2: no final distance, turtle2 left the world at 0.512 s; never within 0.5 m"),
+        ("{t: 3, clear: }", "warning: s.yaml, event 1 (clear) never happens, the run ends at 1 s"),
+    ],
+)
+def test_the_summary_tells_who_left_and_a_warning_what_never_happens(run: Run, event: str, said: str) -> None:
+    outcome = run("sim", "run", "s.yaml", files={"s.yaml": f"{SCENE}events: [{event}]\n"})
+    assert f"frametool: {said}\n" in outcome.err
+
+
+def test_teleop_says_that_it_is_endless_and_follow_that_it_is_not(run: Run) -> None:
+    defaults = [re.findall(r"or inf\s+\[default:\s+(\w+)", run("sim", name, "--help").out) for name in ("teleop", "follow")]
+    assert defaults == [["inf"], ["20"]]
 
 
 def test_files_are_written_whole_in_the_form_of_their_suffix(run: Run, tmp_path: Path) -> None:
@@ -207,6 +231,41 @@ def test_an_interrupt_prints_the_summary_and_exits_130() -> None:
     assert tool.returncode == 130
     assert "final distance to turtle1" in err
     assert "Traceback" not in err
+    assert "\n\n" not in err
+
+
+def _open_stdin(*arguments: str) -> subprocess.Popen[str]:
+    """Start a leader from a standard input that stays open."""
+    return subprocess.Popen(
+        [*TOOL, "sim", "follow", "--leader", "-", "--emit", "poses", "-f", "csv", *arguments],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=console.ROOT,
+    )  # fmt: skip
+
+
+def test_in_real_time_one_key_is_enough_and_an_open_stdin_does_not_hold_the_end_up() -> None:
+    with _open_stdin("--realtime", "--duration", "0.4") as tool:
+        assert tool.stdin is not None
+        assert tool.stdout is not None
+        assert tool.stderr is not None
+        tool.stdin.write("up\n")
+        tool.stdin.flush()
+        assert tool.wait(20) == 0
+        assert tool.stdout.read().count(",turtle1,") == 25
+        assert tool.stderr.read().endswith("0.4 s simulated; wall hits: 0\n")
+
+
+@pytest.mark.parametrize("more", [(), ("--realtime",)])
+def test_an_interrupt_ends_a_run_that_waits_for_keys(more: tuple[str, ...]) -> None:
+    with _open_stdin("--duration", "inf", *more) as tool:
+        assert tool.stdin is not None
+        assert tool.stdout is not None
+        assert tool.stderr is not None
+        tool.stdin.write("up\nup\n")
+        tool.stdin.flush()
+        tool.stdout.readline()
+        tool.send_signal(signal.SIGINT)
+        assert tool.wait(20) == 130
+        assert "simulated; wall hits: 0\n" in tool.stderr.read()
 
 
 def test_keys_drive_the_turtle_in_a_terminal_and_commands_go_to_stdout() -> None:

@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.errors import alternatives
-from frametool.formats.source import Source, read_text
+from frametool.errors import FormatError, alternatives
+from frametool.formats.source import Source, decode, read_text
 from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
-from frametool.sim.twists import read_script, read_twists, stdin_lines
+from frametool.sim.twists import read_script, read_twists
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import Any
+
     from frametool.sim.leaders import MakeLeader
 
 
@@ -40,3 +43,29 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
     mailbox = Mailbox()
     mailbox.fill_from(read_twists(stdin_lines(), "stdin", period_ns=0))
     return lambda: mailbox
+
+
+def stdin_lines() -> Iterator[str]:
+    """Give the lines of standard input as they arrive.
+
+    Raises FormatError for bytes that are no text.
+    """
+    for number, data in enumerate(_lines(sys.stdin.buffer)):
+        try:
+            yield decode(data, "stdin")
+        except FormatError as error:
+            error.line += number
+            raise
+
+
+def _lines(stream: Any) -> Iterator[bytes]:
+    """Read past the stream's buffer: Python aborts when it ends while a thread waits inside that."""
+    begun: list[bytes] = []
+    while block := stream.raw.read(1 << 16):
+        first, *more = block.split(b"\n")
+        begun.append(first)
+        for rest in more:
+            yield b"".join(begun) + b"\n"
+            begun = [rest]
+    if last := b"".join(begun):
+        yield last

@@ -90,7 +90,7 @@ class Show:
     def play(self, scene: Scene) -> None:
         """Run a scene to its end and sum it up on stderr.
 
-        Raises KeyboardInterrupt after the summary when it was interrupted.
+        Raises click's Exit with status 130 after the summary when it was interrupted.
         """
         progress = Progress(scene, self.reach)
         drawing = self._drawing(scene)
@@ -109,7 +109,7 @@ class Show:
         if drawing:
             self._save(drawing)
         if interrupted:
-            raise KeyboardInterrupt
+            raise click.exceptions.Exit(130)  # click ends the line of stderr at a KeyboardInterrupt
 
     def _drawing(self, scene: Scene) -> Drawing | None:
         """Give what remembers the run for the plot, if there is to be one."""
@@ -213,6 +213,8 @@ def check_files(plot: str | None, output: str | None, *, force: bool) -> None:
     for path in filter(None, (plot, output)):
         if path != "-" and not force and os.path.lexists(path):
             raise FileProblem(f"{path}: exists; give --force to replace it")
+        if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
+            raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     if plot and suffix_of(plot) == ".png":
         from frametool.view.plot_png import require_matplotlib
 

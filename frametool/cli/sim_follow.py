@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, Number, Text
+from frametool.cli.command import TEXT, Command, Number, Text, decorated
 from frametool.cli.leader import leader_of
 from frametool.cli.play import Show, play_options
 from frametool.errors import ValueInvalid
@@ -19,6 +19,8 @@ from frametool.sim.targets import TARGETS
 from frametool.sim.world import VARIANTS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from frametool.sim.leaders import MakeLeader
     from frametool.sim.scene import Scene
 
@@ -57,8 +59,8 @@ class Duration(Number):
         return seconds
 
 
-def follow_options(function: Any) -> Any:
-    """Give a command the options of followers."""
+def follow_options(duration: str) -> Callable[[Any], Any]:
+    """Give a command the options of followers; `duration` is how long it runs if not told."""
     options = [
         click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
                      help="the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)"),
@@ -73,16 +75,14 @@ def follow_options(function: Any) -> Any:
                      help="follow where the target was so long ago, looked up through world  [default: 0]"),
         click.option("--spawn", type=Spawn(), default="4,2,0", show_default=True, metavar="X,Y,THETA",
                      help="where turtle2 begins: metres, radians (or 90deg)"),
-        click.option("--duration", type=Duration(), default="20", show_default=True, metavar="S",
+        click.option("--duration", type=Duration(), default=duration, show_default=True, metavar="S",
                      help="simulated seconds, or inf"),
         click.option("--turtlesim", type=click.Choice(VARIANTS), default="ros1", show_default=True,
                      help="whose turtlesim"),
         click.option("--holonomic", is_flag=True, help="let linear.y count in ROS 2, as the node's parameter does"),
         click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader"),
     ]  # fmt: skip
-    for option in reversed(options):
-        function = option(function)
-    return function
+    return lambda function: decorated(function, options)
 
 
 @click.command(cls=Command, name="follow")
@@ -90,7 +90,7 @@ def follow_options(function: Any) -> Any:
               help="still, circle, square, figure8, random, a file of commands, or - for standard input")
 @click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
               help="each follows the one before")
-@follow_options
+@follow_options("20")
 @play_options
 def command(leader: str, followers: int, **options: Any) -> None:
     """Let turtle2 follow turtle1 by tf, as the tutorial does, and print its velocity commands.
@@ -101,7 +101,8 @@ def command(leader: str, followers: int, **options: Any) -> None:
       frametool sim follow --leader figure8 --followers 3 --plot chain.svg --emit tf
 
     A leader file has t, linear, angular as CSV, JSON or YAML; standard input also takes Twist messages and the words
-    up, down, left, right, one a second unless they say their time. A turtle at a wall is told of once, and every tick
+    up, down, left, right, one a second unless they say their time: simulated time waits for the next of them, or goes
+    on with --realtime, where they act when they come. A turtle at a wall is told of once, and every tick
     there is counted in the summary. Below 2 micrometres from its target a follower stands still.
     """
     show, scene = settled(options, leader, followers)
@@ -121,6 +122,8 @@ def settled(
     changes = {key: options.pop(key) for key in keys}
     names = ("spawn", "target", "delay", "duration", "turtlesim", "holonomic")
     chosen = {name: options.pop(name) for name in names}
+    if chosen["holonomic"] and chosen["turtlesim"] == "ros1":
+        raise click.UsageError("--holonomic is for --turtlesim ros2; in ROS 1 linear.y always counts")
     law, seed = options.pop("law"), options.pop("seed")
     show = Show(**options, **more)
     try:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, Command
-from frametool.cli.play import Show, play_options
+from frametool.cli.play import Show, play_options, tell
 from frametool.cli.poses import source_of, usage_if_inline
 from frametool.cli.sim_follow import Duration, duration_ns
 from frametool.errors import FormatError
+from frametool.frames.stamps import BILLION
 from frametool.sim.scenes import read_scene
+from frametool.sim.turtle import TICK_NS
+
+if TYPE_CHECKING:
+    from frametool.sim.scene import Scene
 
 
 @click.command(cls=Command, name="run")
@@ -43,4 +48,17 @@ def command(scene: str, duration: float | None, seed: int | None, **options: Any
         read = read_scene(source_of(scene), seed=seed)
     except FormatError as error:
         raise usage_if_inline(error) from None
-    show.play(read if duration is None else read._replace(duration_ns=duration_ns(duration)))
+    scene_now = read if duration is None else read._replace(duration_ns=duration_ns(duration))
+    _warn_of_late(scene_now)
+    show.play(scene_now)
+
+
+def _warn_of_late(scene: Scene) -> None:
+    """Tell of events that the end comes before; an event acts at the first tick after its time."""
+    if scene.duration_ns is None:
+        return
+    last_ns = scene.duration_ns // TICK_NS * TICK_NS
+    if late := [call for call in scene.calls if call.t_ns >= last_ns]:
+        end = f"{scene.duration_ns / BILLION:g} s"
+        more = f", nor do {len(late) - 1} more" if late[1:] else ""
+        tell(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")

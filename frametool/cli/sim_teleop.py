@@ -26,7 +26,7 @@ QUIT = b"qQ\x04"
 @click.command(cls=Command, name="teleop")
 @click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
               help="each follows the one before, the first follows turtle1")
-@follow_options
+@follow_options("inf")
 @play_options
 def command(followers: int, **options: Any) -> None:
     """Drive turtle1 with the arrow keys, as turtle_teleop_key does; turtle2 follows. Drawn in the terminal; q ends it.
@@ -42,10 +42,7 @@ def command(followers: int, **options: Any) -> None:
     if not sys.stdin.isatty():
         raise click.UsageError("standard input is no terminal; pipe key names into frametool sim follow --leader -")
     mailbox = Mailbox()
-    options = {**options, "live": True}
-    if click.get_current_context().get_parameter_source("duration") == click.core.ParameterSource.DEFAULT:
-        options["duration"] = float("inf")
-    show, scene = settled(options, lambda: mailbox, followers, leaders=True)
+    show, scene = settled({**options, "live": True}, lambda: mailbox, followers, leaders=True)
     with keyboard(mailbox, headings=scene.variant == "ros2"):
         show.play(scene)
 

@@ -42,17 +42,28 @@ class FollowController:
         self.max_angular = math.inf if max_angular is None else _checked("max_angular", max_angular, 0.0)
 
     def command(self, x: float, y: float) -> Twist:
-        """Give the command for a target seen at x ahead, y to the left (metres)."""
+        """Give the command for a target seen at x ahead, y to the left (metres).
+
+        Raises ValueInvalid when a gain makes the velocity infinite.
+        """
         distance = math.sqrt(x * x + y * y)
         if distance < ARRIVED:
             return Twist(0.0, 0.0)
         linear = self.gain_linear * distance
         angular = self.gain_angular * math.atan2(y, x)
-        return Twist(_limited(linear, self.max_linear), _limited(angular, self.max_angular))
+        try:
+            return Twist(_limited(linear, self.max_linear), _limited(angular, self.max_angular))
+        except ValueInvalid:
+            raise ValueInvalid(unbounded(self.gain_linear, self.gain_angular, distance)) from None
 
     def due_ns(self, count: int) -> int:
         """Give the time of the control step of that number, from 0; rounded once, so that no rate drifts."""
         return round(count * BILLION / self.rate)
+
+
+def unbounded(gain_linear: float, gain_angular: float, distance: float) -> str:
+    """Say that gains are too great; metres."""
+    return f"gain_linear {gain_linear:g}, gain_angular {gain_angular:g} give no finite velocity at {distance:g} m"
 
 
 def _limited(value: float, most: float) -> float:

@@ -25,10 +25,11 @@ class Progress:
     def __init__(self, scene: Scene, reach: float = 0.5) -> None:
         """Begin before the first step."""
         self.reach = reach
-        self.t_ns = 0
+        self.t_ns: int | None = None  # of the last step
         self.walls: dict[str, int] = {}
         self.distances: dict[str, float] = {}
         self.reached_ns: dict[str, int] = {}
+        self.gone: dict[str, tuple[str, int]] = {}  # follower -> who of the two left the world, and when
         self._follows = scene.followers
 
     def watch(self, step: Step) -> None:
@@ -42,21 +43,30 @@ class Progress:
                 self.distances[name] = distance
                 if distance <= self.reach:
                     self.reached_ns.setdefault(name, step.t_ns)
+            elif step.is_tick and name in self.distances:
+                del self.distances[name]
+                self.gone[name] = (follow.leader if name in step.states else name, step.t_ns)
 
     def lines(self) -> Iterator[str]:
         """Give the summary: one line a follower, then the walls."""
+        if self.t_ns is None:
+            yield "ended before the first step"
+            return
         yield from (self._line(name, follow) for name, follow in self._follows.items())
         hits = ", ".join(f"{name} {count}" for name, count in sorted(self.walls.items()))
         yield f"{_seconds(self.t_ns)} simulated; wall hits: {sum(self.walls.values())}" + (f" ({hits})" if hits else "")
 
     def _line(self, name: str, follow: Follow) -> str:
         target = follow.leader if follow.target == "leader" else f"the {follow.target} of {follow.leader}"
-        if name not in self.distances:
+        if name not in self.distances and name not in self.gone:
             return f"{name}: never in the world together with {follow.leader}"
         reached = self.reached_ns.get(name)
         near = f"within {self.reach:g} m"
         soon = f"never {near}" if reached is None else f"{near} after {_seconds(reached)}"
-        return f"{name}: final distance to {target} {self.distances[name]:.4f} m; {soon}"
+        if name in self.distances:
+            return f"{name}: final distance to {target} {self.distances[name]:.4f} m; {soon}"
+        who, when_ns = self.gone[name]
+        return f"{name}: no final distance, {who} left the world at {_seconds(when_ns)}; {soon}"
 
 
 def goal(leader: State, follow: Follow, now_ns: int) -> State:

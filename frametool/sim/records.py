@@ -102,11 +102,16 @@ def table(rows: Sequence[dict[str, float | None]], form: str, number: Callable[[
     if form == "json":
         return "".join(f"{json_dump(row, number or repr)}\n" for row in rows)
     if form == "yaml":
-        return "".join(yaml_dump([row], number or repr) for row in rows)
+        return "".join(_yaml_line(row, number or repr) for row in rows)
     cells = _csv_cell if form == "csv" else _text_cell
     lines = [[cells(cell, number) for cell in row.values()] for row in rows]
     columns = list(rows[0])
     return "".join(_aligned(line, columns) if form == "text" else ",".join(line) + "\n" for line in [columns, *lines])
+
+
+def _yaml_line(row: dict[str, float | None], number: Callable[[float], str]) -> str:
+    """Write an item of a list, on one line whatever is missing."""
+    return "- {" + ", ".join(f"{key}: {yaml_dump(cell, number).rstrip()}" for key, cell in row.items()) + "}\n"
 
 
 def _csv_cell(cell: Any, number: Callable[[float], str] | None) -> str:

@@ -37,8 +37,6 @@ SCENE_KEYS = ("turtles", "events", "duration", "turtlesim", "holonomic", "seed")
 CONTROLLER_KEYS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
 FOLLOW_KEYS = ("follow", "law", *CONTROLLER_KEYS, "target", "delay")
 TURTLE_KEYS = ("spawn", "leader", *FOLLOW_KEYS)
-NAMES = frozenset(("turtle", "name"))
-ANGLES = frozenset(("theta", "angular"))
 DURATION_S = "20"
 RADIANS = 3.141592653589793 / 180.0
 
@@ -177,16 +175,12 @@ def _call(value: Any) -> Call:
 def _arguments(service: str, value: Any) -> dict[str, float | str]:
     """Read a service's arguments and check that none is missing."""
     given = _known(value, SERVICES[service], f"the arguments of {service}")
-    arguments = {key: within((key,), _argument(key), each) for key, each in given.items()}
+    arguments = {key: within((key,), ARGUMENTS.get(key, _number), each) for key, each in given.items()}
     try:
         complete(service, arguments)
     except ValueInvalid as error:
         raise Misfit(str(error)) from None
     return arguments
-
-
-def _argument(key: str) -> Callable[[Any], Any]:
-    return _name if key in NAMES else _angle if key in ANGLES else _flag if key == "off" else _number
 
 
 def _known(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
@@ -270,7 +264,15 @@ def _integer(text: str) -> int:
     return int(text)
 
 
+def _pen_byte(text: str) -> float:
+    value = parse_number(text)
+    if not (0.0 <= value <= 255.0 and value.is_integer()):
+        raise ValueInvalid(f"expected a whole number 0 .. 255, found {text}")
+    return value
+
+
 _number = _guarded(parse_number, "a number")
+_byte = _guarded(_pen_byte, "a whole number 0 .. 255")
 _angle = _guarded(_radians, "an angle in radians, or like 90deg")
 _stamp = _guarded(_not_negative, "a time in seconds")
 _duration = _guarded(_endless, "a duration in seconds, or inf")
@@ -283,11 +285,15 @@ def _flag(value: Any) -> float:
     return float(_truth(value)) if value in ("true", "false") else float(_number(value))
 
 
+ARGUMENTS = {"turtle": _name, "name": _name, "theta": _angle, "angular": _angle, "off": _flag}  # others: numbers
+ARGUMENTS |= dict.fromkeys(("r", "g", "b", "width"), _byte)
+
+
 def _place(value: Any) -> Place:
     """Read [x, y], [x, y, theta] or {x, y, theta}: metres, radians."""
     if type(value) is dict:
         given = _known(value, ("x", "y", "theta"), "a place")
-        x, y, theta = (within((key,), _argument(key), given.get(key, "0")) for key in ("x", "y", "theta"))
+        x, y, theta = (within((key,), ARGUMENTS.get(key, _number), given.get(key, "0")) for key in ("x", "y", "theta"))
         return x, y, theta
     if type(value) is not list or len(value) not in (2, 3):
         raise Misfit(f"expected [x, y, theta], found {kind(value)}")

@@ -219,7 +219,10 @@ class Chase:
             self._tell(error, step)
             return
         self._failing = ""
-        twist = self.follow.controller.command(x, y)
+        try:
+            twist = self.follow.controller.command(x, y)
+        except ValueInvalid as error:
+            raise ValueInvalid(f"{self.turtle}: {error}") from None
         stage.world.turtles[self.turtle].command(twist)
         states = stage.states
         distance = math.sqrt(x * x + y * y)

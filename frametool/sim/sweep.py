@@ -12,7 +12,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
-from frametool.sim.controllers import ARRIVED, FollowController
+from frametool.sim.controllers import ARRIVED, FollowController, unbounded
 from frametool.sim.scene import TUTORIAL_SPAWN, tutorial
 from frametool.sim.simulate import simulate
 from frametool.sim.turtle import DT, PI, SIZE, TICK_NS, TIMEOUT_NS
@@ -64,7 +64,7 @@ def simulate_many(
         starts = np.stack([xs, ys, np.zeros_like(xs)], axis=-1)
         simulate_many("circle", spawn=starts).time_to_reach
 
-    Raises ValueInvalid for what `FollowController` would refuse, and for a spawn that is not finite.
+    Raises ValueInvalid for what `FollowController` would refuse, for velocities and a spawn that are not finite.
     """
     law_itself = FollowController(law, rate=rate)
     given = dict(zip(NUMBERS, (gain_linear, gain_angular, max_linear, max_angular), strict=True))
@@ -217,8 +217,17 @@ class _Crowd:
         ahead, left = cosine * across + sine * up, cosine * up - sine * across
         distance = np.sqrt(ahead * ahead + left * left)
         moving = distance >= ARRIVED
-        self.speed = np.clip(self.gain_linear * distance * moving, -self.max_linear, self.max_linear)
-        self.turn = np.clip(self.gain_angular * np.arctan2(left, ahead) * moving, -self.max_angular, self.max_angular)
+        with np.errstate(over="ignore"):  # what comes of it is refused below
+            self.speed = np.clip(self.gain_linear * distance * moving, -self.max_linear, self.max_linear)
+            turn = self.gain_angular * np.arctan2(left, ahead) * moving
+        self.turn = np.clip(turn, -self.max_angular, self.max_angular)
+        self._check_finite(distance)
+
+    def _check_finite(self, distance: Floats) -> None:
+        finite = np.isfinite(self.speed) & np.isfinite(self.turn)
+        if not finite.all():
+            first = int(np.argmin(finite))
+            raise ValueInvalid(unbounded(self.gain_linear[first], self.gain_angular[first], distance[first]))
 
     def result(self, leader: State) -> tuple[Any, ...]:
         """Give the fields of Many."""

@@ -1,6 +1,6 @@
 """Velocity commands in: leader files and streams, one command at a time, each with its line.
 
-    t,linear,angular                                     CSV: columns by name, also linear_y; others are not looked at
+    t,linear,angular                                     CSV: columns by name, also linear_y and those of sim's own CSV
     - {t: 0.5, linear: 2.0, angular: 0.0}                YAML or JSON: mappings, in a list or as documents
     {linear: {x: 2.0}, angular: {z: 1.8}}                Twist messages
     up                                                   a word a line: the arrow keys of turtle_teleop_key
@@ -11,13 +11,13 @@ Metres and radians a second, times in seconds. What has no time comes one period
 from __future__ import annotations
 
 import re
-import sys
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, ValueInvalid, alternatives
+from frametool.formats.detect import NOISE
 from frametool.formats.documents import format_error, parse_documents
 from frametool.formats.numbers import parse_number
-from frametool.formats.source import Source, decode, placed_error
+from frametool.formats.source import Source, placed_error
 from frametool.formats.values import Misfit, as_mapping, kind, read_number, read_numbers, within
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp
 from frametool.sim.leaders import KEYS
@@ -36,9 +36,11 @@ COLUMNS = {
     "linear_x": "linear", "angular_z": "angular",
 }  # fmt: skip
 NEEDED = ("t", "linear", "angular")
+RECORDED = ("turtle", "distance", "leader_x", "leader_y", "leader_theta", "x", "y", "theta")  # not looked at
 ENTRY_KEYS = ("t", "turtle", "linear", "angular", "linear_y")
 AXES = ("x", "y", "z")
-EXPECTED = f"a command is {{t: 0.5, linear: 2.0, angular: 0.0}}, a Twist message, or a key: {', '.join(KEYS)}"
+COMMAND = f"{{t: 0.5, linear: 2.0, angular: 0.0}}, a Twist message, or a key: {', '.join(KEYS)}"
+EXPECTED = f"a command is {COMMAND}"
 _WORD = re.compile(r"[A-Za-z_]+\s*").fullmatch
 _CSV_HEADER = re.compile(r"[^-{\[:,][^:,]*(,[^:,]*)+").fullmatch
 
@@ -107,16 +109,6 @@ def read_twists(lines: Iterable[str], name: str, *, period_ns: int = BILLION) ->
             raise
 
 
-def stdin_lines() -> Iterator[str]:
-    """Give the lines of standard input as they arrive."""
-    for number, data in enumerate(sys.stdin.buffer):
-        try:
-            yield decode(data, "stdin")
-        except FormatError as error:
-            error.line += number
-            raise
-
-
 def _next_time(stamp_ns: int | None, last_ns: int | None, period_ns: int, path: Path) -> int:
     """Settle the time of a command, which may not lie before the last one's."""
     if stamp_ns is None:
@@ -134,7 +126,7 @@ def _chunks(lines: Iterable[str], name: str) -> Iterator[Chunk]:
     columns: dict[str, int] | None = None
     begun = False
     for number, line in enumerate(lines, 1):
-        text = line.rstrip("\r\n")
+        text = _without_noise(line.rstrip("\r\n"))
         if columns is not None:
             if text.strip() and not text.startswith("#"):
                 yield Chunk(name, text, number, columns)
@@ -153,6 +145,11 @@ def _chunks(lines: Iterable[str], name: str) -> Iterator[Chunk]:
         yield Chunk(name, "\n".join(pending), number - len(pending) + 1)
 
 
+def _without_noise(text: str) -> str:
+    """Blank a line that the shell or the tools wrote beside the messages; one of theirs ends a document."""
+    return text if NOISE(text) is None else "---" if text.endswith("---") else ""
+
+
 def _stands_alone(text: str) -> bool:
     """Tell whether a line needs none of the following: a key's name, an object of JSON."""
     return _WORD(text) is not None or (text.startswith("{") and text.rstrip().endswith("}"))
@@ -169,6 +166,9 @@ def _header(chunk: Chunk) -> dict[str, int]:
             columns[COLUMNS[name]] = index
     if missing := [name for name in NEEDED if name not in columns]:
         raise chunk.error(f"no column {', '.join(missing)}; columns: {', '.join(names)}")
+    for index, name in enumerate(names):
+        if name not in COLUMNS and name not in RECORDED:
+            raise chunk.error(f"unknown column {name!r}{alternatives(name, COLUMNS, 'columns')}", (index,))
     return columns | {"": len(names)}
 
 
@@ -222,7 +222,7 @@ def _entry(value: Any) -> tuple[int | None, Twist]:
     if type(value) is list:
         t, linear, angular = _listed(value)
         return t, Twist(linear, angular)
-    entry = as_mapping(value, EXPECTED)
+    entry = as_mapping(value, f"a command {COMMAND}")
     if unknown := [key for key in entry if key not in ENTRY_KEYS]:
         known = alternatives(unknown[0], ENTRY_KEYS, "keys")
         raise Misfit(f"unknown key {unknown[0]!r}{known}", (unknown[0],), key=True)

@@ -88,3 +88,15 @@ def test_nobody_is_nobody() -> None:
 def test_what_one_follower_refuses_many_refuse(wrong: dict[str, object]) -> None:
     with pytest.raises(ValueInvalid):
         simulate_many(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("gains", [{"gain_linear": 1e308}, {"gain_angular": -1.7e308}])
+def test_a_gain_that_gives_no_finite_velocity_is_refused_by_both(gains: dict[str, float]) -> None:
+    with pytest.raises(ValueInvalid, match=r"gain_linear .* give no finite velocity at 3\.86632"):
+        simulate_many(**gains)  # type: ignore[arg-type]
+    with pytest.raises(ValueInvalid, match=r"^turtle2: gain_linear .* give no finite velocity at 3\.86632"):
+        list(simulate(tutorial(law=FollowController(**gains))))  # type: ignore[arg-type]
+
+
+def test_a_limit_makes_any_gain_possible() -> None:
+    assert np.isfinite(simulate_many(gain_linear=1e308, max_linear=2.0, duration=1.0).distance)

@@ -230,6 +230,10 @@ def test_control_steps_do_not_drift(rate: float) -> None:
     assert abs(FollowController(rate=rate).due_ns(1_000_000) - 1_000_000 / rate * 1e9) < 1.0
 
 
+def test_a_run_that_never_began_has_no_distances() -> None:
+    assert list(Progress(tutorial()).lines()) == ["ended before the first step"]
+
+
 def test_a_chain_of_followers_converges() -> None:
     progress, _ = last_of(tutorial(followers=4, duration=60.0))
     assert [*progress.reached_ns] == ["turtle2", "turtle3", "turtle4", "turtle5"]

@@ -30,9 +30,11 @@ ECHO = "linear:\n  x: 2.0\n  y: 0.0\n  z: 0.0\nangular:\n  x: 0.0\n  y: 0.0\n  z
     "text",
     [
         "t,linear,angular\n0,2,0\n0.5,0,-1.5\n",
-        "# made by hand\n\nangular, note, linear, t\r\n0,a b,2,0\r\n# more\r\n-1.5,,0,0.5",
+        "# made by hand\n\nangular, turtle, linear, t\r\n0,a b,2,0\r\n# more\r\n-1.5,,0,0.5",
         "t,turtle,linear_x,angular_z,distance\n0,a,2,0,\n500000000ns,a,0,-1.5,",
         "- {t: 0, linear: 2, angular: 0}\n- {t: 0.5, linear: 0, angular: -1.5}\n",
+        "$ ros2 topic echo /turtle1/cmd_vel\nt: 0\nlinear: 2\n---\nt: 0.5\nangular: -1.5\n$ exit\n",
+        "$ cat leader.csv\nt,linear,angular\n0,2,0\n0.5,0,-1.5\n",
         "- [0, 2, 0]\n- [0.5, 0, -1.5]\n",
         '{"t": 0, "linear": 2}\n{"t": 0.5, "angular": -1.5}\n',
         '[{"t": 0, "linear": 2}, {"t": 0.5, "angular": {"z": -1.5}}]',
@@ -72,6 +74,9 @@ def test_a_stream_is_read_one_command_at_a_time() -> None:
         ("t,lin,angular\n", "bad:1:1: no column linear; columns: t, lin, angular"),
         ("t,linear,angular,linear_x\n", "bad:1:18: two columns for linear"),
         ("0,1,0\n", "bad:1:1: no column t, linear, angular"),
+        ("t,linear,angular,linearx\n", "bad:1:18: unknown column 'linearx'; did you mean 'linear_x'?"),
+        ("5\n", "bad:1:1: expected a command {t: 0.5, linear: 2.0, angular: 0.0}, a Twist message, or a key"),
+        ("$ cat x\n- {t: 1, linar: 1}\n", "bad:2:10: unknown key 'linar'"),
         ("- {t: 1, linear: 1}\n- {t: 0, linear: 1}\n", "bad:2:7: t 0.000000000 comes after"),
         ("- {t: 1, linar: 1}\n", "bad:1:10: unknown key 'linar'; did you mean 'linear'?"),
         ("- {t: 1}\n", "bad:1:3: neither linear nor angular"),
@@ -161,6 +166,9 @@ def test_a_list_of_turtles_and_a_leader_file_beside_the_scene_are_read(tmp_path:
         ("turtles: {a: }\nevents:\n- {t: 1}\n", "s.yaml:3:3: an event has t and one of spawn"),
         ("turtles: {a: }\nevents:\n- {t: 1, spawn: {x: 1}}\n", "s.yaml:3:17: spawn needs y"),
         ("turtles: {a: }\nevents:\n- {t: x, kill: a}\n", "s.yaml:3:7: 'x' is not a time"),
+        ("turtles: {a: }\nevents:\n- {t: 1, set_pen: {turtle: a, r: 300}}\n", "s.yaml:3:34: expected a whole number 0 .. 255"),
+        ("turtles: {a: }\nevents:\n- {t: 1, set_pen: {turtle: a, g: -4}}\n", "s.yaml:3:34: expected a whole number 0 .. 255"),
+        ("turtles: {a: }\nevents:\n- {t: 1, set_pen: {turtle: a, width: 1e9}}\n", "s.yaml:3:38: expected a whole number"),
         ("turtles: {a: }\nseed: 1.5\n", "s.yaml:2:7: expected a whole number"),
     ],
 )
@@ -215,3 +223,10 @@ def test_a_leader_reads_what_a_follower_commanded() -> None:
 def test_a_table_shows_what_is_missing(form: str) -> None:
     text = table([{"gain": 0.5, "time": None, "hits": 3}], form)
     assert {"text": "-", "yaml": "null", "json": "null", "csv": ",,"}[form] in text
+
+
+def test_every_row_of_a_yaml_table_has_one_line_whatever_is_missing() -> None:
+    table_rows: list[dict[str, float | None]] = [{"gain": 0.5, "time": None}, {"gain": 1e-5, "time": 2.0}]
+    text = table(table_rows, "yaml")
+    assert text.splitlines() == ["- {gain: 0.5, time: null}", "- {gain: 1.0e-05, time: 2.0}"]
+    assert yaml.safe_load(text) == table_rows
