@@ -93,7 +93,7 @@ def command(
     body at TARGET's origin: angular R w, linear R v + t x R w.
 
     \b
-      printf 'stamp,x,y,z\\n0.5,1,0,0\\n2.5,1,0,0\\n' | frametool apply examples/drive.yaml map lidar --time-column stamp
+      printf 'stamp,x,y,z\\n0.5,1,0,0\\n2,1,0,0\\n' | frametool apply examples/drive.yaml map lidar --time-column stamp
 
     Stamps are decimal seconds (12.5) or nanoseconds (12500000000ns, or a name like stamp_ns), exact to the nanosecond.
     A row at a time without data is a bad row, as --on-error says.
