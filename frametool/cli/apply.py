@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -108,7 +107,7 @@ def command(
         way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
     if time_column is not None:
         _check_timed(rest, at)
-    elif rest in ((), ("-",)) and (recording := _messages(stream.path)) is not None:
+    elif rest in ((), ("-",)) and (recording := _messages(stream)) is not None:
         _move_messages(recording, kind, way, output, normalize=normalize)
         return 0
     if rest in ((), ("-",)):
@@ -270,16 +269,14 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
         yield Point((x, y, z), kind or "point")
 
 
-def _messages(path: str | None) -> Recording | None:
-    """Open a stream of stamped ROS messages, as its first bytes tell; None for any other."""
-    if path is None and sys.stdin.isatty():
-        return None
-    with_peek = getattr(sys.stdin.buffer, "peek", None) if path is None else None
-    if path is None and with_peek is None:
+def _messages(stream: Stream) -> Recording | None:
+    """Take a stream for stamped ROS messages where its first bytes tell; None for any other."""
+    opened = stream.opened()
+    if opened.isatty():
         return None
     from frametool.formats.recordings import open_messages
 
-    return open_messages(path or "-")
+    return open_messages(stream.path or "-", opened)
 
 
 def _read(argument: str | Source, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:

@@ -121,3 +121,28 @@ def test_mistakes_are_one_line_with_their_status(
     assert (code, out) == (status, b"")
     assert err.startswith(message)
     assert err.count(b"\n") == 1
+
+
+def test_a_pipe_given_by_its_name_loses_nothing(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with start(*MOVE, "-i", str(pipe)) as process:
+        pipe.write_bytes(ROWS)
+        assert process.communicate()[0] == MOVED
+
+
+def in_shell(redirection: str, *arguments: str, text: bytes = ROWS) -> tuple[int, bytes, bytes]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = ["sh", "-c", f'exec "$@" {redirection}', "sh", *TOOL, *arguments]
+    done = subprocess.run(command, input=text, capture_output=True, check=False, env=environment)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_a_closed_input_is_told() -> None:
+    for arguments in (MOVE, ["invert"]):
+        assert in_shell("<&-", *arguments) == (5, b"", b"frametool: standard input is closed\n")
+
+
+def test_what_nobody_is_told_does_not_change_the_data() -> None:
+    assert in_shell("2>&-", *MOVE) == (0, MOVED, b"")
+    assert in_shell("2>/dev/full", *MOVE, "--on-error", "skip", text=ROWS + b"8,1,2,?\n") == (3, MOVED, b"")
