@@ -16,11 +16,15 @@ DONE, BAD_DATA, ROWS_SKIPPED = 0, 1, 3
 
 
 class Fault(NamedTuple):
-    """One bad row: its line, the name of the column that is to blame ("" for the whole row), and why."""
+    """One bad row: its line, the name of the column that is to blame ("" for the whole row), and why.
+
+    final: nothing behind it can be read
+    """
 
     line: int
     column: str
     reason: str
+    final: bool = False
 
 
 class Stopped(FormatError):
@@ -42,7 +46,7 @@ class Policy:
         """Tell of the faults of a block; raise Stopped at the first if that is the rule."""
         for fault in faults:
             self.count += 1
-            if self.on_error == STOP:
+            if self.on_error == STOP or fault.final:
                 raise Stopped(self._message(fault))
             if self.count <= self.most:
                 self.tell(f"{self._message(fault)} ({self._fate()})")

@@ -22,6 +22,7 @@ MILLIMETRES = "_mm"
 WHOLE = tuple(f"m{row}{column}" for row in "1234" for column in "1234")
 # `quaternion` stands for the three that share its columns; six_d's are a matrix's, euler's say no axes: by --from only
 SEARCHED = ("quaternion", "rpy", "axis_angle", "rotvec", "matrix", "mrp")
+WITH_XYZ = ("axis_angle", "rotvec", "mrp")  # their columns look like a position with a prefix
 SAME_COLUMNS = {"xyzw": "quaternion", "wxyz": "quaternion"}
 
 
@@ -56,9 +57,10 @@ def find_positions(names: Sequence[str]) -> list[Columns]:
     """Give every three columns that can be a position."""
     found = []
     quaternions = {(each.prefix, each.suffix) for each in find_quaternions(names)}
+    turns = {place for name in WITH_XYZ for each in _of_representation(name, names, None) for place in each.places}
     for base in POSITIONS:
         for places, prefix, suffix in _matches(base.split(), names):
-            if (prefix, suffix) in quaternions or suffix.startswith(OTHER_UNITS):
+            if (prefix, suffix) in quaternions or suffix.startswith(OTHER_UNITS) or turns.issuperset(places):
                 continue
             unit = 1000.0 if suffix.startswith(MILLIMETRES) else 1.0
             found.append(_columns(places, names, prefix, suffix)._replace(unit=unit))
