@@ -194,8 +194,12 @@ def _way_by_tree(
     if not {target, source or target} <= set(tree.frames):
         tree.lookup(target, source or target)  # raises, and names the nearest frames
 
+    plain: dict[str, str] = {}  # so that a leading / is told of once
+
     def start(own: str | None) -> str:
-        if (settled := _settled(own, source)) is None:
+        if own and own not in plain:
+            plain[own] = frame_name(own, tree)
+        if (settled := _settled(own and plain[own], source)) is None:
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
         return settled
 
@@ -225,7 +229,7 @@ def own_frame(record: Pose | Point) -> str | None:
 
 def _settled(own: str | None, source: str | None) -> str | None:
     """Settle which frame a record is given in: where both it and the command say, they must agree."""
-    if own is not None and source is not None and own != source:
+    if own and source is not None and own != source:
         raise ValueInvalid(
             f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame"
         )

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from io import BufferedReader
+from io import BufferedReader, FileIO
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, Notations, be_verbose
 from frametool.cli.telling import tell
-from frametool.errors import FileProblem, FormatError
+from frametool.errors import FileProblem
 from frametool.formats.detect import HEAD
 from frametool.formats.source import Source, decode
 from frametool.stream.detect import RECORDS, STREAMS, form_of
@@ -196,7 +196,7 @@ def _opened(path: str | None) -> BufferedReader:
         stream = sys.stdin.buffer
         return stream if isinstance(stream, BufferedReader) else BufferedReader(stream)  # type: ignore[arg-type]
     try:
-        return open(path, "rb", buffering=HEAD)
+        return BufferedReader(FileIO(path), HEAD)
     except OSError as error:
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
 
@@ -206,10 +206,3 @@ def one_notation(given: Any) -> Any:
     if given and len(given) > 1:
         raise click.UsageError("--from takes one representation")
     return given[0] if given else None
-
-
-def no_columns(error: FormatError) -> FormatError:
-    """Count what --columns names wrongly as misuse."""
-    if not error.line:
-        error.exit_code = 2
-    return error

@@ -31,6 +31,12 @@ class Stopped(FormatError):
     """Report the bad row that ended the run; the rows before it are out."""
 
 
+class Misused(FormatError):
+    """Report options that do not fit the columns of a table."""
+
+    exit_code = 2
+
+
 class Policy:
     """Tell of faults as they come, count them, and say how the run ends."""
 
@@ -41,6 +47,7 @@ class Policy:
         self.most = most
         self.tell = tell
         self.count = 0
+        self._frames_told = False  # the list of those there are is told once
 
     def take(self, faults: Iterable[Fault]) -> None:
         """Tell of the faults of a block; raise Stopped at the first if that is the rule."""
@@ -61,8 +68,11 @@ class Policy:
         return ROWS_SKIPPED
 
     def _message(self, fault: Fault) -> str:
+        reason, frames, _ = fault.reason.partition(" frames: ")
+        if not frames or not self._frames_told:
+            self._frames_told, reason = self._frames_told or bool(frames), fault.reason
         column = f"{fault.column}: " if fault.column else ""
-        return f"{self.source}:{fault.line}:{' ' * (not column)}{column}{fault.reason}"
+        return f"{self.source}:{fault.line}:{' ' * (not column)}{column}{reason.rstrip(';')}"
 
     def _fate(self) -> str:
         return "row skipped" if self.on_error == SKIP else "no result"

@@ -58,12 +58,12 @@ def _blocks(stream: Source, delimiter: bytes, size: int) -> Iterator[bytes]:
     size = size or BLOCK_BYTES
     if not delimiter:
         return read_blocks(stream, size=size)
-    return read_blocks(
-        stream,
-        size=size,
-        whole=lambda text: whole_records(text, delimiter),
-        is_torn=lambda rest: is_torn(rest, delimiter),
-    )
+
+    def whole(text: bytes) -> int:
+        end = whole_records(text, delimiter)
+        return -1 if is_torn(text[end:], delimiter) else end
+
+    return read_blocks(stream, size=size, whole=whole)
 
 
 def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:

@@ -41,13 +41,12 @@ def read_blocks(
     size: int = BLOCK_BYTES,
     longest: int = LONGEST_LINE,
     whole: Callable[[bytes], int] = whole_lines,
-    is_torn: Callable[[bytes], bool] | None = None,
 ) -> Iterator[bytes]:
     """Yield blocks of whole lines, in order; only the very last may lack its line end.
 
     size: bytes a block has when the stream delivers as fast as they are taken.
-    whole: how many bytes of a text are finished records; for records of several lines.
-    is_torn: whether what is left over will never be a record: it is the last block then.
+    whole: how many bytes of a text are finished records; for records of several lines. Where it is
+    negative they will never be, and the text is the last block.
     Raises FormatError if one record is longer than `longest`.
     """
     ready = _readiness(stream)
@@ -57,11 +56,12 @@ def read_blocks(
         if b"\n" in piece:
             text = b"".join(pieces)
             end = whole(text)
+            if end < 0:
+                pieces = [text]
+                break
             pieces = [text[end:]]
             if end:
                 yield text[:end]
-            if is_torn is not None and is_torn(pieces[0]):
-                break
         if sum(map(len, pieces)) > longest:
             raise FormatError(f"a line is longer than {longest} bytes: this is no text in lines")
     if rest := b"".join(pieces):

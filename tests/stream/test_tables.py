@@ -223,3 +223,10 @@ def test_a_quote_that_is_never_closed_ends_the_run(on_error: str, lines: int, si
 def test_a_quote_that_opens_nothing_is_text() -> None:
     assert flow(b'id,x,y,z\n5",1,2,3\n6,1,2,3', MOVE).text == b'id,x,y,z\n5",-1.0,3.0,6.0\n6,-1.0,3.0,6.0'
     assert flow(b'"id,x,y,z\n5,1,2,3\n', MOVE).told == ["in:1: a quote is opened here and not closed"]
+
+
+@pytest.mark.parametrize("first", [b"", b"7 "])
+def test_sixteen_columns_are_a_matrix(first: bytes) -> None:
+    given = convert("quaternion")._replace(given=convert("matrix").notations[0])
+    row = first + b"1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1\n"
+    assert flow(row, given, "columns", header=False).text == first + b"1.0 2.0 3.0 0.0 0.0 0.0 1.0\n"
