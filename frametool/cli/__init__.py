@@ -11,6 +11,7 @@ import click
 
 from frametool import __version__
 from frametool.cli.help import WithHelp
+from frametool.cli.telling import tell
 from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, alternatives
 
 if TYPE_CHECKING:
@@ -175,7 +176,7 @@ def _report(error: FrametoolError, arguments: Sequence[str]) -> int:
 
     if not wants_json(arguments):
         return _complain(_with_snippet(error), error.exit_code)
-    print(as_json(error), file=sys.stderr)  # noqa: T201
+    tell(as_json(error))
     return error.exit_code
 
 
@@ -185,13 +186,13 @@ def _with_snippet(error: FrametoolError) -> str:
 
 
 def _complain(message: str, status: int) -> int:
-    print(f"frametool: {message}", file=sys.stderr)  # noqa: T201 - this is where errors become text
+    tell(f"frametool: {message}")
     return status
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     start = "" if isinstance(message, Tf2Warning) else "frametool: warning: "
-    print(f"{start}{message}", file=sys.stderr)  # noqa: T201 - this is where warnings become text
+    tell(f"{start}{message}")
 
 
 def _die_of_closed_pipe() -> int:

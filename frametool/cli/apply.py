@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -108,7 +107,7 @@ def command(
         way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
     if time_column is not None:
         _check_timed(rest, at)
-    elif rest in ((), ("-",)) and (recording := _messages(stream.path)) is not None:
+    elif rest in ((), ("-",)) and (recording := _messages(stream)) is not None:
         _move_messages(recording, kind, way, output, normalize=normalize)
         return 0
     if rest in ((), ("-",)):
@@ -195,8 +194,12 @@ def _way_by_tree(
     if not {target, source or target} <= set(tree.frames):
         tree.lookup(target, source or target)  # raises, and names the nearest frames
 
+    plain: dict[str, str] = {}  # so that a leading / is told of once
+
     def start(own: str | None) -> str:
-        if (settled := _settled(own, source)) is None:
+        if own and own not in plain:
+            plain[own] = frame_name(own, tree)
+        if (settled := _settled(own and plain[own], source)) is None:
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
         return settled
 
@@ -226,7 +229,7 @@ def own_frame(record: Pose | Point) -> str | None:
 
 def _settled(own: str | None, source: str | None) -> str | None:
     """Settle which frame a record is given in: where both it and the command say, they must agree."""
-    if own is not None and source is not None and own != source:
+    if own and source is not None and own != source:
         raise ValueInvalid(
             f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame"
         )
@@ -270,16 +273,14 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
         yield Point((x, y, z), kind or "point")
 
 
-def _messages(path: str | None) -> Recording | None:
-    """Open a stream of stamped ROS messages, as its first bytes tell; None for any other."""
-    if path is None and sys.stdin.isatty():
-        return None
-    with_peek = getattr(sys.stdin.buffer, "peek", None) if path is None else None
-    if path is None and with_peek is None:
+def _messages(stream: Stream) -> Recording | None:
+    """Take a stream for stamped ROS messages where its first bytes tell; None for any other."""
+    opened = stream.opened()
+    if opened.isatty():
         return None
     from frametool.formats.recordings import open_messages
 
-    return open_messages(path or "-")
+    return open_messages(stream.path or "-", opened)
 
 
 def _read(argument: str | Source, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:

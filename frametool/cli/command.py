@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
 SPELLINGS = [f"{name}:AXES" if name == "euler" else name for name in REPRESENTATIONS]
-EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 4 lookup failed, 5 file problem."
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file, 130 interrupted."
 
 
 class Command(WithHelp):

@@ -7,6 +7,7 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from frametool.cli.telling import tell
 from frametool.errors import FileProblem, ValueInvalid
 from frametool.formats import FORMATS, writers
 from frametool.formats.pose import Pose
@@ -84,7 +85,7 @@ class Output:
     def tell_of_lock(self, poses: Sequence[Pose]) -> None:
         """Say of a single result that its Euler angles are not unique."""
         if len(poses) == 1 and any(is_locked(poses[0], form) for form in self.style.notations):
-            print("frametool: note: gimbal lock: the angles are not unique; the third was set to 0", file=sys.stderr)  # noqa: T201
+            tell("frametool: note: gimbal lock: the angles are not unique; the third was set to 0")
 
     def points(self, records: Iterable[dict[str, Any]]) -> None:
         """Write points."""

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-from io import BufferedReader
+from io import BufferedReader, FileIO
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, Notations, be_verbose
-from frametool.errors import FileProblem, FormatError
+from frametool.cli.telling import tell
+from frametool.errors import FileProblem
+from frametool.formats.detect import HEAD
 from frametool.formats.source import Source, decode
 from frametool.stream.detect import RECORDS, STREAMS, form_of
 from frametool.stream.faults import MOST, ON_ERROR, STOP, Policy
@@ -90,6 +92,13 @@ class Stream:
         self.path: str | None = self.options["input_path"]
         if self.path == "-":
             self.path = None
+        self._opened: BufferedReader | None = None
+
+    def opened(self) -> BufferedReader:
+        """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
+        if self._opened is None:
+            self._opened = _opened(self.path)
+        return self._opened
 
     def is_wanted(self, argument: object) -> bool:
         """Tell whether standard input or -i FILE is to be read in this argument's place."""
@@ -105,11 +114,11 @@ class Stream:
         as_spelled: records cannot be shown otherwise than they are spelled.
         """
         name = self.path or "stdin"
-        with _opened(self.path) as stream:
+        with self.opened() as stream:
             begin = stream.peek()
             form, known_by = form_of(begin, self.path or "", told=self.options["input_form"] or _table_form(output))
             if self.options["verbose"] and known_by:
-                click.echo(f"frametool: {name}: read as {form} ({STREAMS[form]}), known by {known_by}", err=True)
+                tell(f"frametool: {name}: read as {form} ({STREAMS[form]}), known by {known_by}")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             if form in RECORDS and not as_spelled and (output.told or form) != form:
@@ -147,7 +156,7 @@ class Stream:
             name,
             request.on_error,
             most=self.options["max_errors"],
-            tell=lambda text: click.echo(f"frametool: {text}", err=True),
+            tell=lambda text: tell(f"frametool: {text}"),
         )
         progress = Progress(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"])
         outcomes = self._outcomes(stream, form, request, name)
@@ -180,12 +189,14 @@ def _table_form(output: Output) -> str:
 def _opened(path: str | None) -> BufferedReader:
     """Open the input; raises FileProblem."""
     if path is None:
+        if sys.stdin is None:
+            raise FileProblem("standard input is closed")
         if sys.stdin.isatty():
-            click.echo("frametool: reading from the terminal; end with Ctrl-D", err=True)
+            tell("frametool: reading from the terminal; end with Ctrl-D")
         stream = sys.stdin.buffer
         return stream if isinstance(stream, BufferedReader) else BufferedReader(stream)  # type: ignore[arg-type]
     try:
-        return open(path, "rb")
+        return BufferedReader(FileIO(path), HEAD)
     except OSError as error:
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
 
@@ -195,10 +206,3 @@ def one_notation(given: Any) -> Any:
     if given and len(given) > 1:
         raise click.UsageError("--from takes one representation")
     return given[0] if given else None
-
-
-def no_columns(error: FormatError) -> FormatError:
-    """Count what --columns names wrongly as misuse."""
-    if not error.line:
-        error.exit_code = 2
-    return error

@@ -31,10 +31,10 @@ _HEADER = re.compile(r"\bheader\b")
 class Recording:
     """A file that was opened and looked at: its name for messages, its form, its bytes."""
 
-    def __init__(self, path: str | PathLike[str]) -> None:
+    def __init__(self, path: str | PathLike[str], stream: BinaryIO | None = None) -> None:
         """Open a file, a bag's folder, or standard input for `-`, and detect its form.
 
-        Raises FileProblem.
+        stream: what was opened already, with nothing of it read.  Raises FileProblem.
         """
         self.path = str(path)
         self.name = "stdin" if self.path == "-" else self.path
@@ -43,7 +43,7 @@ class Recording:
         self.raw = False
         self.stream: BinaryIO | None = None
         if not _is_bag_folder(self.path):
-            self.stream = _opened(self.path)
+            self.stream = stream or _opened(self.path)
             self.form = detect(self.stream.peek(HEAD)[:HEAD])  # type: ignore[attr-defined]
 
     @property
@@ -96,13 +96,10 @@ def samples_of(recording: Recording, report: Report | None = None) -> Iterator[S
             yield Sample(edge.parent, edge.child, edge.pose.components, edge.stamp_ns)
 
 
-def open_messages(path: str) -> Recording | None:
-    """Open what begins with a ROS message, as text or JSON lines; None for anything else, nothing of it read."""
-    stream = _opened(path)
+def open_messages(path: str, stream: BinaryIO) -> Recording | None:
+    """Take a stream that begins with a ROS message, as text or JSON lines; None for any other, nothing of it read."""
     head = stream.peek(HEAD)[:HEAD]  # type: ignore[attr-defined]
-    if path != "-":
-        stream.close()
-    return Recording(path) if detect(head) in ("echo", "jsonl") else None
+    return Recording(path, stream) if detect(head) in ("echo", "jsonl") else None
 
 
 def _raise(error: FormatError) -> None:
@@ -121,6 +118,8 @@ def _opened(path: str) -> BinaryIO:
     import io
 
     if path == "-":
+        if sys.stdin is None:
+            raise FileProblem("standard input is closed")
         stdin = sys.stdin.buffer
         return stdin if hasattr(stdin, "peek") else io.BufferedReader(stdin)  # type: ignore[type-var]
     try:

@@ -12,7 +12,7 @@ from frametool.formats.numbers import explain_angle, explain_number, parse_angle
 from frametool.geometry import arrays, rigid
 from frametool.stream.faults import NULL, STOP, Fault
 from frametool.stream.movers import NOWHERE, by_frame, by_time
-from frametool.stream.pieces import Const, Out
+from frametool.stream.pieces import Const, In, Instead, Out
 from frametool.stream.rotations import read_rotations
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
 from frametool.stream.shape import IDENTITY, POSE, TURN, pose_of
@@ -38,7 +38,7 @@ class Plan(NamedTuple):
     pieces: the text of a result; null: what stands for each number of a row without one
     edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
     timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
-    yaml: numbers need a point before the exponent
+    yaml: numbers need a point before the exponent; frame_column: the name of the column that names frames
     """
 
     shapes: tuple[Shape, ...]
@@ -56,6 +56,7 @@ class Plan(NamedTuple):
     edges: tuple[Rigid | None, ...] = ()
     timed: Timed | None = None
     sources: tuple[str | None, ...] = ()
+    frame_column: str = ""
 
 
 class State:
@@ -126,9 +127,12 @@ class Run:
         shapes = max(len(plan.shapes), 1)
         if plan.timed is not None and self.count:
             frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
-            return [by_time(plan.timed, *each, self._blame) for each in zip(block.stamps, frames, strict=True)]
+            return [
+                by_time(plan.timed, *each, self._blame, plan.frame_column)
+                for each in zip(block.stamps, frames, strict=True)
+            ]
         if plan.edge_of is not None and self.count:
-            return [by_frame(plan.edge_of, block.frames, self._blame)] * shapes
+            return [by_frame(plan.edge_of, block.frames, self._blame, plan.frame_column)] * shapes
         return list(plan.edges) or [None] * shapes
 
     def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
@@ -227,15 +231,11 @@ class Run:
         return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked))]
 
     def _null_rows(self) -> list[tuple[Ints, list[Spans]]]:
-        if self.plan.on_error != NULL or not self.reasons:
+        plan = self.plan
+        if plan.on_error != NULL or not self.reasons:
             return []
         rows = np.array(sorted(self.reasons), np.int64)
-        pieces = [
-            Const(piece.between.join([self.plan.null] * (piece.last - piece.first)))
-            if isinstance(piece, Out)
-            else piece
-            for piece in self.plan.pieces
-        ]
+        pieces = [_without_result(piece, plan.null) for piece in plan.pieces]
         parts = [chosen(part, rows) for part in self.block.parts]
         return [(self.block.places[rows], assemble(pieces, parts, None, np.zeros(len(rows), np.int64)))]
 
@@ -243,6 +243,13 @@ class Run:
         """Give what is wrong, line by line."""
         found = [Fault(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
         return sorted(found + [Fault(each.line, each.column, each.reason) for each in self.block.broken])
+
+
+def _without_result(piece: Piece, null: bytes) -> Piece:
+    """Give what stands in a row without a result: nulls for its numbers, the input for what was put in its place."""
+    if isinstance(piece, Out):
+        return Const(piece.between.join([null] * (piece.last - piece.first)))
+    return In(piece.part) if isinstance(piece, Instead) else piece
 
 
 def _read_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, did_you_mean
 from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -22,6 +23,7 @@ MILLIMETRES = "_mm"
 WHOLE = tuple(f"m{row}{column}" for row in "1234" for column in "1234")
 # `quaternion` stands for the three that share its columns; six_d's are a matrix's, euler's say no axes: by --from only
 SEARCHED = ("quaternion", "rpy", "axis_angle", "rotvec", "matrix", "mrp")
+WITH_XYZ = ("axis_angle", "rotvec", "mrp")  # their columns look like a position with a prefix
 SAME_COLUMNS = {"xyzw": "quaternion", "wxyz": "quaternion"}
 
 
@@ -56,9 +58,10 @@ def find_positions(names: Sequence[str]) -> list[Columns]:
     """Give every three columns that can be a position."""
     found = []
     quaternions = {(each.prefix, each.suffix) for each in find_quaternions(names)}
+    turns = {place for name in WITH_XYZ for each in _of_representation(name, names, None) for place in each.places}
     for base in POSITIONS:
         for places, prefix, suffix in _matches(base.split(), names):
-            if (prefix, suffix) in quaternions or suffix.startswith(OTHER_UNITS):
+            if (prefix, suffix) in quaternions or suffix.startswith(OTHER_UNITS) or turns.issuperset(places):
                 continue
             unit = 1000.0 if suffix.startswith(MILLIMETRES) else 1.0
             found.append(_columns(places, names, prefix, suffix)._replace(unit=unit))
@@ -181,10 +184,12 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
 def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notation | None) -> Pose:
     """Take columns by name or by position from 1 (`2-8`): x y z, a rotation's, or first the one and then the other.
 
-    Raises ValueInvalid-like FormatError without a place for names that are not there, or a count that says nothing.
+    Raises Misused for names that are not there, or a count that says nothing.
     """
     places = [place for word in spec.split(",") for place in _places(word.strip(), names, width)]
     shown = names or [f"column {place + 1}" for place in range(width)]
+    if twice := sorted({shown[place] for place in places if places.count(place) > 1}):
+        raise Misused(f"--columns: {', '.join(twice)} stands twice")
     position = _columns(places[:3], shown)._replace(unit=1000.0 if shown[places[0]].endswith(MILLIMETRES) else 1.0)
     if len(places) == 3 and given is None:
         found = find_rotations([shown[place] for place in places], None) if names else []
@@ -206,12 +211,12 @@ def _form_of(places: Sequence[int], shown: Sequence[str], given: Notation | None
         size = len(given.representation.columns)
         if len(places) in (size, size + 3):
             return given, size
-        raise FormatError(
+        raise Misused(
             f"--columns: {given.spec} takes {size} columns, or {size + 3} with x y z before them; found {len(places)}"
         )
     if len(places) == 7:
         return notation("xyzw"), 4
-    raise FormatError(f"--columns: {len(places)} columns do not say what they are; add --from REP")
+    raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
 
 
 def _form_by_names(chosen: Sequence[str], given: Notation | None) -> Notation | None:
@@ -233,6 +238,6 @@ def _places(word: str, names: Sequence[str] | None, width: int) -> list[int]:
         low, high = int(first), int(last or first)
         if 1 <= low <= high <= width:
             return list(range(low - 1, high))
-        raise FormatError(f"--columns: {word} is not within 1-{width}")
+        raise Misused(f"--columns: {word} is not within 1-{width}")
     near = did_you_mean(word, names or ())
-    raise FormatError(f"--columns: no column {word!r}{near}; columns: {', '.join(names or [f'1-{width}'])}")
+    raise Misused(f"--columns: no column {word!r}{near}; columns: {', '.join(names or [f'1-{width}'])}")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from frametool.errors import FormatError
-from frametool.stream.pieces import Const, In, Out
+from frametool.stream.faults import Misused
+from frametool.stream.pieces import Const, In, Instead, Out
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -65,15 +65,9 @@ class Layout(NamedTuple):
     def null_row(self, cells: Sequence[bytes]) -> bytes:
         """Give a row without a result, as far as its cells go."""
         padded = [*cells, *[self.null] * len(self.columns)]
-        given = [
-            padded[column.place] if isinstance(column, Kept) else _told(column, self.null) for column in self.columns
-        ]
+        given = [self.null if isinstance(column, New) else padded[column.place] for column in self.columns]
         most = max((column.place for column in self.columns if not isinstance(column, New)), default=-1)
         return (self.delimiter or b" ").join([*given, *cells[max(most + 1, max(self.places, default=-1) + 1) :]])
-
-
-def _told(column: Column, null: bytes) -> bytes:
-    return column.text.encode() if isinstance(column, Told) else null
 
 
 def quoted(name: str, delimiter: bytes) -> bytes:
@@ -105,7 +99,7 @@ def lay_out(
             if follows and end == width - 1:
                 pieces.append(Const(between))
         else:
-            pieces += _written(group, between, delimiter)
+            pieces += _written(group, between, delimiter, stretches)
             if not last and not isinstance(groups[at + 1][0], Kept):
                 pieces.append(Const(between))
     if not stretches or stretches[-1][3] != "line":
@@ -122,9 +116,10 @@ def lay_out(
     )
 
 
-def _written(group: Sequence[Column], between: bytes, delimiter: bytes) -> list[Piece]:
+def _written(group: Sequence[Column], between: bytes, delimiter: bytes, stretches: list[Stretch]) -> list[Piece]:
     if isinstance(group[0], Told):
-        return [Const(quoted(group[0].text, delimiter))]
+        stretches.append((group[0].place, group[0].place, "cell", "cell"))
+        return [Instead(len(stretches) - 1, quoted(group[0].text, delimiter))]
     first, last = group[0].number, group[-1].number  # type: ignore[union-attr]
     return [Out(first, last + 1, between)]
 
@@ -144,8 +139,11 @@ def _grouped(columns: Sequence[Column]) -> list[list[Column]]:
 
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
-    """Raise FormatError if a new column would be called as one that stays."""
+    """Raise Misused if a new column would be called as one that stays, or as another new one."""
     kept = [names[column.place] for column in columns if not isinstance(column, New)]
-    clash = sorted({column.name for column in columns if isinstance(column, New) and column.name in kept})
+    new = [column.name for column in columns if isinstance(column, New)]
+    if twice := sorted({name for name in new if new.count(name) > 1}):
+        raise Misused(f"--to: columns {', '.join(twice)} would stand twice")
+    clash = sorted(set(new).intersection(kept))
     if clash:
-        raise FormatError(f"columns {', '.join(clash)} would stand twice; name the new ones with --prefix")
+        raise Misused(f"columns {', '.join(clash)} would stand twice; name the new ones with --prefix")

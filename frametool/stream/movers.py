@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 
 
-def by_frame(edge_of: Callable[[str], Rigid], frames: Sequence[str], blame: Blame) -> Rigid:
+def by_frame(edge_of: Callable[[str], Rigid], frames: Sequence[str], blame: Blame, column: str = "") -> Rigid:
     """Give the pose of each row by its frame's name; a row whose frame has none is bad."""
     table: list[Rigid] = []
     known: dict[str, tuple[int, str]] = {}
@@ -33,7 +33,7 @@ def by_frame(edge_of: Callable[[str], Rigid], frames: Sequence[str], blame: Blam
             known[name] = len(table), problem
             table.append(edge)
         if known[name][1]:
-            blame(row, "", known[name][1])
+            blame(row, column, known[name][1])
     chosen_rows = np.array([known[name][0] for name in frames], np.int64)
     return tuple(np.array(column)[chosen_rows] for column in zip(*table, strict=True))  # type: ignore[return-value]
 
@@ -46,17 +46,17 @@ def _edge(edge_of: Callable[[str], Rigid], name: str) -> tuple[Rigid, str]:
         return NOWHERE, str(error)
 
 
-def by_time(timed: Timed, stamps: Spans, frames: Sequence[str | None], blame: Blame) -> Rigid:
+def by_time(timed: Timed, stamps: Spans, frames: Sequence[str | None], blame: Blame, column: str = "") -> Rigid:
     """Give the pose of each row at its stamp; a row without a stamp or without data then is bad.
 
-    frames: one a row, or one for all (None: the one SOURCE).
+    frames: one a row, or one for all (None: the one SOURCE); column: the one that names them.
     """
     times, reasons = parse_stamps(stamps, in_ns=timed.in_ns)
     for row, reason in reasons.items():
         blame(row, timed.name, reason)
     poses = np.full((7, len(times)), np.nan)
     for frame, rows in _by_frame(frames, np.delete(np.arange(len(times)), list(reasons))):
-        _fill(poses, timed, frame, rows, times, blame)
+        _fill(poses, timed, frame, rows, times, blame, column)
     return tuple(poses)  # type: ignore[return-value]
 
 
@@ -69,13 +69,13 @@ def _by_frame(frames: Sequence[str | None], rows: Ints) -> list[tuple[str | None
     return [(frame, rows[of_row == number]) for frame, number in numbers.items()]
 
 
-def _fill(poses: Floats, timed: Timed, frame: str | None, rows: Ints, times: Ints, blame: Blame) -> None:
+def _fill(poses: Floats, timed: Timed, frame: str | None, rows: Ints, times: Ints, blame: Blame, column: str) -> None:
     """Look the rows of one frame up at once, then ask singly why some have no data."""
     try:
         poses[:, rows] = timed.many(frame, times[rows])
     except FrametoolError as error:
         for row in rows.tolist():
-            blame(row, "", str(error))
+            blame(row, column, str(error))
     else:
         for row in rows[np.isnan(poses[6, rows])].tolist():
             blame(row, timed.name, _reason(timed, frame, int(times[row])))

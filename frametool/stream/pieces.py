@@ -19,6 +19,13 @@ class Out(NamedTuple):
     between: bytes = b","
 
 
+class Instead(NamedTuple):
+    """Constant text in place of a stretch of the input, which stays where there is no result."""
+
+    part: int
+    text: bytes
+
+
 class Const(NamedTuple):
     """The same text in every row."""
 
@@ -31,4 +38,4 @@ class IfLocked(NamedTuple):
     text: bytes
 
 
-Piece: TypeAlias = In | Out | Const | IfLocked
+Piece: TypeAlias = In | Out | Const | IfLocked | Instead

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.stream.pieces import Const, IfLocked, In, Out
+from frametool.stream.pieces import Const, IfLocked, In, Instead, Out
 from frametool.text.fixed import fixed_spans
 from frametool.text.shortest import shortest_spans
 from frametool.text.spans import MARGIN, Spans, framed, join
@@ -96,7 +96,7 @@ def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, locked: I
         ends = values.ends[:, piece.first : piece.last].copy()
         ends[:, -1] -= 1
         return Spans(values.data, values.starts[:, piece.first : piece.last], ends)
-    text = piece.text if isinstance(piece, (Const, IfLocked)) else b""
+    text = piece.text if isinstance(piece, (Const, Instead, IfLocked)) else b""
     data = framed(text)
     starts = np.full(len(locked), MARGIN, np.int64)
     return Spans(data, starts, starts + (locked * len(text) if isinstance(piece, IfLocked) else len(text)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from frametool.errors import FileProblem
@@ -32,6 +33,7 @@ class Sink:
     def __init__(self, path: str | None, *, force: bool = False) -> None:
         """Write to a temporary file beside `path`, or to standard output; raises FileProblem if the file exists."""
         self.path = path
+        self._owner = os.getpid()
         self._part = f"{path}.{os.getpid()}.part"
         self._in_place = path is not None and is_special(path)
         self._writing = self._interrupted = False
@@ -55,8 +57,11 @@ class Sink:
             raise self._problem(error) from None
 
     def __enter__(self) -> Self:
-        """Take over Ctrl-C."""
-        self._before = signal.signal(signal.SIGINT, self._interrupt)
+        """Take over Ctrl-C, and with a temporary file the signals that would leave it behind."""
+        self._before = {signal.SIGINT: signal.signal(signal.SIGINT, self._interrupt)}
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if self.path and not self._in_place and signal.getsignal(number) is signal.SIG_DFL:
+                self._before[number] = signal.signal(number, self._give_up)
         return self
 
     def write(self, block: bytes) -> None:
@@ -82,14 +87,23 @@ class Sink:
             raise KeyboardInterrupt
         self._interrupted = True
 
+    def _give_up(self, number: int, _frame: FrameType | None) -> None:
+        """Take the temporary file away, and die of the signal; the processes of --jobs only die."""
+        if os.getpid() == self._owner:
+            os.unlink(self._part)
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
+
     def __exit__(
         self, kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
     ) -> None:
         """Put the file in its place if all went well, else leave nothing."""
-        signal.signal(signal.SIGINT, self._before)
+        for number, before in self._before.items():
+            signal.signal(number, before)
         if not self.path:
             return
-        self._stream.close()
+        with suppress(OSError):  # each block was flushed: what fails again was told
+            self._stream.close()
         if self._in_place:
             return
         if kind is None:

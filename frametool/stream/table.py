@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError
 from frametool.stream.rows import Block, Broken
-from frametool.text.cells import split_blank, split_delimited, without_quotes
+from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
 from frametool.text.spans import Spans
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENT = b"#"
-LONGEST_SHOWN = 60
+UNCLOSED = "a quote is opened here and not closed"
 
 
 class Table(NamedTuple):
@@ -54,6 +54,8 @@ def open_table(block: bytes, delimiter: bytes, *, header: bool, source: str) -> 
     rest = block[len(mark) :]
     skipped = _comments(rest) if not delimiter else 0
     line = _first_record(rest[skipped:], delimiter)
+    if delimiter and torn_record(line, delimiter) is not None:
+        raise FormatError(UNCLOSED, source=source, line=1)
     cells = _cells(line, delimiter)
     if not cells:
         raise FormatError("no rows in it", source=source)

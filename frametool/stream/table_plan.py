@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import FormatError, alternatives
 from frametool.geometry.representations import notation
 from frametool.stream.blocks import Plan
+from frametool.stream.faults import Misused
 from frametool.stream.header import Pose, find_poses, named_pose
 from frametool.stream.layout import Kept, New, Told, lay_out, refuse_repeated
 from frametool.stream.shape import POINT, POSE, Shape, Target
@@ -33,6 +34,9 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     target = _target(shapes, request)
     places = tuple(place for pose in poses for columns in pose if columns for place in columns.places)
     frames = _frame_columns(table, request, source)
+    edge_of = request.edge_of
+    if frames and edge_of is None:
+        edge_of = request.way
     columns = _columns(table, poses, shapes, target, request, frames)
     if table.header:
         refuse_repeated(columns, table.names or ())
@@ -40,8 +44,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     layout = layout._replace(time=_time_column(table, request, source))
     return Plan(
         shapes, (target,), request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
-        request.edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
-        timed=request.timed,
+        edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
+        timed=request.timed, frame_column=table.name(frames[0]) if len(frames) == 1 else "",
     ), layout  # fmt: skip
 
 
@@ -51,7 +55,7 @@ def _find(table: Table, request: Request, source: str) -> list[Pose]:
         return []
     if request.columns:
         if len(request.columns) != request.poses:
-            raise FormatError(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
+            raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
         return [named_pose(spec, table.names, table.width, request.given) for spec in request.columns]
     if table.names:
         return find_poses(table.names, request.given, request.poses, source)
@@ -65,6 +69,8 @@ def _find(table: Table, request: Request, source: str) -> list[Pose]:
 def _by_width(width: int, given: Notation | None) -> str:
     """Take all columns of a table without names for a point or pose: TUM's eight, or as many as it has numbers."""
     size = len(given.representation.columns) if given else 0
+    if given and given.representation.name == "matrix" and width in (16, 17):
+        return f"{width - 15}-{width}"
     if given and width in (size, size + 3, size + 4):
         return f"{1 + (width == size + 4)}-{width}"
     return {3: "1-3", 7: "1-7", 8: "2-8", 16: "1-16"}.get(width, "") if not given else ""
@@ -92,7 +98,10 @@ def _shape(pose: Pose, request: Request) -> Shape:
         moved = request.operation.moves and request.kind != POSE
         return Shape((request.kind or POINT) if moved else POSE, unit)
     if request.kind not in ("", POSE) and request.operation.moves:
-        return Shape(request.kind, unit)
+        raise Misused(
+            f"rows have a rotation, {pose.rotation.shown}, and cannot be taken for a {request.kind}; "
+            "name the three with --columns"
+        )
     form = pose.rotation.form
     return Shape(POSE, None if pose.rotation.whole else unit, form, request.in_degrees(form), pose.rotation.whole)
 
@@ -133,8 +142,10 @@ def _shifts(request: Request) -> bool:
 def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ...]:
     """Find the columns that name frames."""
     names = table.names or ()
+    found = [name for name in names if name in FRAME_NAMES or name.endswith(("header.frame_id",))]
+    if not request.frames and request.told is not None and request.operation.moves and len(found) == 1:
+        return (names.index(found[0]),)  # what rows say must agree with SOURCE
     if request.frames == ("",):
-        found = [name for name in names if name in FRAME_NAMES or name.endswith(("header.frame_id",))]
         if len(found) != 1:
             raise FormatError(
                 f"rows do not say their frame; name SOURCE, or give --frame-column; columns: {', '.join(names)}",
@@ -144,7 +155,7 @@ def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ..
         return (names.index(found[0]),)
     for name in request.frames:
         if name not in names:
-            raise FormatError(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
+            raise Misused(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
     return tuple(names.index(name) for name in request.frames)
 
 
@@ -154,7 +165,7 @@ def _time_column(table: Table, request: Request, source: str) -> int | None:
         return None
     name, names = request.timed.name, table.names or tuple(map(str, range(1, table.width + 1)))
     if name not in names:
-        raise FormatError(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
+        raise Misused(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
     return names.index(name)
 
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError
 from frametool.stream.blocks import Run, State
+from frametool.stream.faults import Fault
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, mapped
-from frametool.stream.table import open_table, table_block
+from frametool.stream.table import UNCLOSED, open_table, table_block
 from frametool.stream.table_plan import TUM, plan_table
-from frametool.text.cells import whole_records
-from frametool.text.lines import read_blocks, whole_lines
+from frametool.text.cells import is_torn, torn_record, whole_records
+from frametool.text.lines import BLOCK_BYTES, read_blocks
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
@@ -38,8 +39,7 @@ def run_table(
 ) -> Generator[Outcome]:
     """Give the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
     delimiter = DELIMITERS[form]
-    options = {"size": size} if size else {}
-    blocks = read_blocks(stream, whole=whole_records if delimiter else whole_lines, **options)
+    blocks = _blocks(stream, delimiter, size)
     first = _first_rows(blocks, delimiter)
     if first is None:
         raise FormatError("nothing in it", source=source)
@@ -51,6 +51,19 @@ def run_table(
     yield Outcome(head, lines=first.count(b"\n", 0, taken), size=taken)
     work = Work(table, plan, layout)
     yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if work.remembers else jobs)
+
+
+def _blocks(stream: Source, delimiter: bytes, size: int) -> Iterator[bytes]:
+    """Give blocks of whole rows; cells in quotes may hold line ends."""
+    size = size or BLOCK_BYTES
+    if not delimiter:
+        return read_blocks(stream, size=size)
+
+    def whole(text: bytes) -> int:
+        end = whole_records(text, delimiter)
+        return -1 if is_torn(text[end:], delimiter) else end
+
+    return read_blocks(stream, size=size, whole=whole)
 
 
 def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
@@ -82,7 +95,15 @@ class Work:
         self.remembers = plan.unwrap or plan.operation.of == "previous"
 
     def __call__(self, text: bytes) -> Outcome:
-        """Process one block."""
+        """Process one block; a quote that is not closed takes all behind it along."""
+        torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
+        if torn is None:
+            return self._done(text)
+        done = self._done(text[:torn]) if torn else Outcome(b"")
+        fault = Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True)
+        return done._replace(faults=[*done.faults, fault])
+
+    def _done(self, text: bytes) -> Outcome:
         block = table_block(self.table, self.layout, text)
         run = Run(self.plan, block, self.state)
         faults = run.faults()

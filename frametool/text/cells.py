@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from frametool.text.arrays import Bytes, Flags, Ints
 
 _NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
+MOST_QUOTED = 1 << 20  # bytes of a record whose quote is still open
+MOST_QUOTED_LINES = 10_000
 _NEWLINE, _RETURN, _QUOTE, _BLANK, _TAB = b'\n\r" \t'
 
 
@@ -102,6 +104,24 @@ def whole_records(text: bytes, delimiter: bytes = b",") -> int:
         return before_last_quote
     record_ends = [cell.end() for cell in _cell_pattern(delimiter).finditer(text) if cell[1] == b"\n"]
     return max(record_ends, default=0)
+
+
+def torn_record(text: bytes, delimiter: bytes) -> int | None:
+    """Give where the record begins that has a quote opened and not closed; None where all are closed."""
+    if _ends_outside_quotes(text, delimiter):
+        return None
+    start = 0
+    for cell in _cell_pattern(delimiter).finditer(text):
+        if cell.start(1) == len(text) and re.fullmatch(rb'"(?:[^"]++|"")*+', text[cell.start() :]):
+            return start
+        start = cell.end() if cell[1] == b"\n" else start
+    return None
+
+
+def is_torn(rest: bytes, delimiter: bytes) -> bool:
+    """Tell whether what is left of a block is more than any cell in quotes should hold, and its quote still open."""
+    is_much = b"\n" in rest and (len(rest) > MOST_QUOTED or rest.count(b"\n") > MOST_QUOTED_LINES)
+    return is_much and torn_record(rest, delimiter) == 0
 
 
 def _ends_outside_quotes(lines: bytes, delimiter: bytes) -> bool:

@@ -45,7 +45,8 @@ def read_blocks(
     """Yield blocks of whole lines, in order; only the very last may lack its line end.
 
     size: bytes a block has when the stream delivers as fast as they are taken.
-    whole: how many bytes of a text are finished records; for records of several lines.
+    whole: how many bytes of a text are finished records; for records of several lines. Where it is
+    negative they will never be, and the text is the last block.
     Raises FormatError if one record is longer than `longest`.
     """
     ready = _readiness(stream)
@@ -55,6 +56,9 @@ def read_blocks(
         if b"\n" in piece:
             text = b"".join(pieces)
             end = whole(text)
+            if end < 0:
+                pieces = [text]
+                break
             pieces = [text[end:]]
             if end:
                 yield text[:end]

@@ -16,7 +16,7 @@ class Progress:
         """Know the bytes there are in all, or None."""
         self.total = total
         self.rows = self.size = 0
-        self._hidden = quiet or not sys.stderr.isatty()
+        self._hidden = quiet or sys.stderr is None or not sys.stderr.isatty()
         self._start = time.monotonic()
         self._bar: Any = None
 

@@ -158,7 +158,7 @@ def test_the_cache_forgets_for_apply_too(run: Run) -> None:
         (["map", "base", "--at", "1"], 2, "leave --at out"),
         (["map", "base", "1", "2", "3"], 2, "--time-column is for the rows of a stream"),
         (["map", "bse"], 4, "did you mean 'base'?"),
-        (["map", "base", "--frame-column", "frme"], 1, "no column 'frme'"),
+        (["map", "base", "--frame-column", "frme"], 2, "no column 'frme'"),
         (["map", "base", "-f", "yaml"], 2, "a stream of csv stays csv"),
     ],
 )
@@ -170,7 +170,7 @@ def test_misuse_is_told(move: Run, arguments: list[str], status: int, complaint:
 
 def test_a_column_that_is_not_there_is_told_with_those_that_are(move: Run) -> None:
     outcome = move("map", "base", rows="stmp,x,y,z\n1,0,0,0\n")
-    assert outcome.status == 1
+    assert outcome.status == 2
     assert "no column 'stamp'; did you mean 'stmp'? columns: stmp, x, y, z" in outcome.err
 
 

@@ -107,7 +107,13 @@ def test_a_few_records_need_no_numpy() -> None:
     [
         ([*MOVE], b"", 1, b"frametool: stdin: nothing in it"),
         ([*MOVE], b"hello\n", 1, b"frametool: stdin:1: cannot tell the form of 'hello'"),
-        ([*MOVE, "--columns", "a,b,c"], b"x,y,z\n1,2,3\n", 1, b"frametool: --columns: no column 'a'"),
+        ([*MOVE, "--columns", "a,b,c"], b"x,y,z\n1,2,3\n", 2, b"frametool: --columns: no column 'a'"),
+        ([*MOVE, "--columns", "x,x,z"], b"x,y,z\n1,2,3\n", 2, b"frametool: --columns: x stands twice"),
+        (["invert", "--columns", "x,y"], b"x,y,z\n1,2,3\n", 2, b"frametool: --columns: 2 columns do not say"),
+        ([*MOVE, "--keep"], b"x,y,z\n1,2,3\n", 2, b"frametool: columns x, y, z would stand twice; name the new"),
+        (["convert", "--to", "rpy,rpy"], b"qx,qy,qz,qw\n0,0,0,1\n", 2, b"frametool: --to: columns pitch, roll"),
+        (["convert", "--to", "quaternion,xyzw"], b"roll,pitch,yaw\n0,0,0\n", 2, b"frametool: --to: columns qw"),
+        (["relative", "--consecutive"], b"x,y,z,angle\n0,0,0,1\n", 2, b"frametool: columns angle would stand twice"),
         ([*MOVE, "-i", "no.csv"], b"", 5, b"frametool: no.csv: no such file or directory"),
         ([*MOVE, "-i", "a.csv", "1", "2", "3"], b"", 2, b"frametool: apply: -i FILE and records are two inputs"),
         (["invert", "--in", "cvs"], b"", 2, b"frametool: invert: invalid value for '--in'"),
@@ -121,3 +127,83 @@ def test_mistakes_are_one_line_with_their_status(
     assert (code, out) == (status, b"")
     assert err.startswith(message)
     assert err.count(b"\n") == 1
+
+
+def test_a_pipe_given_by_its_name_loses_nothing(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with start(*MOVE, "-i", str(pipe)) as process:
+        pipe.write_bytes(ROWS)
+        assert process.communicate()[0] == MOVED
+
+
+def in_shell(redirection: str, *arguments: str, text: bytes = ROWS) -> tuple[int, bytes, bytes]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = ["sh", "-c", f'exec "$@" {redirection}', "sh", *TOOL, *arguments]
+    done = subprocess.run(command, input=text, capture_output=True, check=False, env=environment)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_a_closed_input_is_told() -> None:
+    for arguments in (MOVE, ["invert"]):
+        assert in_shell("<&-", *arguments) == (5, b"", b"frametool: standard input is closed\n")
+
+
+def test_what_nobody_is_told_does_not_change_the_data() -> None:
+    assert in_shell("2>&-", *MOVE) == (0, MOVED, b"")
+    assert in_shell("2>/dev/full", *MOVE, "--on-error", "skip", text=ROWS + b"8,1,2,?\n") == (3, MOVED, b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full disk at hand")
+def test_a_full_device_is_told_by_its_name() -> None:
+    message = b"frametool: /dev/full: no space left on device\n"
+    assert run(*MOVE, "-o", "/dev/full", text=ROWS) == (5, b"", message)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_who_is_ended_leaves_no_half_file(number: int, tmp_path: Path) -> None:
+    with start(*MOVE, "-v", "-o", str(tmp_path / "out.csv")) as process:
+        assert process.stdin is not None
+        process.stdin.write(ROWS)
+        process.stdin.flush()
+        while not list(tmp_path.iterdir()):
+            assert process.poll() is None
+        while b"\n" not in next(tmp_path.iterdir()).read_bytes():
+            assert process.poll() is None
+        process.send_signal(number)
+        assert process.wait() == -number
+    assert list(tmp_path.iterdir()) == []
+
+
+TREE = "frames: [{name: cam, parent: map, xyz: [1, 0, 0]}, {name: lid, parent: map, xyz: [2, 0, 0]}]\n"
+FRAMES = b"frame_id,x,y,z\ncam,0,0,0\n/lid,0,0,0\nnope,0,0,0\nmop,0,0,0\n"
+
+
+def in_tree(folder: Path, *arguments: str, text: bytes = FRAMES) -> tuple[int, bytes, list[str]]:
+    tree = folder / "tree.yaml"
+    tree.write_text(TREE)
+    status, out, err = run("apply", str(tree), "map", *arguments, text=text)
+    return status, out, err.decode().replace(str(tree), "TREE").splitlines()
+
+
+def test_rows_without_a_result_keep_the_name_of_their_frame(tmp_path: Path) -> None:
+    status, out, told = in_tree(tmp_path, "--on-error", "null")
+    assert (status, out) == (3, b"frame_id,x,y,z\nmap,1.0,0.0,0.0\nmap,2.0,0.0,0.0\nnope,,,\nmop,,,\n")
+    assert told == [
+        "frametool: warning: frame '/lid': the leading / is no part of a name and was left out",
+        "frametool: stdin:4:frame_id: unknown frame 'nope' in TREE; frames: cam, lid, map (no result)",
+        "frametool: stdin:5:frame_id: unknown frame 'mop' in TREE; did you mean 'map'? (no result)",
+        "frametool: stdin: 2 of 4 rows without result",
+    ]
+
+
+def test_rows_must_be_given_in_the_source(tmp_path: Path) -> None:
+    status, out, told = in_tree(tmp_path, "cam", "--on-error", "null", "--jobs", "2")
+    assert (status, out) == (3, b"frame_id,x,y,z\nmap,1.0,0.0,0.0\n/lid,,,\nnope,,,\nmop,,,\n")
+    assert "stdin:4:frame_id: a record is given in 'nope', not in 'cam'" in told[2]
+
+
+def test_poses_are_not_cut_down_to_points(tmp_path: Path) -> None:
+    status, out, told = in_tree(tmp_path, "cam", "--as", "point", text=b"x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1\n")
+    assert (status, out) == (2, b"")
+    assert "cannot be taken for a point" in told[0]

@@ -201,3 +201,32 @@ def test_tables_without_header_are_read_by_position() -> None:
     request = MOVE._replace(columns=("2-4",))
     assert flow(b"a,0,0,0\nb,1,1,1\n", request, header=False).text == b"a,1.0,2.0,3.0\nb,0.0,3.0,4.0\n"
     assert "--no-header" in flow(b"1,2,3\n", MOVE).told[0]
+
+
+@pytest.mark.parametrize("spec", ["rotvec", "rotvec_deg", "axis_angle_deg", "mrp"])
+def test_columns_of_a_rotation_are_no_position(spec: str) -> None:
+    text = b"id,x,y,z,qx,qy,qz,qw\n1,1,2,3,0.0,0.0,0.0,1.0\n"
+    assert flow(flow(text, convert(spec)).text, convert("quaternion")).text == text
+    alone = flow(b"qx,qy,qz,qw\n0,0,0.6,0.8\n", convert(spec)).text
+    assert flow(alone, INVERT).text.splitlines()[0] == alone.splitlines()[0]
+
+
+@pytest.mark.parametrize("on_error", ["stop", "skip", "null"])
+@pytest.mark.parametrize(("lines", "size", "jobs"), [(3, 0, 1), (3, 9, 1), (11_000, 20_000, 1), (60_000, 20_000, 2)])
+def test_a_quote_that_is_never_closed_ends_the_run(on_error: str, lines: int, size: int, jobs: int) -> None:
+    text = b'id,x,y,z,tag\n1,1,2,3,"a\nb"\n2,1,2,3,"a\n' + b"3,1,2,3,b\n" * lines
+    result = flow(text, MOVE._replace(on_error=on_error), size=size, jobs=jobs)
+    assert result.text == b'id,x,y,z,tag\n1,-1.0,3.0,6.0,"a\nb"\n'
+    assert (result.status, result.told) == (1, ["in:4: a quote is opened here and not closed"])
+
+
+def test_a_quote_that_opens_nothing_is_text() -> None:
+    assert flow(b'id,x,y,z\n5",1,2,3\n6,1,2,3', MOVE).text == b'id,x,y,z\n5",-1.0,3.0,6.0\n6,-1.0,3.0,6.0'
+    assert flow(b'"id,x,y,z\n5,1,2,3\n', MOVE).told == ["in:1: a quote is opened here and not closed"]
+
+
+@pytest.mark.parametrize("first", [b"", b"7 "])
+def test_sixteen_columns_are_a_matrix(first: bytes) -> None:
+    given = convert("quaternion")._replace(given=convert("matrix").notations[0])
+    row = first + b"1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1\n"
+    assert flow(row, given, "columns", header=False).text == first + b"1.0 2.0 3.0 0.0 0.0 0.0 1.0\n"
