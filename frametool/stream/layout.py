@@ -64,9 +64,9 @@ class Layout(NamedTuple):
 
     def null_row(self, cells: Sequence[bytes]) -> bytes:
         """Give a row without a result, as far as its cells go."""
-        padded = [*cells, *[self.null] * len(self.columns)]
-        given = [self.null if isinstance(column, New) else padded[column.place] for column in self.columns]
         most = max((column.place for column in self.columns if not isinstance(column, New)), default=-1)
+        padded = [*cells, *[self.null] * (most + 1)]
+        given = [self.null if isinstance(column, New) else padded[column.place] for column in self.columns]
         return (self.delimiter or b" ").join([*given, *cells[max(most + 1, max(self.places, default=-1) + 1) :]])
 
 

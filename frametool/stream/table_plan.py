@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
 
 TUM = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
-FRAME_NAMES = ("frame", "frame_id", "header.frame_id", "field.header.frame_id")
+FRAME_NAMES = ("frame_id", "header.frame_id", "field.header.frame_id")  # a column `frame` often counts pictures
 
 
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
