@@ -52,13 +52,13 @@ def _outcomes(
         return
     second = next(blocks, None) if len(first) < SMALL and _has_ended(stream) else b""
     records = splitter.records(first) if second is None else []
-    if second is None and len(records) <= FEW:
+    if second is None and len(records) <= FEW and not request.in_order:
         yield from _singly(first, records, form, request, source)
         return
     from frametool.stream.bulk import Work
 
     work = Work(splitter, form, request, source)
-    jobs = 1 if request.operation.of == "previous" or request.unwrap else jobs
+    jobs = 1 if request.in_order else jobs
     yield from mapped(work, _again(first, second, blocks), jobs)
 
 
