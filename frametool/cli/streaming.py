@@ -121,6 +121,14 @@ class Stream:
                 )
             return self._run(stream, form, self._completed(request, output), output)
 
+    def policy(self, name: str) -> Policy:
+        """Say what bad rows do."""
+
+        def tell(text: str) -> None:
+            click.echo(f"frametool: {text}", err=True)
+
+        return Policy(name, self.options["on_error"], most=self.options["max_errors"], tell=tell)
+
     def _completed(self, request: Request, output: Output) -> Request:
         """Add what the stream's options say to the request."""
         options = self.options
@@ -143,12 +151,7 @@ class Stream:
         from frametool.view.progress import Progress
 
         name = self.path or "stdin"
-        policy = Policy(
-            name,
-            request.on_error,
-            most=self.options["max_errors"],
-            tell=lambda text: click.echo(f"frametool: {text}", err=True),
-        )
+        policy = self.policy(name)
         progress = Progress(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"])
         outcomes = self._outcomes(stream, form, request, name)
         try:
