@@ -119,7 +119,7 @@ class Stream:
                 raise click.UsageError(
                     f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
                 )
-            return self._run(stream, form, self._completed(request, output), output)
+            return self._run(stream, form, self._completed(request, output, form), output)
 
     def policy(self, name: str) -> Policy:
         """Say what bad rows do."""
@@ -129,11 +129,11 @@ class Stream:
 
         return Policy(name, self.options["on_error"], most=self.options["max_errors"], tell=tell)
 
-    def _completed(self, request: Request, output: Output) -> Request:
+    def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
         options = self.options
-        if options["keep"] and output.told in RECORDS:
-            raise click.UsageError("--keep is for tables; a record holds one pose")
+        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or options["prefix"])):
+            raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
         return request._replace(
             given=request.given or self.given,
             notations=request.notations or output.notations,

@@ -118,8 +118,14 @@ class Editor:
             self.dropped.update((key,) if key else XYZ)
         elif None in self.slots[:3]:
             self._replace(self.node.value[key], self._member({key: list(SAMPLE[:3])}, 0))
-        else:
+        elif not self._position_stays():
             self._numbers(range(3), 0)
+
+    def _position_stays(self) -> bool:
+        """Tell whether only the notation of the rotation changes: then the position keeps its text."""
+        request = self.request
+        moves = request.operation.moves or request.way is not None or request.timed is not None
+        return request.operation.changes_nothing and not moves and not self.holder.inverse
 
     def _rotation(self) -> None:
         """Write the rotation where it stands, or its members anew."""
