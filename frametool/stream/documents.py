@@ -102,7 +102,9 @@ class Splitter:
             ends = [found.end() for found in _DOCUMENT_END.finditer(text)]
             return ends[-1] if ends else 0
         if self.lines is None:
-            self.lines = _first_line_is_whole(text[: whole_lines(text)])
+            lines = whole_lines(text)
+            is_long_array = not lines and len(text) > SMALL and text.removeprefix(MARK).lstrip().startswith(b"[")
+            self.lines = False if is_long_array else _first_line_is_whole(text[:lines])
         if self.lines is None:
             return 0
         return whole_lines(text) if self.lines else self._pretty(text)[1]
