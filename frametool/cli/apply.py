@@ -108,8 +108,10 @@ def command(
     if time_column is not None:
         _check_timed(rest, at)
     elif rest in ((), ("-",)) and (recording := _messages(stream)) is not None:
-        _move_messages(recording, kind, way, output, normalize=normalize)
-        return 0
+        from frametool.cli.messages import move_messages
+
+        announce(recording)
+        return move_messages(recording, kind, way, output, stream.policy(recording.name), normalize=normalize)
     if rest in ((), ("-",)):
         wishes = _wishes(way, frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
         outcome = stream.run(wishes, output, as_spelled=time_column is not None)
@@ -145,15 +147,6 @@ def _wishes(way: Way, frame_column: str | None, time_column: str | None) -> Requ
         Operation(left=fixed, moves=True), frames=frames, edge_of=edge_of if frames else None, way=edge_of,
         timed=timed, told=way.target,
     )  # fmt: skip
-
-
-def _move_messages(recording: Recording, kind: str | None, way: Way, output: Output, *, normalize: bool) -> None:
-    """Move stamped ROS messages, each from its own frame and at its own time."""
-    from frametool.formats.stamped_stream import read_stamped_messages
-
-    announce(recording)
-    messages = read_stamped_messages(recording, kind, normalize=normalize)
-    output.messages(each.moved(way.from_frame(each.frame, each.stamp_ns), way.target) for each in messages)
 
 
 class Way(NamedTuple):

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from frametool.formats.points import Point
+    from frametool.formats.ros_stream import Message
     from frametool.formats.stamped import Stamped
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
@@ -107,9 +108,16 @@ class Output:
     def _module(self, text_module: str) -> Any:
         return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)
 
-    def messages(self, messages: Iterable[Stamped]) -> None:
-        """Write messages as they come, each as it was written unless the command was told otherwise."""
-        self.pieces(map(self._message, messages))
+    def message(self, message: Message, moved: Sequence[Stamped]) -> str:
+        """Give the text of a message in which some moved: as it was spelled unless the command was told otherwise."""
+        from frametool.formats.stamped_text import respelled
+
+        if moved and self.told in (None, moved[0].form):
+            style = self.style.in_form(moved[0].form)
+            text = respelled(message.source.text, message.document, moved, style)
+            if text is not None:
+                return text if text.endswith("\n") else f"{text}\n"
+        return "".join(map(self._message, moved))
 
     def _message(self, message: Stamped) -> str:
         from frametool.formats.stamped import spelling

@@ -128,13 +128,18 @@ class Stream:
                 raise click.UsageError(
                     f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
                 )
-            return self._run(stream, form, self._completed(request, output), output)
+            return self._run(stream, form, self._completed(request, output, form), output)
 
-    def _completed(self, request: Request, output: Output) -> Request:
+    def policy(self, name: str) -> Policy:
+        """Say what bad rows do."""
+        most = self.options["max_errors"]
+        return Policy(name, self.options["on_error"], most=most, tell=lambda text: tell(f"frametool: {text}"))
+
+    def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
         options = self.options
-        if options["keep"] and output.told in RECORDS:
-            raise click.UsageError("--keep is for tables; a record holds one pose")
+        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or options["prefix"])):
+            raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
         return request._replace(
             given=request.given or self.given,
             notations=request.notations or output.notations,
@@ -152,12 +157,7 @@ class Stream:
         from frametool.view.progress import Progress
 
         name = self.path or "stdin"
-        policy = Policy(
-            name,
-            request.on_error,
-            most=self.options["max_errors"],
-            tell=lambda text: tell(f"frametool: {text}"),
-        )
+        policy = self.policy(name)
         progress = Progress(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"])
         outcomes = self._outcomes(stream, form, request, name)
         try:

@@ -58,6 +58,19 @@ def parse_json(source: Source) -> list[Any] | None:
     return values
 
 
+def strict_json(source: Source) -> list[Any]:
+    """Give the values of a text that must be JSON; raises FormatError with the place where it is none."""
+    values = parse_json(source)
+    if values is not None:
+        return values
+    try:
+        _decoded(source.text)
+    except ValueError as error:
+        problem = getattr(error, "msg", str(error))
+        raise error_at(source, getattr(error, "pos", 0), f"not JSON: {problem[:1].lower()}{problem[1:]}") from None
+    return []
+
+
 def json_marks(source: Source, paths: Sequence[Path]) -> dict[Path, tuple[tuple[int, int], tuple[int, int]]]:
     """Find the places (line, column) of keys and values in a text that parse_json reads."""
     found = find_marks(_place_events(source.text), paths)

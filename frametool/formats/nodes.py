@@ -8,7 +8,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.formats.json_text import looks_like_json
+from frametool.formats.json_text import looks_like_json, parse_json
+from frametool.formats.source import Source
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,12 +55,8 @@ class Node(NamedTuple):
 
 def parse_nodes(text: str) -> list[Node]:
     """Give the trees of all documents of a text."""
-    if looks_like_json(text):
-        try:
-            return list(_json_nodes(text))
-        except (ValueError, StopIteration, IndexError):
-            pass  # flow YAML
-    return list(_yaml_nodes(text))
+    is_json = looks_like_json(text) and parse_json(Source("", text)) is not None
+    return list(_json_nodes(text) if is_json else _yaml_nodes(text))
 
 
 def _json_nodes(text: str) -> Iterator[Node]:
@@ -81,8 +78,6 @@ def _json_node(token: re.Match[str], tokens: Iterator[re.Match[str]]) -> Node:
         pairs = {}
         while (token_in := next(tokens))[0] != "}":
             key = _json_node(token_in, tokens)
-            if not key.quote:
-                raise ValueError(word)
             pairs[key.value] = key, _json_node(next(tokens), tokens)
         return Node(token.start(), token_in.end(), pairs)
     quoted = word.startswith('"')

@@ -12,8 +12,9 @@ from frametool.errors import FormatError
 from frametool.formats import ros_csv
 from frametool.formats.detect import NOISE
 from frametool.formats.documents import format_error, parse_documents
+from frametool.formats.json_text import strict_json
 from frametool.formats.pieces import Piece, counted_from, documents, lines
-from frametool.formats.source import Source
+from frametool.formats.source import Source, check_text
 from frametool.formats.values import Misfit
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Itera
         for piece in documents(stream, name):
             yield from document_messages(piece, name, tally)
     elif form == "jsonl":
-        yield from _by_line(stream, name, tally, lambda line, number: _parsed(line, number, name))
+        yield from _by_line(stream, name, tally, lambda line, number: _json_line(line, number, name))
     else:
         yield from _csv(stream, name, form, tally)
 
@@ -96,6 +97,20 @@ def _parsed(text: str, line: int, name: str) -> Iterator[Message | FormatError]:
         return
     for document in found:
         yield Message(document.value, Source(name, text), line, document.index)
+
+
+def _json_line(text: str, line: int, name: str) -> Iterator[Message | FormatError]:
+    """Read the values on a line that must be JSON."""
+    source = Source(name, text.removeprefix("\ufeff"))
+    try:
+        with counted_from(line):
+            check_text(source)
+            values = strict_json(source)
+    except FormatError as error:
+        yield error
+        return
+    for index, value in enumerate(values):
+        yield Message(value, source, line, index)
 
 
 def _by_line(

@@ -12,7 +12,7 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.formats import ros
-from frametool.formats.numbers import parse_number
+from frametool.formats.numbers import NotFinite, parse_number
 from frametool.formats.ros_parts import frame_of, header_stamp, read_rigid, whole_list
 from frametool.formats.values import Misfit, as_mapping, read_numbers, within
 from frametool.geometry import floats, quaternion, rigid, spatial
@@ -69,6 +69,7 @@ class Stamped(NamedTuple):
     frame: str | None = None
     stamp_ns: int | None = None
     listed: str = ""  # the list that a TFMessage holds it in
+    path: Path = ()  # where it stands in the document
     form: str = ""  # how it was written: ros1, ros2, json; "" for the grammar of poses and points
 
     def moved(self, target_from_source: Rigid, target: str | None) -> Stamped:
@@ -83,7 +84,7 @@ class Stamped(NamedTuple):
 
     def mapping(self) -> dict[str, Any]:
         """Give the message with the numbers and the frame it has now; each transform in a TFMessage of its own."""
-        message = self._message()
+        message = plain(self._message())
         return {self.listed: [message]} if self.listed else message
 
     def _message(self) -> dict[str, Any]:
@@ -137,7 +138,7 @@ def read_stamped(message: dict[str, Any], key: str, reading: Reading) -> Stamped
         covariance = within(path, _covariance, inner) if "covariance" in inner else None
         inner, path = within((key, key), as_mapping, inner[key], f"the {key} as a mapping"), (key, key)
     numbers = within(path, _numbers, key, inner, reading)
-    return Stamped(plain(message), key, numbers, covariance, frame, stamp_ns)
+    return Stamped(message, key, numbers, covariance, frame, stamp_ns)
 
 
 def _numbers(key: str, inner: dict[str, Any], reading: Reading) -> Sequence[float]:
@@ -171,7 +172,10 @@ def plain(value: Any, key: str = "") -> Any:
         return value
     if _WHOLE.fullmatch(value):
         return int(value)
-    return parse_number(value) if _NUMBER.fullmatch(value) else _TRUTH.get(value, value)
+    try:
+        return parse_number(value) if _NUMBER.fullmatch(value) else _TRUTH.get(value, value)
+    except NotFinite:
+        return value
 
 
 def moveables(value: Any, reading: Reading) -> Iterator[Stamped]:
@@ -186,7 +190,7 @@ def moveables(value: Any, reading: Reading) -> Iterator[Stamped]:
             found = ", ".join(map(repr, list(message)[:8])) if type(message) is dict else repr(message)
             raise Misfit(f"expected a header and one of {', '.join(KINDS)}; found {found}", path)
         stamped = within(path, read_stamped, message, key, reading)
-        yield stamped._replace(listed=str(path[-2]) if path[-2:-1] and path[-2] in ros.LISTS else "")
+        yield stamped._replace(path=path, listed=str(path[-2]) if path[-2:-1] and path[-2] in ros.LISTS else "")
 
 
 def _each(value: Any, path: Path) -> Iterator[tuple[Any, Path]]:

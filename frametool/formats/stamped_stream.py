@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.formats.ros_stream import read_messages
@@ -10,40 +10,53 @@ from frametool.formats.stamped import moveables, spelling
 from frametool.formats.values import Misfit, Reading
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from frametool.formats.recordings import Recording
     from frametool.formats.ros_stream import Message
     from frametool.formats.stamped import Stamped
 
 
-def read_stamped_messages(recording: Recording, kind: str | None, *, normalize: bool = False) -> Iterator[Stamped]:
-    """Give every message of a recording that can be moved, in order, then warn of what was odd.
+class Batch(NamedTuple):
+    """All that can be moved in one message of a recording."""
 
-    kind: what --as says they are.
-    Raises FormatError with the place, also for a recording without messages; ValueInvalid for another kind.
+    message: Message
+    stamped: Sequence[Stamped]
+
+
+def read_stamped_messages(
+    recording: Recording, kind: str | None, *, normalize: bool = False
+) -> Iterator[Batch | FormatError]:
+    """Give every message of a recording with what can be moved in it, in order, then warn of what was odd.
+
+    Where a message cannot be read the error stands in its place.  kind: what --as says they are.
+    Raises FormatError for a recording without messages; ValueInvalid for another kind.
     """
     found = False
     if recording.stream is None:
         raise FormatError("messages are read from text; of a bag only the transforms are", source=recording.name)
     for message in read_messages(recording.stream, recording.name, recording.form, recording.tally):
-        if isinstance(message, FormatError):
-            raise message
-        reading = Reading(message.source, normalize=normalize)
-        try:
-            for stamped in moveables(message.value, reading):
-                if kind not in (None, stamped.key):
-                    raise ValueInvalid(f"{recording.name}:{message.line}: a {stamped.key} cannot be taken for a {kind}")
-                found = True
-                yield stamped._replace(form=_form(recording.form, stamped, message))
-        except Misfit as misfit:
-            raise message.error(misfit) from None
-        for _, note in reading.notes:
-            recording.tally.notes.setdefault(note, message.line)
+        found = True
+        yield message if isinstance(message, FormatError) else _batch(message, recording, kind, normalize=normalize)
     if not found:
         raise FormatError("no messages in it", source=recording.name)
     for line, sentence in recording.tally.told():
         warn(f"{recording.name}:{line}: {sentence}")
+
+
+def _batch(message: Message, recording: Recording, kind: str | None, *, normalize: bool) -> Batch | FormatError:
+    """Read what can be moved in a message."""
+    reading = Reading(message.source, normalize=normalize)
+    try:
+        found = list(moveables(message.value, reading))
+    except Misfit as misfit:
+        return message.error(misfit)
+    stamped = [each._replace(form=_form(recording.form, each, message)) for each in found]
+    if other := next((each.key for each in stamped if kind not in (None, each.key)), None):
+        raise ValueInvalid(f"{recording.name}:{message.line}: a {other} cannot be taken for a {kind}")
+    for _, note in reading.notes:
+        recording.tally.notes.setdefault(note, message.line)
+    return Batch(message, stamped)
 
 
 def _form(form: str, stamped: Stamped, message: Message) -> str:

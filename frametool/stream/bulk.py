@@ -64,6 +64,7 @@ class Work:
         for start, end in rest:
             self._rest(text, start, end, odd, faults, singles)
         cuts += [_as_cut(learned, spans) for learned, spans in singles.items()]
+        cuts = _in_order(cuts) if self.request.in_order else cuts
         return self._outcome(text, framed(text), cuts, odd, faults)
 
     def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
@@ -242,6 +243,18 @@ def _cut_chunk(learned: Learned, chunk: bytes, offset: int) -> tuple[Cut | None,
 def _as_cut(learned: Learned, spans: Sequence[tuple[tuple[int, int], ...]]) -> Cut:
     found = np.fromiter(chain.from_iterable(chain.from_iterable(spans)), np.int64).reshape(len(spans), -1, 2)
     return Cut(learned, np.ascontiguousarray(found[:, :, 0]), np.ascontiguousarray(found[:, :, 1]))
+
+
+def _in_order(cuts: Sequence[Cut]) -> list[Cut]:
+    """Part cuts of several kinds so that their records follow each other as in the text."""
+    if not cuts:
+        return []
+    kinds = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
+    rows = np.concatenate([np.arange(len(cut.starts)) for cut in cuts])
+    order = np.argsort(np.concatenate([cut.starts[:, 0] for cut in cuts]), kind="stable")
+    changes = np.flatnonzero(np.diff(kinds[order])) + 1
+    parts = [(cuts[kinds[part[0]]], rows[part]) for part in np.split(order, changes)]
+    return [Cut(cut.learned, cut.starts[part], cut.ends[part]) for cut, part in parts]
 
 
 def _null_row(cut: Cut, row: int, text: bytes) -> bytes:

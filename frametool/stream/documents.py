@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, FrametoolError
 from frametool.stream.faults import NULL, SKIP, STOP, Fault
-from frametool.stream.json_array import with_commas_between
+from frametool.stream.json_array import closed, with_commas_between
 from frametool.stream.learned import learn
 from frametool.stream.run import Outcome, mapped
 from frametool.stream.single import result_of
@@ -24,6 +24,8 @@ SMALL = 1 << 14  # bytes
 _DOCUMENT_END = re.compile(rb"^---[ \t]*\r?\n", re.MULTILINE)
 _TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*(?:"|\\?\Z)|[{}\[\]]', re.DOTALL)  # a string that is cut off hides its brackets
 _SEVERAL = re.compile(rb"\}\s*,?\s*\{")
+_BEHIND_ARRAY = re.compile(rb"(?<=\})\s*(?:\]\s*|,\s*(?=\{))([^\s,\]}].*\S)", re.DOTALL)
+_LEFT_OVER = re.compile(rb"[\s,\]\[]*([^\s,\]\[].*\S|[^\s,\]\[])", re.DOTALL)
 _LINE = re.compile(rb"[^\n]*\n|[^\n]+\Z")
 _AFTER_RECORD = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
 _NO_DOCUMENT = re.compile(rb"(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|---)\s*)?")
@@ -36,7 +38,11 @@ def run_records(
     """Give the outcomes of a stream of records."""
     outcomes = _outcomes(stream, form, request, source=source, jobs=jobs, size=size)
     try:
-        yield from with_commas_between(outcomes) if form == "json" and request.on_error == SKIP else outcomes
+        if form == "json":
+            kept = with_commas_between(outcomes) if request.on_error == SKIP else outcomes
+            yield from closed(kept, request.on_error)
+        else:
+            yield from outcomes
     finally:
         outcomes.close()  # ends the processes of several jobs
 
@@ -52,13 +58,13 @@ def _outcomes(
         return
     second = next(blocks, None) if len(first) < SMALL and _has_ended(stream) else b""
     records = splitter.records(first) if second is None else []
-    if second is None and len(records) <= FEW:
+    if second is None and len(records) <= FEW and not request.in_order:
         yield from _singly(first, records, form, request, source)
         return
     from frametool.stream.bulk import Work
 
     work = Work(splitter, form, request, source)
-    jobs = 1 if request.operation.of == "previous" or request.unwrap else jobs
+    jobs = 1 if request.in_order else jobs
     yield from mapped(work, _again(first, second, blocks), jobs)
 
 
@@ -96,7 +102,9 @@ class Splitter:
             ends = [found.end() for found in _DOCUMENT_END.finditer(text)]
             return ends[-1] if ends else 0
         if self.lines is None:
-            self.lines = _first_line_is_whole(text[: whole_lines(text)])
+            lines = whole_lines(text)
+            is_long_array = not lines and len(text) > SMALL and text.removeprefix(MARK).lstrip().startswith(b"[")
+            self.lines = False if is_long_array else _first_line_is_whole(text[:lines])
         if self.lines is None:
             return 0
         return whole_lines(text) if self.lines else self._pretty(text)[1]
@@ -108,16 +116,22 @@ class Splitter:
         if self.lines is None:
             self.lines = _first_line_is_whole(text)
         if not self.lines:
-            return self._pretty(text)[0]
+            found, end = self._pretty(text)
+            behind = _LEFT_OVER.match(text, end) if found else None
+            return [*found, behind.span(1)] if behind else found
         return [span for found in _LINE.finditer(text) for span in self._in_line(text, found.start(), found.end())]
 
     def _in_line(self, text: bytes, start: int, end: int) -> list[tuple[int, int]]:
         """Give the records of a line: one, unless an array has several there."""
         span = _trimmed(text, start, end)
-        if span is None or not _SEVERAL.search(text, *span):
+        if span is None or not (_SEVERAL.search(text, *span) or _BEHIND_ARRAY.search(text, *span)):
             return [span] if span else []
         found, stop = self._pretty(text[span[0] : span[1]])
-        return [(span[0] + a, span[0] + b) for a, b in found] if stop == span[1] - span[0] else [span]
+        inner = [(span[0] + a, span[0] + b) for a, b in found]
+        behind = _BEHIND_ARRAY.match(text, span[0] + stop, span[1])
+        if behind and found:
+            return [*inner, behind.span(1)]
+        return inner if stop == span[1] - span[0] else [span]
 
     def _pretty(self, text: bytes) -> tuple[list[tuple[int, int]], int]:
         """Find objects that span lines, by their brackets."""

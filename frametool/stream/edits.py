@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.formats.pose import Pose
 from frametool.formats.results import Result, Style
 from frametool.geometry.representations import notation
+from frametool.stream.holders import XYZ
 from frametool.stream.pieces import Const, IfLocked, Out
 from frametool.stream.shape import POSE, Target, axes_of
 
@@ -84,7 +85,7 @@ class Editor:
         self._position()
         if self.holder.shape.kind == POSE:
             self._rotation()
-            self.dropped.update((*STALE, "inverse", *self.holder.others))
+            self.dropped.update({*STALE, "inverse", *self.holder.others} - set(self.holder.flat))
         self._leave_out()
         return self.edits
 
@@ -114,11 +115,17 @@ class Editor:
                 self._insert_before(anchor, self._member({"xyz": list(SAMPLE[:3])}, 0))
             return
         if target.unit is None:
-            self.dropped.add(key)
+            self.dropped.update((key,) if key else XYZ)
         elif None in self.slots[:3]:
             self._replace(self.node.value[key], self._member({key: list(SAMPLE[:3])}, 0))
-        else:
+        elif not self._position_stays():
             self._numbers(range(3), 0)
+
+    def _position_stays(self) -> bool:
+        """Tell whether only the notation of the rotation changes: then the position keeps its text."""
+        request = self.request
+        moves = request.operation.moves or request.way is not None or request.timed is not None
+        return request.operation.changes_nothing and not moves and not self.holder.inverse
 
     def _rotation(self) -> None:
         """Write the rotation where it stands, or its members anew."""
@@ -131,6 +138,7 @@ class Editor:
             members = []
         elif rotation:
             self._replace(self.node.value[rotation], members.pop(0) if members else ())
+            self.dropped.update(set(self.holder.flat) - {rotation})
         count = (
             first + sum(len(form.representation.columns) for form, _ in self.target.notations) + self.target.whole * 7
         )

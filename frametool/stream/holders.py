@@ -11,13 +11,14 @@ from frametool.errors import did_you_mean
 from frametool.formats.points import POINT_KEYS
 from frametool.formats.pose import POSE_KEYS, read_angle_unit, read_name, read_position
 from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS, read_rotation, shape_of
-from frametool.formats.values import INDICES, Misfit, Reading, kind, read_numbers, within
+from frametool.formats.values import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.stream.shape import POINT, POSE, VECTOR, Shape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from frametool.formats.values import Path
+    from frametool.stream.header import Columns
     from frametool.stream.request import Request
 
 INNER = ("transforms", "poses", "pose", "transform", "msg", "message")
@@ -28,6 +29,7 @@ class Holder(NamedTuple):
     """One point or pose: where it is held, what its numbers mean, and their paths (None: not written, so 0).
 
     key, rotation: the keys that hold position and rotation ("" for bare x, y, z); other rotations are told twice
+    flat: keys that hold one number of the rotation each, `rotation` is the first of them
     name, parent: their values and paths; values: the numbers
     """
 
@@ -41,6 +43,7 @@ class Holder(NamedTuple):
     name: tuple[str | None, Path] = (None, ())
     parent: tuple[str | None, Path] = (None, ())
     inverse: bool = False
+    flat: tuple[str, ...] = ()
 
 
 def find_holders(value: Any, request: Request, reading: Reading, path: Path = ()) -> Iterator[Holder]:
@@ -67,12 +70,32 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[P
         for index, item in enumerate(value):
             yield from _search(item, (*path, index), outer)
     elif type(value) is dict:
-        if any(_holds(key, each) for key, each in value.items()) or set(XYZ) <= set(value):
+        if _is_holder(value) or set(XYZ) <= set(value):
+            _refuse_several(value, ["the record's own keys"], path)
             yield path, outer
             return
-        for key in INNER:
-            if type(value.get(key)) in (dict, list):
-                yield from _search(value[key], (*path, key), (*outer, path))
+        found = {
+            key: list(_search(value[key], (*path, key), (*outer, path)))
+            for key in INNER
+            if type(value.get(key)) in (dict, list)
+        }
+        inner = [key for key in found if found[key]]
+        if inner:
+            _refuse_several(value, inner, path)
+        for key in inner:
+            yield from found[key]
+
+
+def _is_holder(value: dict[str, Any]) -> bool:
+    return any(_holds(key, each) for key, each in value.items())
+
+
+def _refuse_several(value: dict[str, Any], found: list[str], path: Path) -> None:
+    """Stop where a mapping holds more than one pose: which is meant nobody can tell."""
+    ours = {*POINT_KEYS, *ROTATION_KEYS, *found}
+    more = [key for key, each in value.items() if type(each) is dict and key not in ours and _is_holder(each)]
+    if len(found) + len(more) > 1:
+        raise Misfit(f"expected one point or pose in a record, found several: {', '.join([*found, *more])}", path)
 
 
 def _holds(key: str, value: Any) -> bool:
@@ -120,17 +143,21 @@ def _mapping(
 ) -> Holder:
     positions = [key for key in value if key in POINT_KEYS]
     rotations = [key for key, each in value.items() if _is_rotation(key, each)]
+    flat = _flat_rotation(value, rotations) if request.kind in ("", POSE) else None
     if len(positions) > 1:
         raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
     _refuse_typos(value, rotations)
     key = positions[0] if positions else ""
-    holder = Holder(path, Shape(_kind(key, rotations, request), None), (), (), key)
+    holder = Holder(path, Shape(_kind(key, rotations or flat or (), request), None), (), (), key)
     if positions:
         holder = _with_position(holder, value[key], (key,), POINT_KEYS[key])
-    elif not rotations:
+    elif set(XYZ) <= set(value):
+        _refuse_bare_quaternion(value)
         holder = _with_position(holder, {name: value[name] for name in XYZ}, (), 1.0)
     reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else request.degrees
-    if rotations:
+    if flat is not None:
+        holder = _with_flat_rotation(value, flat, holder, reading, request)
+    elif rotations:
         within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
         holder = _with_rotation(value[rotations[0]], rotations[0], holder, (rotations[0],), reading, request)
         holder = holder._replace(others=tuple(rotations[1:]))
@@ -157,7 +184,52 @@ def _refuse_disagreement(value: dict[str, Any], rotations: list[str], reading: R
         read_pose({key: value[key] for key in rotations}, reading)
 
 
-def _kind(key: str, rotations: list[str], request: Request) -> str:
+def _flat_rotation(value: dict[str, Any], rotations: list[str]) -> Columns | None:
+    """Find a rotation among the keys by the names that columns have: qx qy qz qw, roll_deg pitch_deg yaw_deg, ..
+
+    Raises Misfit if there are two, or one beside a key that holds a whole rotation.
+    """
+    from frametool.stream.header import find_rotations
+
+    names = [key for key, each in value.items() if type(each) is str]
+    found = [each for each in find_rotations(names, None) if not each.prefix and not each.suffix and not each.whole]
+    if found and len(found) + len(rotations) > 1:
+        shown = " and ".join([*(each.shown for each in found), *rotations])
+        raise Misfit(f"expected one rotation, found {shown}", (found[0].names[0],), key=True)
+    return found[0] if found else None
+
+
+def _refuse_bare_quaternion(value: dict[str, Any]) -> None:
+    """Stop at x, y, z beside w."""
+    if "w" in value:
+        message = "x, y, z beside w may be a quaternion or a point; write {quaternion: {..}} or {point: [..], w: ..}"
+        raise Misfit(message, ("w",), key=True)
+
+
+def _with_flat_rotation(
+    value: dict[str, Any], columns: Columns, holder: Holder, reading: Reading, request: Request
+) -> Holder:
+    """Add a rotation whose numbers are members of the record itself."""
+    from frametool.formats.rotations import read_components, rotation_of
+
+    form, names, texts = columns.form, columns.names, [value[name] for name in columns.names]
+    if form is None or request.poses != 1:
+        raise Misfit("a record holds one pose; two in a row are for tables")
+    places = [(name,) for name in names]
+    try:
+        rotation_of(form, texts, places, reading)
+    except NotARotation as misfit:
+        raise misfit.below(names[0]) from None
+    values, degrees = read_components(form, texts, places, reading)
+    numbers = (*holder.numbers, *((*holder.path, name) for name in names))
+    shape = holder.shape._replace(kind=POSE, notation=form, degrees=degrees)
+    first = next(key for key in value if key in names)
+    return holder._replace(
+        shape=shape, numbers=numbers, values=(*holder.values, *values), rotation=first, flat=tuple(names)
+    )
+
+
+def _kind(key: str, rotations: Sequence[object], request: Request) -> str:
     if rotations or request.kind == POSE or not request.operation.moves:
         if rotations and request.kind not in ("", POSE):
             raise Misfit(f"a record has a rotation and cannot be taken for a {request.kind}")

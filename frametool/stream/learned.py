@@ -11,9 +11,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FormatError
-from frametool.formats.documents import format_error, parse_documents
+from frametool.formats.documents import Document, format_error, parse_documents
+from frametool.formats.json_text import strict_json
 from frametool.formats.nodes import parse_nodes
-from frametool.formats.source import Source
+from frametool.formats.source import Source, check_text
 from frametool.formats.values import Misfit, NotARotation, Reading
 from frametool.stream.edits import Editor, target_of
 from frametool.stream.holders import find_holders
@@ -241,7 +242,7 @@ def learn(text: str, request: Request, *, json: bool, source: str, line: int) ->
     """
     here = Source(source, text)
     try:
-        documents = parse_documents(text, source)
+        documents = _json_documents(here) if json else parse_documents(text, source)
         entries = [entry for document in documents for entry in _entries(document, request, here)]
     except FormatError as error:
         error.line += line - 1
@@ -250,6 +251,13 @@ def learn(text: str, request: Request, *, json: bool, source: str, line: int) ->
         return None
     nodes = parse_nodes(text)
     return Learned(text, entries, nodes, _edits(text, entries, nodes, request, json=json), json=json)
+
+
+def _json_documents(source: Source) -> list[Document]:
+    """Read strict JSON: what only YAML would take is a fault of the record."""
+    check_text(source)
+    values = strict_json(source)
+    return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
 
 
 def _entries(document: Any, request: Request, source: Source) -> list[Entry]:

@@ -48,6 +48,11 @@ class Request(NamedTuple):
     unwrap: bool = False
     on_error: str = STOP
 
+    @property
+    def in_order(self) -> bool:
+        """Tell whether a row's result depends on the rows before it."""
+        return self.unwrap or self.operation.of == "previous"
+
     def in_degrees(self, form: Notation) -> bool:
         """Tell whether a notation's angles are degrees: its own word wins."""
         return self.degrees if form.degrees is None else form.degrees

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
 
 TUM = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
-FRAME_NAMES = ("frame_id", "header.frame_id", "field.header.frame_id")  # a column `frame` often counts pictures
+FRAME_NAMES = ("frame", "frame_id", "header.frame_id", "field.header.frame_id")
+COUNTING = "frame"  # such a column often counts pictures: beside a SOURCE it is not asked
 
 
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
@@ -143,7 +144,8 @@ def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ..
     """Find the columns that name frames."""
     names = table.names or ()
     found = [name for name in names if name in FRAME_NAMES or name.endswith(("header.frame_id",))]
-    if not request.frames and request.told is not None and request.operation.moves and len(found) == 1:
+    agrees = not request.frames and request.told is not None and request.operation.moves
+    if agrees and len(found) == 1 and found[0] != COUNTING:
         return (names.index(found[0]),)  # what rows say must agree with SOURCE
     if request.frames == ("",):
         if len(found) != 1:

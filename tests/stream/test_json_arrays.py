@@ -9,6 +9,8 @@ from flow import MOVE, flow
 from hypothesis import given
 from hypothesis import strategies as st
 
+from frametool.stream.documents import Splitter
+
 GOOD, TEXT, HUGE = '{"id": "a,]", "x": 1, "y": 2, "z": 3}', '{"x": "a", "y": 2, "z": 3}', '{"x": 1e999, "y": 2, "z": 3}'
 LAYOUTS = [
     "[{},{}]\n", "[\n{},\n{}\n]\n", "[{},\n {}]", "[\n  {} ,\n  {}\n]\n", "[\n{}\n,{}\n]\n", "[ {} , {} ]\n", "[{}\n,\n{}\n]",
@@ -48,3 +50,28 @@ def test_each_document_without_a_result_is_null(records: list[str], size: int) -
     outcome = flow(text, MOVE._replace(on_error="null"), "yaml", size=size)
     documents = outcome.text.decode().removesuffix("\n---\n").split("\n---\n")
     assert [document != "null" for document in documents] == [record == GOOD for record in records]
+
+
+@pytest.mark.parametrize("count", [1, 40])
+@pytest.mark.parametrize("between", [", ", ",\n"])
+@pytest.mark.parametrize("end", ["] trailing\n", "]\ntrailing\n", "\n", ",\n", ',{"x": 1', ""])
+def test_arrays_with_a_broken_end_give_what_is_good(count: int, between: str, end: str) -> None:
+    text = ("[" + between.join([GOOD] * count) + end).encode()
+    stopped = flow(text, MOVE, "json")
+    assert (stopped.status, stopped.text.count(b"}")) == (1, count)
+    for on_error in ("skip", "null"):
+        result = flow(text, MOVE._replace(on_error=on_error), "json")
+        assert result.status == 3
+        assert len([each for each in json.loads(result.text) if each]) == count
+
+
+@pytest.mark.parametrize("text", [b"[]", b"[]\n", b"[\n]\n"])
+def test_an_empty_array_stays_one(text: bytes) -> None:
+    assert flow(text, MOVE, "json") == (text, [], 0)
+
+
+def test_a_long_array_on_one_line_is_cut_at_its_records() -> None:
+    text = ("[" + ",".join([GOOD] * 3000) + "]\n").encode()
+    splitter = Splitter("json")
+    assert 0 < splitter.whole(text[:50000]) <= 50000
+    assert len(json.loads(flow(text, MOVE, "json", size=1 << 15).text)) == 3000

@@ -1,0 +1,60 @@
+"""Rotations told by flat keys are read as columns of these names are; what is ambiguous is a fault that says so."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from flow import INVERT, MOVE, convert, flow
+
+H = 0.7071067811865476
+
+
+def moved(record: str) -> dict[str, object]:
+    one, many = (flow((record + "\n").encode() * count, MOVE, "json") for count in (1, 40))
+    assert many.text == one.text * 40
+    assert one.told == []
+    found: dict[str, object] = json.loads(one.text)
+    return found
+
+
+def test_flat_quaternions_turn() -> None:
+    record = moved('{"x":1,"y":2,"z":3,"qw":1,"k":7,"qx":0,"qy":0,"qz":0}')
+    assert record == {"x": -1.0, "y": 3.0, "z": 6.0, "qw": H, "k": 7, "qx": 0.0, "qy": 0.0, "qz": H}
+
+
+def test_flat_angles_turn() -> None:
+    record = moved('{"x":1,"y":2,"z":3,"roll_deg":0,"pitch_deg":0,"yaw_deg":0}')
+    assert record["yaw_deg"] == pytest.approx(90)
+
+
+def test_a_flat_position_beside_a_rotation_is_its_position() -> None:
+    record = moved('{"x":1,"y":2,"z":3,"quaternion":{"x":0,"y":0,"z":0,"w":1}}')
+    assert record == {"x": -1.0, "y": 3.0, "z": 6.0, "quaternion": {"x": 0.0, "y": 0.0, "z": H, "w": H}}
+
+
+@pytest.mark.parametrize("spec", ["rpy_deg", "matrix", "quaternion", "rotvec"])
+def test_flat_rotations_go_to_other_representations(spec: str) -> None:
+    record = '{"x":1,"qx":0,"qy":0,"y":2,"z":3,"qz":0,"qw":1,"k":1}\n'
+    assert set(json.loads(flow(record.encode(), convert(spec), "json").text)) in (
+        {"x", "y", "z", spec, "k"}, {spec, "k"}, {"x", "y", "z", "qx", "qy", "qz", "qw", "k"}
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("record", "named"),
+    [
+        ('{"x":0,"y":0,"z":0,"w":1}', "quaternion"),
+        ('{"x":0,"y":0,"z":0,"qx":0,"qy":0,"qz":0,"qw":1,"roll":0,"pitch":0,"yaw":0}', "roll pitch yaw"),
+        ('{"x":0,"y":0,"z":0,"qx":0,"qy":0,"qz":0,"qw":1,"rpy":[0,0,0]}', "rpy"),
+        ('{"pose":{"xyz":[1,2,3],"rpy":[0,0,0]},"pose2":{"xyz":[1,2,3],"rpy":[0,0,0]}}', "pose, pose2"),
+        ('{"pose":{"xyz":[1,2,3],"rpy":[0,0,0]},"transform":{"xyz":[1,2,3],"rpy":[0,0,0]}}', "pose, transform"),
+        ('{"xyz":[1,2,3],"rpy":[0,0,0],"goal":{"xyz":[1,2,3],"rpy":[0,0,0]}}', "goal"),
+        ('{"x":0,"y":0,"z":0,"qx":0,"qy":0,"qz":0,"qw":0}', "qx"),
+    ],
+)
+def test_what_is_ambiguous_is_a_fault_that_names_the_keys(record: str, named: str) -> None:
+    for request in (MOVE, INVERT):
+        result = flow((record + "\n").encode(), request, "json")
+        assert (result.status, result.text) == (1, b"")
+        assert named in result.told[0]
