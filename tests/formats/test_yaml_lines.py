@@ -37,6 +37,29 @@ def test_both_ways_read_the_same(lines: tuple[str, list[str]]) -> None:
         assert values(text) == expected
 
 
+BLOCKS = some.lists(some.dictionaries(WORDS, WORDS | LISTS, min_size=1, max_size=5), min_size=1, max_size=6)
+
+
+@given(some.sampled_from(["", "  ", "    "]), BLOCKS)
+def test_block_maps_too(indent: str, maps: list[dict[str, str]]) -> None:
+    entries = [[f"{key}: {value}" for key, value in each.items()] for each in maps]
+    text = "frames:\n" + "".join(f"{indent}- " + f"\n{indent}  ".join(each) + "\n" for each in entries)
+    expected = values(text)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(yaml_lines, "LEAST", 0)
+        assert split_run(text) is not None
+        assert values(text) == expected
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["- a: b, c: d", "- a: b\n    c:\n      d: e", "- a: b # c", "- a: b\n    a: c", "- a: [b,\n       c]", "- a: ''", "- a:\n    b: c", "- a: b\n   c: d"],
+)  # fmt: skip
+def test_other_blocks_are_left_to_the_parser(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(yaml_lines, "LEAST", 0)
+    assert split_run(f"frames:\n  - a: b\n  {line}\n") is None
+
+
 @pytest.mark.parametrize(
     "line",
     ["- {a: null}", "- {a: ~}", "- {a: 'b'}", "- {a: b, a: c}", "- {a: b} # c", "- {a: [b, [c]]}", "- {a: {b: c}}", "- {a:b}", "- {a: b c}", "- {a: é}",
