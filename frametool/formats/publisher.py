@@ -83,11 +83,6 @@ def _line(pose: Pose, style: Style) -> str:
     return " ".join(f"--{name} {cell}" for name, cell in zip(names, cells, strict=True))
 
 
-def is_call(line: str) -> bool:
-    """Tell a line of arguments, with or without the command before them."""
-    return CALL in line or line.startswith("--") or (len(line.split()) in (8, 9, 10) and bool(_NUMBER.match(line)))
-
-
 def read_call(line: str, reading: Reading) -> Pose:
     """Read one call as a shell would take it apart.
 
