@@ -48,7 +48,7 @@ class FormatError(FrametoolError, ValueError):
         self.snippet = snippet
 
     def __str__(self) -> str:
-        """Give `source:line:column: message`, leaving out what is not known."""
+        """Return `source:line:column: message`, leaving out what is not known."""
         place = [str(part) for part in (self.source, self.line, self.column) if part]
         return ": ".join((":".join(place), self.message)) if place else self.message
 
@@ -136,7 +136,7 @@ def overheard(call: Callable[..., Result], *arguments: object, **options: object
 
 
 def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
-    """Give `; did you mean 'x'?` for the nearest known name, or nothing."""
+    """Return `; did you mean 'x'?` for the nearest known name, or nothing."""
     from difflib import get_close_matches
 
     near = get_close_matches(name, list(known), n=1, cutoff=cutoff)
@@ -144,18 +144,18 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
 
 
 def alternatives(name: str, known: Iterable[str], label: str) -> str:
-    """Give `; did you mean 'x'? frames: a, b`, or only what there is."""
+    """Return `; did you mean 'x'? frames: a, b`, or only what there is."""
     names = list(known)
     return f"{did_you_mean(name, names) or ';'} {label}: {listing(names)}"
 
 
 def listing(names: Iterable[str], most: int = 20) -> str:
-    """Give the names sorted and joined by commas, cut after `most` of them."""
+    """Return the names sorted and joined by commas, cut after `most` of them."""
     ordered = sorted(names)
     more = f" and {len(ordered) - most} more" if len(ordered) > most else ""
     return ", ".join(map(printable, ordered[:most])) + more
 
 
 def printable(name: str) -> str:
-    """Give a name as a terminal may show it: control characters as escapes, so that no name can steer the terminal."""
+    """Return a name as a terminal may show it: control characters as escapes, so that none can steer it."""
     return name if name.isprintable() else repr(name)[1:-1]

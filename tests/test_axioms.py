@@ -14,7 +14,7 @@ from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Array
+    from frametool.geometry.types import Array
 
 QUATERNIONS = samples.quaternions()
 SHIFTS = np.random.default_rng(2).normal(size=(len(QUATERNIONS), 3))

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from frametool.formats.findings import RULES
-from frametool.formats.results import Style
-from frametool.formats.ros_form import message_text
+from frametool.grammar.result import Style
+from frametool.lint.findings import RULES
+from frametool.ros.echo_format import message_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,8 +12,10 @@ import pytest
 import frametool
 
 ROOT = Path(frametool.__file__).parent
-LAYERS = ["errors", "geometry", "frames", "text", "formats", "stream", "sim", "view", "cli"]
-HOMES = {"click": "cli", "rich": "view", "yaml": "formats"}
+LAYERS = [
+    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "sim", "view", "cli",
+]  # fmt: skip
+HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}
 MODULES = sorted(path for path in ROOT.rglob("*.py") if path.parent != ROOT or path.stem == "errors")
 TREE = "{name: camera, parent: base, xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
 

@@ -16,7 +16,7 @@ from frametool.geometry.representations import REPRESENTATIONS, Notation, axes_n
 from frametool.geometry.rotation import Rotation
 
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Quaternion
+    from frametool.geometry.types import Quaternion
 
 SPECS = [*(name for name in REPRESENTATIONS if name != "euler"), "euler:rzyx", "euler:sxzx"]
 ROWS = samples.quaternions(10)

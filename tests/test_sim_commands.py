@@ -18,7 +18,7 @@ import console
 import pytest
 import yaml
 
-from frametool.cli.sim import SUBCOMMANDS
+from frametool.cli.commands.sim import SUBCOMMANDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,7 +11,7 @@ import click
 
 from frametool import __version__
 from frametool.cli.help import WithHelp
-from frametool.cli.telling import tell
+from frametool.cli.stderr import tell
 from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, alternatives
 
 if TYPE_CHECKING:
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
 
 # name -> (module, what it does); help, completion and the README's check are derived from this table
 COMMANDS = {
-    "convert": ("frametool.cli.convert", "one rotation or pose in other representations"),
-    "compose": ("frametool.cli.compose", "product of poses, left to right: a_from_b, b_from_c -> a_from_c"),
-    "invert": ("frametool.cli.invert", "the inverse of a pose: a_from_b -> b_from_a"),
-    "relative": ("frametool.cli.relative", "the pose of B seen from A, with distance and angle"),
-    "interpolate": ("frametool.cli.interpolate", "poses between A and B at fractions of the way"),
-    "lookup": ("frametool.cli.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
-    "apply": ("frametool.cli.apply", "points, vectors and poses moved into another frame"),
-    "tree": ("frametool.cli.tree", "the tree of frames, drawn or written in another form"),
-    "echo": ("frametool.cli.echo", "where SOURCE is seen from TARGET as a recording goes by"),
-    "monitor": ("frametool.cli.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
-    "static": ("frametool.cli.static", "static_transform_publisher arguments, written and read"),
-    "check": ("frametool.cli.check", "what is wrong or odd in trees and recordings"),
-    "sim": ("frametool.cli.sim", "turtlesim and its followers, without ROS and without a screen"),
+    "convert": ("frametool.cli.commands.convert", "one rotation or pose in other representations"),
+    "compose": ("frametool.cli.commands.compose", "product of poses, left to right: a_from_b, b_from_c -> a_from_c"),
+    "invert": ("frametool.cli.commands.invert", "the inverse of a pose: a_from_b -> b_from_a"),
+    "relative": ("frametool.cli.commands.relative", "the pose of B seen from A, with distance and angle"),
+    "interpolate": ("frametool.cli.commands.interpolate", "poses between A and B at fractions of the way"),
+    "lookup": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
+    "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
+    "tree": ("frametool.cli.commands.tree", "the tree of frames, drawn or written in another form"),
+    "echo": ("frametool.cli.commands.echo", "where SOURCE is seen from TARGET as a recording goes by"),
+    "monitor": ("frametool.cli.commands.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
+    "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
+    "check": ("frametool.cli.commands.check", "what is wrong or odd in trees and recordings"),
+    "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 HELP = """The calculator for rigid-body frames.
 
@@ -172,7 +172,7 @@ def _usage(error: click.ClickException) -> str:
 
 def _report(error: FrametoolError, arguments: Sequence[str]) -> int:
     """Say what went wrong: as a sentence, or as an object where JSON was asked for."""
-    from frametool.cli.failures import as_json, wants_json
+    from frametool.cli.error_json import as_json, wants_json
 
     if not wants_json(arguments):
         return _complain(_with_snippet(error), error.exit_code)

@@ -10,9 +10,9 @@ import click
 from frametool.cli.help import WithHelp
 from frametool.errors import ValueInvalid
 from frametool.formats import writers
-from frametool.formats.numbers import parse_number
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -122,7 +122,7 @@ FILE = File()
 
 
 def result_options(what: str) -> Callable[[Function], Function]:
-    """Give a command the options that shape and place its result; `what` it writes decides the formats."""
+    """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     options = [
         click.option(
             "-f",
@@ -146,7 +146,7 @@ def result_options(what: str) -> Callable[[Function], Function]:
 
 
 def rotation_options(function: Function) -> Function:
-    """Give a command the options that choose how rotations are written."""
+    """Add to a command the options that choose how rotations are written."""
     return decorated(
         function,
         [
@@ -166,14 +166,14 @@ def rotation_options(function: Function) -> Function:
 
 
 def pose_options(function: Function) -> Function:
-    """Give a command the options that say how poses are read; they come beside `rotation_options`."""
+    """Add to a command the options that say how poses are read; they come beside `rotation_options`."""
     return click.option(
         "--normalize", is_flag=True, help="accept any non-zero quaternion and any matrix near a rotation"
     )(function)
 
 
 def decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
-    """Give a command several options, in this order in its help."""
+    """Add several options to a command, in this order in its help."""
     for option in reversed(options):
         function = option(function)
     return function

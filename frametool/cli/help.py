@@ -20,5 +20,5 @@ class WithHelp(click.Command):
     """A command with -h and --help."""
 
     def get_help_option(self, ctx: click.Context) -> click.Option | None:  # noqa: ARG002 - click's signature
-        """Give the one help option."""
+        """Return the one help option."""
         return HELP_OPTION

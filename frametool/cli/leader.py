@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, alternatives
-from frametool.formats.source import Source, decode, read_text
+from frametool.sim.command_file import read_script, read_twists
 from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
-from frametool.sim.twists import read_script, read_twists
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def leader_of(argument: str, seed: int, *, paced: bool) -> MakeLeader:
-    """Give the leader of an argument; `paced`: what comes from standard input acts when it arrives.
+    """Return the leader of an argument; `paced`: what comes from standard input acts when it arrives.
 
     Raises FormatError; FileProblem; click.UsageError for a name that is neither a leader nor a file.
     """
@@ -46,7 +46,7 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
 
 
 def stdin_lines() -> Iterator[str]:
-    """Give the lines of standard input as they arrive.
+    """Yield the lines of standard input as they arrive.
 
     Raises FormatError for bytes that are no text.
     """

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from frametool.cli.streaming import Stream
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.types import Rigid
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def column_options(function: Function) -> Function:
-    """Give a command the options that name columns of frames; `RowFrames` takes them."""
+    """Add to a command the options that name columns of frames; `RowFrames` takes them."""
     function = click.option(
         "--source-column", type=TEXT, metavar="NAME", help="stream a table; this column names each row's SOURCE"
     )(function)
@@ -73,7 +73,7 @@ class RowFrames:
         return status if isinstance(status, int) else 0
 
     def _fixed(self, target: str | None, source: str | None) -> tuple[str | None, str | None]:
-        """Give the frames named on the command line; each frame is named once."""
+        """Return the frames named on the command line; each frame is named once."""
         if self.target is not None and source is None:
             target, source = None, target
         for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):

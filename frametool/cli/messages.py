@@ -11,7 +11,7 @@ from frametool.stream.faults import NULL, STOP, Fault
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.cli.apply import Way
+    from frametool.cli.commands.apply import Way
     from frametool.cli.output import Output
     from frametool.formats.recordings import Recording
     from frametool.formats.stamped_stream import Batch
@@ -44,7 +44,7 @@ def move_messages(
 
 
 def _moved(batch: Batch, way: Way, output: Output) -> str | Fault:
-    """Give the text of a message that moved, or why there is none."""
+    """Return the text of a message that moved, or why there is none."""
     message, moved = batch.message, []
     for each in batch.stamped:
         try:

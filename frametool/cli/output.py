@@ -7,22 +7,22 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from frametool.cli.telling import tell
+from frametool.cli.stderr import tell
 from frametool.errors import FileProblem, ValueInvalid
 from frametool.formats import FORMATS, writers
-from frametool.formats.pose import Pose
-from frametool.formats.results import Result, Style, is_locked, sample_results
 from frametool.geometry.representations import notation
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from frametool.formats.points import Point
-    from frametool.formats.ros_stream import Message
-    from frametool.formats.stamped import Stamped
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
     from frametool.geometry.representations import Notation
+    from frametool.ros.message_stream import Message
+    from frametool.ros.stamped import Stamped
 
 
 PIECE = 1 << 14  # characters
@@ -109,8 +109,8 @@ class Output:
         return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)
 
     def message(self, message: Message, moved: Sequence[Stamped]) -> str:
-        """Give the text of a message in which some moved: as it was spelled unless the command was told otherwise."""
-        from frametool.formats.stamped_text import respelled
+        """Return the text of a message in which some moved: as it was spelled unless the command was told otherwise."""
+        from frametool.ros.stamped_splice import respelled
 
         if moved and self.told in (None, moved[0].form):
             style = self.style.in_form(moved[0].form)
@@ -120,7 +120,7 @@ class Output:
         return "".join(map(self._message, moved))
 
     def _message(self, message: Stamped) -> str:
-        from frametool.formats.stamped import spelling
+        from frametool.ros.stamped import spelling
 
         form = self.style.form if self.told or not message.form else message.form
         if form == "text":

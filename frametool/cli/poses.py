@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.documents.source import Source, read_text
 from frametool.errors import FormatError, ValueInvalid, warn
-from frametool.formats.pose import Pose
 from frametool.formats.records import read_poses
-from frametool.formats.rotations import read_homogeneous, rotation_of
-from frametool.formats.source import Source, read_text
-from frametool.formats.values import INDICES, NotARotation, Reading, read_number
+from frametool.grammar.pose import Pose
+from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
+from frametool.grammar.rotation import read_homogeneous, rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Notations, be_verbose
-from frametool.cli.telling import tell
+from frametool.cli.stderr import tell
+from frametool.documents.source import Source, decode
 from frametool.errors import FileProblem
 from frametool.formats.detect import HEAD
-from frametool.formats.source import Source, decode
-from frametool.stream.detect import RECORDS, STREAMS, form_of
 from frametool.stream.faults import MOST, ON_ERROR, STOP, Policy
+from frametool.stream.stream_form import RECORDS, STREAMS, form_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -43,7 +43,7 @@ NAMES = (
 
 
 def stream_options(function: Function) -> Function:
-    """Give a command the options of streams; `Stream` takes them."""
+    """Add to a command the options of streams; `Stream` takes them."""
     for names, attributes in reversed(OPTIONS):
         function = click.option(*names, **attributes)(function)
     return function
@@ -173,16 +173,16 @@ class Stream:
 
     def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
         if form in RECORDS:
-            from frametool.stream.documents import run_records
+            from frametool.stream.record_stream import run_records
 
             return run_records(stream, form, request, source=name, jobs=self.options["jobs"])
-        from frametool.stream.tables import run_table
+        from frametool.stream.table_stream import run_table
 
         return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
 
 
 def _table_form(output: Output) -> str:
-    """Give the form of a table if --format names one: a table is written as it is read."""
+    """Return the form of a table if --format names one: a table is written as it is read."""
     return output.told if output.told in STREAMS and output.told not in RECORDS else ""
 
 

@@ -32,7 +32,7 @@ class Time(Text):
         self.latest = latest
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Give nanoseconds, or `latest`."""
+        """Return nanoseconds, or `latest`."""
         text = super().convert(value, param, ctx)
         if not isinstance(text, str) or (self.latest and text == LATEST):
             return text
@@ -46,12 +46,12 @@ TIME = Time()
 
 
 def at_ns(chosen: int | str | None) -> int | None:
-    """Give the nanoseconds of an option; None for the latest."""
+    """Return the nanoseconds of an option; None for the latest."""
     return chosen if isinstance(chosen, int) else None
 
 
 def rules_options(function: Function) -> Function:
-    """Give a command the options that say how moving frames are taken."""
+    """Add to a command the options that say how moving frames are taken."""
     options = [
         click.option("--moving", is_flag=True,
                      help="an edge with one stamp answers only that instant, as in tf2  [default: it stands still]"),

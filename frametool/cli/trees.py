@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
+    from frametool.documents.source import Source
     from frametool.formats.assembly import Rules
     from frametool.formats.recordings import Recording
-    from frametool.formats.source import Source
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
@@ -56,7 +56,7 @@ verbose_option = click.option(
 
 
 def tree_file(argument: str) -> str:
-    """Give the file that an argument stands for."""
+    """Return the file that an argument stands for."""
     if argument != ".":
         return argument
     if named := os.environ.get("FRAMETOOL_TREE"):
@@ -89,7 +89,7 @@ FRAME = Frame()
 
 
 def frame_name(name: str, tree: FrameTree | TransformBuffer) -> str:
-    """Give a frame's name without a leading `/`, which tf2 has given up, unless a frame is called so."""
+    """Return a frame's name without a leading `/`, which tf2 has given up, unless a frame is called so."""
     if name.startswith("/") and name not in tree.frames:
         warn(f"frame {name!r}: the leading / is no part of a name and was left out")
         return name[1:]

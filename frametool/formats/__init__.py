@@ -18,28 +18,28 @@ class Row:
 
 FORMATS = {
     "yaml": Row(
-        "frametool.formats.yaml_form",
+        "frametool.formats.yaml_format",
         (".yaml", ".yml"),
         "YAML, as trees and poses are read",
         ("poses", "points", "tree", "report"),
     ),
     "json": Row(
-        "frametool.formats.json_form",
+        "frametool.formats.json_format",
         (".json", ".jsonl"),
         "JSON, one object a line",
         ("poses", "points", "tree", "report"),
     ),
-    "csv": Row("frametool.formats.csv_form", (".csv",), "CSV with a header", ("poses", "points", "report")),
+    "csv": Row("frametool.formats.csv_format", (".csv",), "CSV with a header", ("poses", "points", "report")),
     "ros1": Row(
-        "frametool.formats.ros_form", (), "messages as `rostopic echo` prints them", ("poses", "points", "tree")
+        "frametool.ros.echo_format", (), "messages as `rostopic echo` prints them", ("poses", "points", "tree")
     ),
     "ros2": Row(
-        "frametool.formats.ros_form", (), "messages as `ros2 topic echo` prints them", ("poses", "points", "tree")
+        "frametool.ros.echo_format", (), "messages as `ros2 topic echo` prints them", ("poses", "points", "tree")
     ),
-    "foxglove": Row("frametool.formats.foxglove", (), "FrameTransform as JSON, one a line", ("poses", "tree")),
-    "static1": Row("frametool.formats.publisher", (), "static_transform_publisher of ROS 1", ("poses", "tree")),
-    "static2": Row("frametool.formats.publisher", (), "static_transform_publisher of ROS 2", ("poses", "tree")),
-    "tf2": Row("frametool.formats.tf2_listing", (), "the listing of tf2's all_frames_as_yaml", ("tree",)),
+    "foxglove": Row("frametool.ros.foxglove", (), "FrameTransform as JSON, one a line", ("poses", "tree")),
+    "static1": Row("frametool.ros.publisher", (), "static_transform_publisher of ROS 1", ("poses", "tree")),
+    "static2": Row("frametool.ros.publisher", (), "static_transform_publisher of ROS 2", ("poses", "tree")),
+    "tf2": Row("frametool.ros.tf2_listing", (), "the listing of tf2's all_frames_as_yaml", ("tree",)),
     "dot": Row("frametool.formats.dot", (".dot", ".gv"), "graphviz", ("tree",)),
     "mermaid": Row("frametool.formats.mermaid", (".mmd",), "a mermaid flowchart", ("tree",)),
 }

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.track import Track
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.types import Rigid
 
     class Place(Protocol):
         """Where an edge was read."""
@@ -81,7 +81,7 @@ class Assembly:
         (self.tree if self.buffer is None else self.buffer).add_root(self._kept(frame))
 
     def _kept(self, name: str) -> str:
-        """Give the name under which the buffer keeps a frame: tf2 strips one slash."""
+        """Return the name under which the buffer keeps a frame: tf2 strips one slash."""
         return name if self.rules.policy == "frametool" else name.removeprefix("/")
 
     def add(self, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: Place) -> None:
@@ -105,7 +105,7 @@ class Assembly:
                 raise place.error(str(error), FormatError) from None
 
     def finish(self) -> FrameTree | TransformBuffer:
-        """Give the tree, or the buffer if anything moves."""
+        """Return the tree, or the buffer if anything moves."""
         if self.buffer is None:
             return self.tree
         standing = [] if self.rules.moving else [track for track in self.buffer.tracks() if self._stands(track)]
@@ -122,7 +122,7 @@ class Assembly:
         self.tree.add_components(parent, child, components)
 
     def _moving(self) -> TransformBuffer:
-        """Give the buffer; at the first stamp it takes over what stands still."""
+        """Return the buffer; at the first stamp it takes over what stands still."""
         if self.buffer is None:
             from frametool.frames.buffer import TransformBuffer
 

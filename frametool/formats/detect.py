@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import re
 
+from frametool.ros.noise import NOISE
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Final
 
 HEAD: Final = 1 << 16
 """How many bytes are looked at."""
-
-# what the tools or the shell print between messages; the note about lost messages is the one that ends a document
-NOISE = re.compile(
-    r"""(?x) \ufeff? (?:
-      A\ message\ was\ lost!!! | \ttotal\ count\ change:\ ?\d+ | \ttotal\ count:\ ?\d+(?:---)?
-    | WARNING:\ .* | Is\ /clock\ being\ published\?
-    | \[\ ?(?:DEBUG|INFO|WARN|ERROR|FATAL)\ ?\].*
-    | \d{4}-\d\d-\d\d\ [\d:.]+\ \[[A-Z_]+\ \w+\].* | selected\ interface\ .*\ multicast.*
-    | \$\ .* | \[exit\ \d+\] | \^C.* )""",
-).fullmatch
 
 FORMS = {
     "bag1": "ROS 1 bag",

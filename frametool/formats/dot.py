@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.formats.labels import edge_label, graphviz
 from frametool.frames.tree import FrameTree
+from frametool.grammar.edge_label import edge_label, graphviz
 
 if TYPE_CHECKING:
-    from frametool.formats.results import Style
     from frametool.frames.buffer import TransformBuffer
+    from frametool.grammar.result import Style
 
 
 def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
-    """Give a digraph; names are quoted, so that any text is a name.  What moves is drawn as view_frames does."""
+    """Return a digraph; names are quoted, so that any text is a name.  What moves is drawn as view_frames does."""
     if not isinstance(tree, FrameTree):
         from frametool.formats import view_frames
 

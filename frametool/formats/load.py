@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from frametool.documents.collector import paused_collector
+from frametool.documents.document import Source, format_error, locate_many, parse_documents, read_text
 from frametool.errors import FormatError, warn
 from frametool.formats.assembly import Assembly, Rules
-from frametool.formats.collector import paused_collector
-from frametool.formats.documents import Source, format_error, locate_many, parse_documents, read_text
-from frametool.formats.trees import read_edges
-from frametool.formats.values import Misfit, Reading
+from frametool.formats.tree_reader import read_edges
+from frametool.grammar.readers import Misfit, Reading
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
     from frametool.formats.assembly import Place
     from frametool.formats.recordings import Recording
-    from frametool.formats.trees import Edge
-    from frametool.formats.values import Path
+    from frametool.formats.tree_reader import Edge
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
+    from frametool.grammar.readers import Path
 
 
 class Found(NamedTuple):
@@ -32,7 +32,7 @@ class Found(NamedTuple):
 
     @property
     def path(self) -> Path:
-        """Give the path that leads to it from the top of its source."""
+        """Return the path that leads to it from the top of its source."""
         return (self.document, *self.edge.path)
 
     def error(self, message: str, kind: type[FormatError]) -> FormatError:
@@ -40,7 +40,7 @@ class Found(NamedTuple):
         return format_error(self.source, self.path, message, error=kind)
 
     def seen_from(self, other: Place) -> str:
-        """Give `line 7`, or `other.yaml:7` beside a place in another source."""
+        """Return `line 7`, or `other.yaml:7` beside a place in another source."""
         line, _ = locate_many(self.source.text, [self.path])[0]
         same = isinstance(other, Found) and other.source.name == self.source.name
         return f"line {line}" if same else f"{self.source.name}:{line}"
@@ -51,7 +51,7 @@ def load(
 ) -> FrameTree | TransformBuffer:
     """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 
-    paths: trees in YAML or JSON (`frametool.formats.trees`) and recordings (`frametool.formats.detect`); `-` is
+    paths: trees in YAML or JSON (`frametool.formats.tree_reader`) and recordings (`frametool.formats.detect`); `-` is
     standard input.
     moving: an edge with a single stamp answers only that instant; otherwise it counts as standing.
     policy, keep_ns: as TransformBuffer has them.
@@ -125,7 +125,7 @@ class Spot(NamedTuple):
         return kind(message, source=self.source, line=self.line)
 
     def seen_from(self, other: Place) -> str:
-        """Give `line 7`, or `tf.txt:7` beside a place in another file."""
+        """Return `line 7`, or `tf.txt:7` beside a place in another file."""
         same = isinstance(other, Spot) and other.source == self.source
         return f"line {self.line}" if same else f"{self.source}:{self.line}"
 

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.formats.labels import edge_label
+from frametool.grammar.edge_label import edge_label
 
 if TYPE_CHECKING:
-    from frametool.formats.results import Style
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
+    from frametool.grammar.result import Style
 
 
 def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
-    """Give a flowchart; nodes are numbered, because mermaid's ids take few characters, and labelled with the names."""
+    """Return a flowchart; nodes are numbered, because mermaid's ids take few characters."""
     ids = {frame: f"n{index}" for index, frame in enumerate(tree.frames)}
     lines = ["flowchart TD"]
     lines += [f'  {ids[frame]}["{_escaped(frame)}"]' for frame in tree.frames]

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.formats.pose import POSITION_KEYS, read_name, read_position
 from frametool.formats.records import read_all, read_one_pose
-from frametool.formats.rotations import AXES_KEY, ROTATION_KEYS
-from frametool.formats.values import Misfit, Reading, read_numbers, within
+from frametool.grammar.pose import POSITION_KEYS, read_name, read_position
+from frametool.grammar.readers import Misfit, Reading, read_numbers, within
+from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
+from frametool.ros.messages import MESSAGE_KEYS
 
 if TYPE_CHECKING:
-    from frametool.formats.source import Source
-    from frametool.formats.values import Vector
+    from frametool.documents.source import Source
+    from frametool.grammar.readers import Vector
 
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 BESIDE_POINT = ("frame", "name")
-MESSAGE_KEYS = frozenset(("header", "linear", "force"))
 
 
 class Point(NamedTuple):
@@ -37,7 +37,7 @@ class Point(NamedTuple):
         return self.key == "vector"
 
     def mapping(self) -> dict[str, Any]:
-        """Give the record, spelled as it was read."""
+        """Return the record, spelled as it was read."""
         unit = POINT_KEYS.get(self.key, 1.0)
         values = [value / unit for value in self.position]
         about = {key: name for key, name in (("frame", self.frame), ("name", self.name)) if name is not None}
@@ -49,7 +49,7 @@ class Point(NamedTuple):
 def read_moveables(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Any]:
     """Read every point and pose of a text: what has a rotation is a pose, what has only a position a point.
 
-    ROS messages that can be moved are `frametool.formats.stamped.Stamped`.
+    ROS messages that can be moved are `frametool.ros.stamped.Stamped`.
     """
     return read_all(source, _moveable, degrees=degrees, normalize=normalize)
 
@@ -57,7 +57,7 @@ def read_moveables(source: Source, *, degrees: bool = False, normalize: bool = F
 def _moveable(value: Any, reading: Reading) -> Any:
     """Read a point if there is a position and no rotation, else a pose; a ROS message as what it is."""
     if type(value) is dict and not MESSAGE_KEYS.isdisjoint(value) and "child_frame_id" not in value:
-        from frametool.formats.stamped import kind_of, read_stamped
+        from frametool.ros.stamped import kind_of, read_stamped
 
         if key := kind_of(value):
             return read_stamped(value, key, reading)

@@ -6,22 +6,22 @@ import re
 import sys
 from typing import TYPE_CHECKING, Any
 
+from frametool.documents.chunks import Piece, documents, lines
+from frametool.documents.source import MOST_CHARACTERS, Source, decode, read_text
 from frametool.errors import FileProblem, FormatError, ValueInvalid, warn
-from frametool.formats import ros
 from frametool.formats.detect import BAGS, FORMS, HEAD, detect
-from frametool.formats.pieces import Piece, documents, lines
-from frametool.formats.ros_stream import Message, document_messages, end_of_document, read_messages
-from frametool.formats.samples import Sample, Tally
-from frametool.formats.source import MOST_CHARACTERS, Source, decode, read_text
-from frametool.formats.values import Misfit, Reading, as_mapping
+from frametool.grammar.readers import Misfit, Reading, as_mapping
+from frametool.ros import messages
+from frametool.ros.message_stream import Message, document_messages, end_of_document, read_messages
+from frametool.ros.samples import Sample, Tally
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from os import PathLike
     from typing import BinaryIO
 
-    from frametool.formats.samples import Components
-    from frametool.formats.values import Path
+    from frametool.grammar.readers import Path
+    from frametool.ros.samples import Components
 
     Report = Callable[[FormatError], None]
 
@@ -57,7 +57,7 @@ class Recording:
         return f"{self.name}: {FORMS[self.form]}"
 
     def text(self) -> str:
-        """Give the whole text of a tree."""
+        """Return the whole text of a tree."""
         if self.stream is None or self.path != "-":
             self.close()
             return read_text(self.path)
@@ -69,7 +69,7 @@ class Recording:
             self.stream.close()
 
     def samples(self, report: Report | None = None, *, tell: bool = True, raw: bool = False) -> Iterator[Sample]:
-        """Give the samples in the order they were recorded, then warn of what was odd.
+        """Yield the samples in the order they were recorded, then warn of what was odd.
 
         report: takes the errors, and reading goes on behind them; without it the first one is raised.
         tell: without it what was odd is only kept, in `tally`.  raw: messages in text as tf2 receives them, unchecked.
@@ -84,7 +84,7 @@ class Recording:
 
 
 def samples_of(recording: Recording, report: Report | None = None) -> Iterator[Sample]:
-    """Give what a recording or a tree holds as samples; the frames of a tree that stands still have no stamp."""
+    """Yield what a recording or a tree holds as samples; the frames of a tree that stands still have no stamp."""
     if recording.holds_samples:
         yield from recording.samples(report)
         return
@@ -133,7 +133,7 @@ def _opened(path: str) -> BinaryIO:
 def _samples(recording: Recording, report: Report) -> Iterator[Sample]:
     """Choose the reader."""
     if recording.form in BAGS:
-        from frametool.formats.bags import read_bag
+        from frametool.ros.bags import read_bag
 
         try:
             yield from read_bag(recording.path, recording.tally)
@@ -153,7 +153,7 @@ def _samples(recording: Recording, report: Report) -> Iterator[Sample]:
 
 def _echo(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample]:
     """Read plain documents fast and the others in full."""
-    from frametool.formats.ros_blocks import Blocks
+    from frametool.ros.echo_blocks import Blocks
 
     blocks = Blocks(piece.text, piece.line, recording.tally)
     while True:
@@ -170,7 +170,7 @@ def _echo(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample
 
 def _calls(piece: Piece, recording: Recording, report: Report) -> Iterator[Sample]:
     """Read one call of static_transform_publisher from each line."""
-    from frametool.formats.publisher import read_call
+    from frametool.ros.publisher import read_call
 
     for number, line in enumerate(piece.text.split("\n"), piece.line):
         if not line.strip() or line.lstrip().startswith("#"):
@@ -186,7 +186,7 @@ def _calls(piece: Piece, recording: Recording, report: Report) -> Iterator[Sampl
 
 
 def _message_samples(message: Message | FormatError, recording: Recording, report: Report) -> Iterator[Sample]:
-    """Give the samples of one message; what is wrong with one of them does not touch the others."""
+    """Yield the samples of one message; what is wrong with one of them does not touch the others."""
     if isinstance(message, FormatError):
         report(message)
         return
@@ -196,7 +196,7 @@ def _message_samples(message: Message | FormatError, recording: Recording, repor
         report(message.error(misfit))
         return
     numbers = _header_lines(message, len(found))
-    still = ros.topic_of(message.value).endswith("tf_static")
+    still = messages.topic_of(message.value).endswith("tf_static")
     for (transform, path), line in zip(found, numbers, strict=True):
         reading = Reading(message.source)
         try:
@@ -212,10 +212,10 @@ def _read(
 ) -> tuple[str, str, Components, int | None]:
     """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
     if recording.raw and "header" in transform:
-        from frametool.formats.as_received import read_transform
+        from frametool.ros.tf2_input import read_transform
 
         return read_transform(transform)
-    parent, child, position, rotation, stamp_ns = ros.read_transform(transform, reading)
+    parent, child, position, rotation, stamp_ns = messages.read_transform(transform, reading)
     for _, note in reading.notes:
         if "normalised" in note:
             recording.tally.rough.append(line)
@@ -225,15 +225,15 @@ def _read(
 
 
 def _transforms(value: Any, path: Path, tally: Tally) -> Iterator[tuple[dict[str, Any], Path]]:
-    """Give every transform of a message, or of a list of messages; count messages that hold none."""
+    """Yield every transform of a message, or of a list of messages; count messages that hold none."""
     if type(value) is list:
         for index, item in enumerate(value):
             yield from _transforms(item, (*path, index), tally)
         return
     mapping = as_mapping(value, "a message with transforms")
-    inner = mapping["msg"] if ros.is_envelope(mapping) else mapping
-    if ros.is_message(inner):
-        yield from ros.messages(mapping, path)
+    inner = mapping["msg"] if messages.is_envelope(mapping) else mapping
+    if messages.is_message(inner):
+        yield from messages.messages(mapping, path)
     elif "op" in mapping:
         topic = str(mapping.get("topic") or f"op {mapping['op']}")
         tally.others[topic] = tally.others.get(topic, 0) + 1
@@ -243,7 +243,7 @@ def _transforms(value: Any, path: Path, tally: Tally) -> Iterator[tuple[dict[str
 
 
 def _header_lines(message: Message, count: int) -> list[int]:
-    """Give the lines on which the transforms of a message begin."""
+    """Return the lines on which the transforms of a message begin."""
     if message.source.text.count("\n") > 1:
         text = message.source.text
         offsets = [match.start() for match in _HEADER.finditer(text)]

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from frametool.documents.document import format_error, parse_documents
 from frametool.errors import FormatError
-from frametool.formats import ros
-from frametool.formats.documents import format_error, parse_documents
-from frametool.formats.pose import Pose, read_pose
-from frametool.formats.rotations import read_rotation
-from frametool.formats.values import Misfit, Reading, kind, within
+from frametool.grammar.pose import Pose, read_pose
+from frametool.grammar.readers import Misfit, Reading, kind, within
+from frametool.grammar.rotation import read_rotation
+from frametool.ros import messages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from frametool.formats.source import Source
-    from frametool.formats.values import Path
+    from frametool.documents.source import Source
+    from frametool.grammar.readers import Path
 
 
 def read_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
@@ -48,12 +48,12 @@ def read_all(source: Source, read: Callable[[Any, Reading], Any], *, degrees: bo
 
 
 def _items(value: Any) -> Iterator[tuple[Any, Path]]:
-    """Give the records of a document: itself, the entries of a list, the messages of a ROS list."""
+    """Yield the records of a document: itself, the entries of a list, the messages of a ROS list."""
     if type(value) is list and all(type(item) is dict for item in value):
         for index, item in enumerate(value):
             yield from ((each, (index, *path)) for each, path in _items(item))
-    elif type(value) is dict and ros.is_message(value):
-        yield from ros.messages(value, ())
+    elif type(value) is dict and messages.is_message(value):
+        yield from messages.messages(value, ())
     else:
         yield value, ()
 
@@ -70,7 +70,7 @@ def read_one_pose(value: Any, reading: Reading) -> Pose:
     if type(value) is not dict:
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(value)}")
     if "child_frame_id" in value:
-        parent, child, position, rotation, _ = ros.read_transform(value, reading, may_be_nameless=True)
+        parent, child, position, rotation, _ = messages.read_transform(value, reading, may_be_nameless=True)
         return Pose(position, rotation, child or None, parent or None)
     pose = read_pose(value, reading)
     if pose.position is None and pose.rotation is None:

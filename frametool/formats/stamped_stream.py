@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, warn
-from frametool.formats.ros_stream import read_messages
-from frametool.formats.stamped import moveables, spelling
-from frametool.formats.values import Misfit, Reading
+from frametool.grammar.readers import Misfit, Reading
+from frametool.ros.message_stream import read_messages
+from frametool.ros.stamped import moveables, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.formats.recordings import Recording
-    from frametool.formats.ros_stream import Message
-    from frametool.formats.stamped import Stamped
+    from frametool.ros.message_stream import Message
+    from frametool.ros.stamped import Stamped
 
 
 class Batch(NamedTuple):
@@ -27,7 +27,7 @@ class Batch(NamedTuple):
 def read_stamped_messages(
     recording: Recording, kind: str | None, *, normalize: bool = False
 ) -> Iterator[Batch | FormatError]:
-    """Give every message of a recording with what can be moved in it, in order, then warn of what was odd.
+    """Yield every message of a recording with what can be moved in it, in order, then warn of what was odd.
 
     Where a message cannot be read the error stands in its place.  kind: what --as says they are.
     Raises FormatError for a recording without messages; ValueInvalid for another kind.

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.formats.labels import graphviz
-from frametool.frames.listing import seen
+from frametool.frames.report import seen
+from frametool.grammar.edge_label import graphviz
 
 if TYPE_CHECKING:
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.listing import Seen
+    from frametool.frames.report import Seen
 
 
 def write_tree(tree: TransformBuffer) -> str:
-    """Give the digraph; the legend, which graphviz must hang somewhere, stands above the first root."""
+    """Return the digraph; the legend, which graphviz must hang somewhere, stands above the first root."""
     edges = seen(tree)
     newest = max((each.newest for each in edges), default=0.0)
     lines = ["digraph G {", *map(_edge, edges), "edge [style=invis];"]

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import BadTopology, LookupFailed, NotConnected, ValueInvalid, warn
 from frametool.frames.path import edges_between, to_root
-from frametool.frames.plan import Plan
+from frametool.frames.query import Plan
 from frametool.frames.stamps import format_stamp
-from frametool.frames.store import TrackStore, policy_named, whole_stamp
+from frametool.frames.track_store import TrackStore, policy_named, whole_stamp
 from frametool.geometry import rigid
 from frametool.geometry.transform import Transform
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.frames.track import Track
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.types import Rigid
 
 MOST_PLANS = 1 << 14
 
@@ -65,13 +65,13 @@ class TransformBuffer(TrackStore):
         self._plans.clear()
 
     def parent_exactly(self, frame: str, at_ns: int) -> str | None:
-        """Give a frame's parent only if it has data at a time."""
+        """Return a frame's parent only if it has data at a time."""
         track = self._tracks.get(frame)
         known = track is not None and (track.standing or track.index(at_ns) is not None)
         return track.parent_at(at_ns) if track is not None and known else None
 
     def lookup(self, target: str, source: str, at_ns: int | None = None) -> Transform:
-        """Give target_from_source: the pose of source in target, which maps points in source to points in target.
+        """Return target_from_source: the pose of source in target, which maps points in source to points in target.
 
         at_ns: the time; None is the latest that all edges of the path have reached.
         Raises UnknownFrame (also for a frame against itself), NotConnected, TooEarly, TooLate.
@@ -79,7 +79,7 @@ class TransformBuffer(TrackStore):
         return Transform.of(*self.lookup_components(target, source, at_ns))
 
     def lookup_components(self, target: str, source: str, at_ns: int | None = None) -> Rigid:
-        """Give tx, ty, tz, x, y, z, w of target_from_source; otherwise as `lookup`."""
+        """Return tx, ty, tz, x, y, z, w of target_from_source; otherwise as `lookup`."""
         plan = self._plans.get((target, source))
         if plan is None:
             plan = self._plan(target, source, at_ns)
@@ -93,7 +93,7 @@ class TransformBuffer(TrackStore):
         return found
 
     def latest(self, target: str, source: str) -> int | None:
-        """Give the latest stamp that all moving edges of the newest path have reached; None if none moves.
+        """Return the latest stamp that all moving edges of the newest path have reached; None if none moves.
 
         Of a frame against itself it is that frame's own newest stamp.
         Raises UnknownFrame, NotConnected.
@@ -105,7 +105,7 @@ class TransformBuffer(TrackStore):
     def lookup_across(
         self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str,
     ) -> Transform:  # fmt: skip
-        """Give the pose that source had at one time, seen from where target was at another.
+        """Return the pose that source had at one time, seen from where target was at another.
 
         fixed: a frame that counts as standing in between, e.g. the map.  A time of None is that half's latest.
         Raises as `lookup`.
@@ -117,12 +117,12 @@ class TransformBuffer(TrackStore):
         return Transform.of(*rigid.compose(*target_from_fixed, *fixed_from_source))
 
     def lookup_many(self, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
-        """Give target_from_source at many times: a batch of the times' shape.
+        """Return target_from_source at many times: a batch of the times' shape.
 
         at_ns: integer nanoseconds, an array or a sequence.  missing: "raise" at the first time without data, as
         `lookup` does, or "nan" for rows of NaN there.
         """
-        from frametool.frames.batch import lookup_many
+        from frametool.frames.lookup_many import lookup_many
 
         return lookup_many(self, target, source, at_ns, missing=missing)
 
@@ -141,7 +141,7 @@ class TransformBuffer(TrackStore):
         return [self._tracks[child] for child in (*reversed(down), *reversed(up))]
 
     def span(self, target: str, source: str) -> tuple[int, int] | None:
-        """Give the first and last time at which every moving edge of the newest path has data; None if none moves.
+        """Return the first and last time at which every moving edge of the newest path has data; None if none moves.
 
         They never overlap where the first is after the last.
         """
@@ -159,7 +159,7 @@ class TransformBuffer(TrackStore):
         return sorted(stamps)
 
     def plan(self, target: str, source: str, at_ns: int | None) -> Plan:
-        """Give the way between two frames as it is at a time, or by the newest parents."""
+        """Return the way between two frames as it is at a time, or by the newest parents."""
         return self._plans.get((target, source)) or self._plan(target, source, at_ns)
 
     def _plan(self, target: str, source: str, at_ns: int | None) -> Plan:

@@ -15,7 +15,7 @@ from frametool.geometry import floats, rigid
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.types import Rigid
 
 JUMP_FACTOR = 10.0  # a jump is a step so many times the median step of its edge ..
 JUMP_METRES, JUMP_RADIANS = 0.1, 0.2  # .. and also longer than what noise and slow frames do
@@ -88,7 +88,7 @@ class EdgeLog:
 
     @cached_property
     def steps(self) -> list[Step]:
-        """Give the ways between stamps in the order of time, once all are in; the last of equal stamps counts."""
+        """Return the ways between stamps in the order of time, once all are in; the last of equal stamps counts."""
         last = {stamp: at for at, stamp in enumerate(self._stamps)}
         order = [last[stamp] for stamp in sorted(last)]
         found: list[Step] = []
@@ -100,14 +100,14 @@ class EdgeLog:
         return found
 
     def _apart(self, before: int, at: int) -> tuple[float, float]:
-        """Give metres and radians between two samples; 0 under different parents."""
+        """Return metres and radians between two samples; 0 under different parents."""
         if self._under[before] != self._under[at]:
             return 0.0, 0.0
         metres, radians = rigid.distance(*self._pose(before), *self._pose(at), xp=floats)
         return metres, radians
 
     def _pose(self, at: int) -> Rigid:
-        """Give the components of a sample."""
+        """Return the components of a sample."""
         tx, ty, tz, x, y, z, w = self._poses[7 * at : 7 * at + 7]
         return tx, ty, tz, x, y, z, w
 
@@ -127,29 +127,29 @@ class EdgeLog:
 
     @property
     def rate(self) -> float | None:
-        """Give samples a second between the first and the last stamp; None for an edge that stands still."""
+        """Return samples a second between the first and the last stamp; None for an edge that stands still."""
         if self.first_ns is None or self.last_ns is None or not self.moves:
             return None
         return (self.count - 1) * BILLION / (self.last_ns - self.first_ns)
 
     @property
     def longest(self) -> Step | None:
-        """Give the step with the longest pause."""
+        """Return the step with the longest pause."""
         return max(self.steps, key=lambda step: step.pause_ns, default=None)
 
     def gaps(self) -> list[Step]:
-        """Give the steps that waited far longer than usual."""
+        """Return the steps that waited far longer than usual."""
         usual = _median([step.pause_ns for step in self.steps])
         return [step for step in self.steps if step.pause_ns > GAP_FACTOR * usual]
 
     def jumps(self) -> list[Step]:
-        """Give the steps that went far further than usual."""
+        """Return the steps that went far further than usual."""
         metres, radians = (_median([step[field] for step in self.steps]) for field in (2, 3))
         far, turned = max(JUMP_METRES, JUMP_FACTOR * metres), max(JUMP_RADIANS, JUMP_FACTOR * radians)
         return [step for step in self.steps if step.metres > far or step.radians > turned]
 
     def returns(self) -> list[Step]:
-        """Give the steps back where an edge goes back and forth all the time, as of two publishers that disagree."""
+        """Return the steps back where an edge goes back and forth all the time, as of two publishers that disagree."""
         back = [step for step in self.steps if step.returns]
         return back if len(back) >= max(LEAST_RETURNS, len(self.steps) / 3) else []
 
@@ -172,7 +172,7 @@ def chain(logs: dict[str, EdgeLog], target: str, source: str) -> list[str]:
 
 
 def common_interval(logs: Iterable[EdgeLog]) -> tuple[int, int] | None:
-    """Give the first and last stamp that all moving edges cover; None if all stand still; empty if first > last."""
+    """Return the first and last stamp that all moving edges cover; None if all stand still; empty if first > last."""
     moving = [log for log in logs if log.moves and log.first_ns is not None and log.last_ns is not None]
     if not moving:
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 
 from frametool.errors import BadTopology, NotConnected, UnknownFrame, ValueInvalid
-from frametool.frames.missing import no_data
+from frametool.frames.no_data import no_data
 from frametool.frames.path import edges_between
 from frametool.frames.stamps import format_stamp
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from frametool.errors import LookupFailed
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.track import Track
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.types import Rigid
 
 
 class Policy:
@@ -28,7 +28,7 @@ class Policy:
     def admit(
         self, parent: str, child: str, components: Rigid, authority: str,  # noqa: ARG002 - tf2's words name it
     ) -> tuple[str, str, Rigid]:
-        """Give names and numbers as they are kept.
+        """Return names and numbers as they are kept.
 
         Raises ValueInvalid, BadTopology.
         """

@@ -17,7 +17,7 @@ from frametool.geometry import quaternion
 if TYPE_CHECKING:
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.track import Track
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.types import Rigid
 
 TEN_SECONDS = 10 * BILLION
 LENGTH_TOLERANCE = 0.01  # of the squared norm
@@ -52,11 +52,11 @@ class Ros1(Policy):
         return parent, child, _unit(components)
 
     def received(self, components: Rigid) -> Rigid:
-        """Give the numbers as they come out of the message."""
+        """Return the numbers as they come out of the message."""
         return components
 
     def _complaints(self, parent: str, child: str, components: Rigid, authority: str) -> list[str]:
-        """Give what tf2 logs of names and numbers, in its order."""
+        """Return what tf2 logs of names and numbers, in its order."""
         start = f'Ignoring transform for child_frame_id "{child}" from authority "{authority}" because of'
         position, rotation = (" ".join(map(_number, part)) for part in (components[:3], components[3:]))
         off = abs(sum(value * value for value in components[3:]) - 1.0)
@@ -92,7 +92,7 @@ class Ros1(Policy):
             raise Refused("Warning:", *self.old(_received(track.child, stamp_ns, authority)))
 
     def old(self, what: str) -> tuple[str, ...]:
-        """Give the words for data from the past."""
+        """Return the words for data from the past."""
         return (f"TF_OLD_DATA ignoring data from the past (Possible reasons are {EXPLAINED}) {what}",)
 
     def repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:  # noqa: ARG002
@@ -113,7 +113,7 @@ class Ros1(Policy):
         return error
 
     def invalid(self, name: str, argument: str) -> str:
-        """Give the words for an empty name or one with a slash."""
+        """Return the words for an empty name or one with a slash."""
         if not name:
             return f"Invalid argument {argument} in tf2 frame_ids cannot be empty"
         return f"Invalid argument \"{name}\" {argument} in tf2 frame_ids cannot start with a '/' like: "
@@ -155,7 +155,7 @@ class Ros1(Policy):
         return error
 
     def extrapolation(self, track: Track, at_ns: int) -> str:
-        """Give the words for a time outside of an edge's samples."""
+        """Return the words for a time outside of an edge's samples."""
         first, last = track.span
         if len(track.stamps) == 1:
             return (
@@ -196,7 +196,7 @@ class Ros2(Ros1):
         return standing
 
     def old(self, what: str) -> tuple[str, ...]:
-        """Give the words for data from the past."""
+        """Return the words for data from the past."""
         return f"TF_OLD_DATA ignoring data from the past {what}", f"Possible reasons are {EXPLAINED}"
 
     def repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:  # noqa: ARG002
@@ -217,7 +217,7 @@ class Ros2(Ros1):
         """Leave what is over age."""
 
     def invalid(self, name: str, argument: str) -> str:
-        """Give the words for an empty name or one with a slash."""
+        """Return the words for an empty name or one with a slash."""
         reason = "start with a '/'" if name else "be empty"
         return f'Invalid argument "{name}" {argument} - in tf2 frame_ids cannot {reason}'
 
@@ -275,7 +275,7 @@ def _climb(buffer: TransformBuffer, frame: str, stop: str, at_ns: int | None) ->
 
 
 def _unit(components: Rigid) -> Rigid:
-    """Give the pose with its quaternion unit: tf2 keeps it as given, half a percent off at most."""
+    """Return the pose with its quaternion unit: tf2 keeps it as given, half a percent off at most."""
     squared = sum(value * value for value in components[3:])
     if abs(squared - 1.0) <= quaternion.UNIT:
         return components
@@ -294,6 +294,6 @@ def _number(value: float) -> str:
 
 
 def _double(duration_ns: int) -> float:
-    """Give seconds as ROS 1 computes them: whole seconds and 1e-9 times the rest, summed as doubles."""
+    """Return seconds as ROS 1 computes them: whole seconds and 1e-9 times the rest, summed as doubles."""
     whole, rest = divmod(duration_ns, BILLION)
     return whole + 1e-9 * rest

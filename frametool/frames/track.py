@@ -13,7 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any, TypeAlias
 
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.types import Rigid
 
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 
@@ -37,12 +37,12 @@ class Track:
 
     @property
     def parent(self) -> str:
-        """Give the newest parent."""
+        """Return the newest parent."""
         return self.parents[-1]
 
     @property
     def span(self) -> tuple[int, int]:
-        """Give the first and the last stamp of a moving frame."""
+        """Return the first and the last stamp of a moving frame."""
         return self.stamps[0], self.stamps[-1]
 
     def stand(self, parent: str, components: Rigid) -> None:
@@ -79,27 +79,27 @@ class Track:
         self.table = None
 
     def index(self, at_ns: int) -> int | None:
-        """Give the sample that holds or begins the way at a time; None outside of the samples."""
+        """Return the sample that holds or begins the way at a time; None outside of the samples."""
         at = bisect_right(self.stamps, at_ns) - 1
         if at < 0 or (at + 1 == len(self.stamps) and self.stamps[at] != at_ns):
             return None
         return at
 
     def parent_at(self, at_ns: int | None) -> str | None:
-        """Give the parent at a time, or the newest one; None where a changing parent is not known."""
+        """Return the parent at a time, or the newest one; None where a changing parent is not known."""
         if not self.varies or at_ns is None:
             return self.parents[-1]
         at = self.index(at_ns)
         return None if at is None else self.parents[at]
 
     def parent_near(self, at_ns: int) -> str:
-        """Give the parent at a time, or at the sample nearest to it."""
+        """Return the parent at a time, or at the sample nearest to it."""
         if not self.varies:
             return self.parents[-1]
         return self.parents[max(bisect_right(self.stamps, at_ns) - 1, 0)]
 
     def at(self, at_ns: int) -> Rigid | None:
-        """Give parent_from_child at a time, interpolated between two samples; None outside of them.
+        """Return parent_from_child at a time, interpolated between two samples; None outside of them.
 
         Between samples under different parents the older one holds, as in tf2.
         """

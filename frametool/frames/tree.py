@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from typing import Any
 
-    from frametool.geometry.kinds import Rigid
+    from frametool.geometry.types import Rigid
 
 MOST_KEPT = 1 << 14  # answers
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -79,16 +79,16 @@ class FrameTree:
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """Give every frame, in the order of first mention."""
+        """Return every frame, in the order of first mention."""
         return tuple(self._frames)
 
     @property
     def roots(self) -> tuple[str, ...]:
-        """Give the frames without a parent."""
+        """Return the frames without a parent."""
         return tuple(frame for frame in self._frames if frame not in self._edges)
 
     def parent(self, frame: str) -> str | None:
-        """Give a frame's parent; None for a root."""
+        """Return a frame's parent; None for a root."""
         edge = self._edges.get(frame)
         return edge[0] if edge is not None else None
 
@@ -107,7 +107,7 @@ class FrameTree:
         return [*reversed(down), line[len(up)], *reversed(up)]
 
     def lookup(self, target: str, source: str, at_ns: int | None = None) -> Transform:  # noqa: ARG002 - a tree that stands still answers any time alike
-        """Give target_from_source: the pose of source in target, which maps points in source to points in target.
+        """Return target_from_source: the pose of source in target, which maps points in source to points in target.
 
         at_ns: any time, or None; frames that stand still answer all alike.
         Raises UnknownFrame (also for a frame against itself), NotConnected.
@@ -129,18 +129,18 @@ class FrameTree:
         return rigid.compose(*target_from_top, *top_from_source) if down else top_from_source
 
     def latest(self, target: str, source: str) -> None:
-        """Give no stamp, as nothing moves; raises UnknownFrame, NotConnected."""
+        """Return no stamp, as nothing moves; raises UnknownFrame, NotConnected."""
         self._between(target, source)
 
     def lookup_across(
         self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str
     ) -> Transform:
-        """Give target_from_source by way of a fixed frame, as TransformBuffer does; any times are alike."""
+        """Return target_from_source by way of a fixed frame, as TransformBuffer does; any times are alike."""
         return self.lookup(target, fixed, target_at_ns) @ self.lookup(fixed, source, source_at_ns)
 
     def lookup_many(self, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
-        """Give target_from_source for each of many times, all alike; see TransformBuffer.lookup_many."""
-        from frametool.frames.batch import lookup_still
+        """Return target_from_source for each of many times, all alike; see TransformBuffer.lookup_many."""
+        from frametool.frames.lookup_many import lookup_still
 
         return lookup_still(self, target, source, at_ns, missing=missing)
 

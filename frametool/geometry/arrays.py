@@ -10,7 +10,7 @@ from numpy import any as some
 from numpy import cbrt, copysign, degrees, frexp, ldexp, maximum, minimum, radians, sqrt, where
 
 from frametool.errors import ValueInvalid
-from frametool.geometry.elementary import doubled_arctan, half_sincos, largest
+from frametool.geometry.trig import doubled_arctan, half_sincos, largest
 
 __all__ = [
     "all_near_one", "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp",
@@ -22,7 +22,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.geometry.kinds import Array, Components, Kernel, Number, Pair, Quaternion
+    from frametool.geometry.types import Array, Components, Kernel, Number, Pair, Quaternion
 
 BLOCK = 16384  # rows: numpy's calls cost little beside their work, and the temporaries of a kernel stay in the cache
 WIDE = 12  # columns in and out: kernels with more have more temporaries, and get three quarters of the rows
@@ -31,7 +31,7 @@ np.empty(2**21)  # 16 MiB given back untouched: from then on glibc reuses the me
 
 
 def length(x: Number, y: Number, z: Number) -> Number:
-    """Give the length of a vector; np.hypot takes two numbers and six times as long."""
+    """Return the length of a vector; np.hypot takes two numbers and six times as long."""
     return sqrt(x * x + y * y + z * z)
 
 
@@ -42,7 +42,7 @@ def all_near_one(values: Number, tolerance: float) -> bool:
 
 
 def first_nonzero(*values: Number) -> Number:
-    """Give element by element the first value that is not zero, or the last."""
+    """Return element by element the first value that is not zero, or the last."""
     found = values[0]
     for value in values[1:]:
         if np.all(found):
@@ -52,7 +52,7 @@ def first_nonzero(*values: Number) -> Number:
 
 
 def canonical_sign(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
-    """Give q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0.
+    """Return q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0.
 
     A product with +-1 costs a quarter of `where`; only exact zeros need the longer way.
     """
@@ -61,7 +61,7 @@ def canonical_sign(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
 
 
 def incline(rise: Number, run: Number) -> Number:
-    """Give the angle of a direction of length 1 to 1e-8, run >= 0.
+    """Return the angle of a direction of length 1 to 1e-8, run >= 0.
 
     Twice that whose tangent is rise / (length + run), which is at most 1; even parts are exactly pi/4.
     """
@@ -72,7 +72,7 @@ def incline(rise: Number, run: Number) -> Number:
 
 
 def bearing(y: Number, x: Number, radius: Number) -> Number:
-    """Give the angle of a direction of this length in [-pi, pi], NaN for none."""
+    """Return the angle of a direction of this length in [-pi, pi], NaN for none."""
     angle = doubled_arctan(y / (radius + abs(x)))
     angle *= copysign(1.0, x)
     angle += np.signbit(x) * copysign(np.pi, y)
@@ -80,7 +80,7 @@ def bearing(y: Number, x: Number, radius: Number) -> Number:
 
 
 def half_sincos_deg(angle: Number) -> Pair:
-    """Give sine and cosine of half an angle in degrees, exact at multiples of 90 as that of `floats` is."""
+    """Return sine and cosine of half an angle in degrees, exact at multiples of 90 as that of `floats` is."""
     half = 0.5 * np.fmod(angle, 720.0)
     quarter = np.rint(half / 90.0)
     rest = half - 90.0 * quarter
@@ -110,7 +110,7 @@ def rows(kernel: Kernel, count: int, parts: Components, *args: object) -> Array:
 
 
 def batch_shape(parts: Components) -> tuple[int, ...]:
-    """Give the shape components broadcast to.
+    """Return the shape components broadcast to.
 
     Raises:
         ValueInvalid: they do not.
@@ -156,5 +156,5 @@ def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:
 
 
 def _cut(column: Number, start: int, stop: int) -> Number:
-    """Give a block of a column as contiguous float64; a float stands for every row."""
+    """Return a block of a column as contiguous float64; a float stands for every row."""
     return column if isinstance(column, float) else np.ascontiguousarray(column[start:stop], dtype=np.float64)

@@ -9,13 +9,13 @@ from frametool.geometry.quaternion import canonical, unit_vector
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Namespace, Number, Quaternion
+    from frametool.geometry.types import Namespace, Number, Quaternion
 
 
 def to_quaternion(
     ax: Number, ay: Number, az: Number, angle: Number, xp: Namespace, *, degrees: bool = False
 ) -> Quaternion:
-    """Give the quaternion x, y, z, w of a turn about a non-zero axis of any length, in radians or degrees."""
+    """Return the quaternion x, y, z, w of a turn about a non-zero axis of any length, in radians or degrees."""
     ux, uy, uz = unit_vector(ax, ay, az, xp)
     sine, cosine = xp.half_sincos_deg(angle) if degrees else xp.half_sincos(angle)
     return ux * sine, uy * sine, uz * sine, cosine
@@ -24,7 +24,7 @@ def to_quaternion(
 def from_quaternion(
     x: Number, y: Number, z: Number, w: Number, xp: Namespace, *, degrees: bool = False
 ) -> tuple[Number, Number, Number, Number]:
-    """Give unit axis and angle in [0, pi] (or 180 degrees); the identity has the axis x.
+    """Return unit axis and angle in [0, pi] (or 180 degrees); the identity has the axis x.
 
     At half a turn, where both directions are right, the first non-zero component of the axis is positive.
     """

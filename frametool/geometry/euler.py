@@ -10,13 +10,13 @@ from frametool.geometry.quaternion import EPS, settled
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Namespace, Number, Quaternion, Vector
+    from frametool.geometry.types import Namespace, Number, Quaternion, Vector
 
 LOCK = EPS * EPS  # of the squared radii: beyond 1 eps the angles are still known, and dropping them would be an error
 
 
 def _plan(name: str) -> tuple[int, int, int, float, bool, bool]:
-    """Give the axes i, j, k (outermost first), their parity, and whether symmetric and static."""
+    """Return the axes i, j, k (outermost first), their parity, and whether symmetric and static."""
     static = name[0] == "s"
     i, j, last = ("xyz".index(letter) for letter in (name[:0:-1] if static else name[1:]))
     k = 3 - i - j
@@ -35,7 +35,7 @@ AXES = {
 def to_quaternion(
     first: Number, second: Number, third: Number, axes: str, xp: Namespace, *, degrees: bool = False
 ) -> Quaternion:
-    """Give the quaternion x, y, z, w of three angles about the axes of a convention.
+    """Return the quaternion x, y, z, w of three angles about the axes of a convention.
 
     Angles in radians, or in degrees with exact results at multiples of 90.
     Source: the product of three elementary quaternions q_i(a) q_j(b) q_k(c), written out.
@@ -65,7 +65,7 @@ def to_quaternion(
 def from_quaternion(
     x: Number, y: Number, z: Number, w: Number, axes: str, xp: Namespace, *, degrees: bool = False
 ) -> Vector:
-    """Give the three angles of a convention, in the order of its letters.
+    """Return the three angles of a convention, in the order of its letters.
 
     The middle angle lies in [-pi/2, pi/2], or in [0, pi] where the outer axes are the same; the others in (-pi, pi].
     At gimbal lock the third is 0.  Degrees are exact at multiples of 90.
@@ -107,7 +107,7 @@ def _pairs(
     parity: float,
     symmetric: bool,  # noqa: FBT001
 ) -> Quaternion:
-    """Give a, b, c, d: (a, b) points along half the sum of the outer angles, (c, d) along half their difference."""
+    """Return a, b, c, d: (a, b) points along half the sum of the outer angles, (c, d) along half their difference."""
     vi, vj, vk = vector[i], vector[j], vector[k]
     if symmetric:
         return w, vi, vj, vk * parity
@@ -119,7 +119,7 @@ def _without_third(
     a: Number, b: Number, c: Number, d: Number, squared_sum: Number, squared_difference: Number, radius: Number,
     static: bool, xp: Namespace,  # noqa: FBT001
 ) -> tuple[Number, Number, Number, Number, Number]:  # fmt: skip
-    """Give the pairs, and the product of their lengths, with the pair that vanished at lock set to the other.
+    """Return the pairs, and the product of their lengths, with the pair that vanished at lock set to the other.
 
     To its mirror image where the axes are static: so the third angle becomes 0.
     """

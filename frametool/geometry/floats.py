@@ -13,7 +13,7 @@ __all__ = [
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Pair
+    from frametool.geometry.types import Pair
 
 SQRT_HALF = sqrt(0.5)
 maximum, minimum = max, min
@@ -23,19 +23,19 @@ some = bool
 
 
 def where(condition: bool, yes: float, no: float) -> float:  # noqa: FBT001 - numpy's signature
-    """Give `yes` if the condition holds, else `no`; both are already computed."""
+    """Return `yes` if the condition holds, else `no`; both are already computed."""
     return yes if condition else no
 
 
 def canonical_sign(x: float, y: float, z: float, w: float) -> tuple[float, float, float, float]:
-    """Give q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0."""
+    """Return q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0."""
     if (w or x or y or z) < 0.0:
         return 0.0 - x, 0.0 - y, 0.0 - z, 0.0 - w
     return x, y, z, w
 
 
 def bearing(y: float, x: float, _radius: float) -> float:
-    """Give the angle of a direction in [-pi, pi]; arrays profit from knowing its length."""
+    """Return the angle of a direction in [-pi, pi]; arrays profit from knowing its length."""
     return atan2(y, x)
 
 
@@ -45,7 +45,7 @@ def all_near_one(value: float, tolerance: float) -> bool:
 
 
 def first_nonzero(*values: float) -> float:
-    """Give the first value that is not zero, or the last."""
+    """Return the first value that is not zero, or the last."""
     for value in values:
         if value:
             return value
@@ -53,13 +53,13 @@ def first_nonzero(*values: float) -> float:
 
 
 def half_sincos(angle: float) -> Pair:
-    """Give sine and cosine of half an angle in radians."""
+    """Return sine and cosine of half an angle in radians."""
     half = 0.5 * angle
     return sin(half), cos(half)
 
 
 def half_sincos_deg(angle: float) -> Pair:
-    """Give sine and cosine of half an angle in degrees.
+    """Return sine and cosine of half an angle in degrees.
 
     Exact at multiples of 180; at odd multiples of 90 both have the same double sqrt(1/2) as magnitude, so that
     products cancel exactly.  The reduction to at most 45 degrees is exact.

@@ -10,7 +10,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from frametool.geometry.kinds import Matrix, Namespace, Number, Quaternion
+    from frametool.geometry.types import Matrix, Namespace, Number, Quaternion
 
 ORTHONORMAL = 8 * EPS  # of the Gram matrix: what rounding alone leaves on a correctly rounded rotation
 SINGULAR = 1e-12  # of det / (|row 1| |row 2| |row 3|): below, rounding decides which rotation is nearest
@@ -20,7 +20,7 @@ def to_quaternion(
     r11: Number, r12: Number, r13: Number, r21: Number, r22: Number, r23: Number,
     r31: Number, r32: Number, r33: Number, xp: Namespace,
 ) -> Quaternion:  # fmt: skip
-    """Give the quaternion of an orthonormal matrix.
+    """Return the quaternion of an orthonormal matrix.
 
     Source: Shepperd 1978, from the largest of 4w^2, 4x^2, 4y^2, 4z^2, then normalised.
     """
@@ -40,21 +40,21 @@ def to_quaternion(
 
 
 def from_quaternion(x: Number, y: Number, z: Number, w: Number) -> Matrix:
-    """Give the matrix of a quaternion."""
+    """Return the matrix of a quaternion."""
     return to_matrix(x, y, z, w)
 
 
 def determinant(
     a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number
 ) -> Number:
-    """Give the determinant: 1 for a rotation, negative for what is mirrored."""
+    """Return the determinant: 1 for a rotation, negative for what is mirrored."""
     return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
 def defect(
     a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number, xp: Namespace
 ) -> Number:
-    """Give the largest entry of |R R^T - 1|: how far the rows are from orthonormal."""
+    """Return the largest entry of |R R^T - 1|: how far the rows are from orthonormal."""
     larger = xp.maximum
     lengths = larger(abs(a * a + b * b + c * c - 1.0), abs(d * d + e * e + f * f - 1.0))
     lengths = larger(lengths, abs(g * g + h * h + i * i - 1.0))
@@ -65,7 +65,7 @@ def defect(
 def nearest(
     a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number, xp: Namespace
 ) -> Matrix:
-    """Give the rotation nearest to a matrix of positive determinant: its orthogonal polar factor.
+    """Return the rotation nearest to a matrix of positive determinant: its orthogonal polar factor.
 
     Source: Higham 1986, Newton's X <- (X + X^-T)/2 with the inverse by cofactors, started at determinant 1.
     The convergence is quadratic: a step below 1e-9 leaves 1e-18.
@@ -139,7 +139,7 @@ def scaled(
 def relative_volume(
     a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number, xp: Namespace
 ) -> Number:
-    """Give the determinant divided by the lengths of the rows: in [-1, 1], 0 where a row is zero."""
+    """Return the determinant divided by the lengths of the rows: in [-1, 1], 0 where a row is zero."""
     a, b, c, d, e, f, g, h, i = scaled(a, b, c, d, e, f, g, h, i, xp)
     lengths = xp.length(a, b, c) * xp.length(d, e, f) * xp.length(g, h, i)
     return determinant(a, b, c, d, e, f, g, h, i) / xp.where(lengths == 0.0, 1.0, lengths)

@@ -8,18 +8,18 @@ LIMIT = 1e150  # beyond, the square of the length overflows (and no digit of a t
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Namespace, Number, Quaternion, Vector
+    from frametool.geometry.types import Namespace, Number, Quaternion, Vector
 
 
 def to_quaternion(px: Number, py: Number, pz: Number) -> Quaternion:
-    """Give the quaternion x, y, z, w of modified Rodrigues parameters (Schaub & Junkins 1996)."""
+    """Return the quaternion x, y, z, w of modified Rodrigues parameters (Schaub & Junkins 1996)."""
     squared = px * px + py * py + pz * pz
     scale = 1.0 / (1.0 + squared)
     return 2.0 * px * scale, 2.0 * py * scale, 2.0 * pz * scale, (1.0 - squared) * scale
 
 
 def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Vector:
-    """Give modified Rodrigues parameters of length 0 to 1: those of the shorter turn."""
+    """Return modified Rodrigues parameters of length 0 to 1: those of the shorter turn."""
     divisor = xp.copysign(1.0 + abs(w), xp.first_nonzero(w, x, y, z))
     return x / divisor, y / divisor, z / divisor
 

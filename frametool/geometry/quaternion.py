@@ -10,7 +10,7 @@ from frametool.geometry import floats
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Components, Matrix, Namespace, Number, Quaternion, Vector
+    from frametool.geometry.types import Components, Matrix, Namespace, Number, Quaternion, Vector
 
 EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: what lies within 4 is left alone, bit for bit
@@ -20,7 +20,7 @@ TINY = 1e-150  # the least angle divided by: sin(x)/x is 1 there, and parts down
 
 
 def squared_norm(x: Number, y: Number, z: Number, w: Number) -> Number:
-    """Give x^2 + y^2 + z^2 + w^2; right for norms between 1e-150 and 1e150."""
+    """Return x^2 + y^2 + z^2 + w^2; right for norms between 1e-150 and 1e150."""
     return x * x + y * y + z * z + w * w
 
 
@@ -62,7 +62,7 @@ def settled(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
 
 
 def conjugate(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
-    """Give the inverse of a unit quaternion; zeros stay +0."""
+    """Return the inverse of a unit quaternion; zeros stay +0."""
     return 0.0 - x, 0.0 - y, 0.0 - z, w
 
 
@@ -94,19 +94,19 @@ def canonical(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quat
 
 
 def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
-    """Give the quaternion as it leaves: unit, with the canonical sign."""
+    """Return the quaternion as it leaves: unit, with the canonical sign."""
     return canonical(*unit(x, y, z, w, xp), xp)
 
 
 def angle(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Number:
-    """Give the rotation angle in [0, pi] radians, accurate at both ends (half the angle by atan2)."""
+    """Return the rotation angle in [0, pi] radians, accurate at both ends (half the angle by atan2)."""
     return 2.0 * xp.incline(xp.length(x, y, z), abs(w))
 
 
 def arc(
     ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number, xp: Namespace,
 ) -> Number:  # fmt: skip
-    """Give the angle in [0, pi/2] between two quaternions as vectors, q and -q being one: half the rotation's.
+    """Return the angle in [0, pi/2] between two quaternions as vectors, q and -q being one: half the rotation's.
 
     Source: Kahan, 2 atan2(|b - a|, |b + a|); it keeps its relative accuracy for the smallest arcs.
     """
@@ -118,7 +118,7 @@ def arc(
 def distance(
     ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number, xp: Namespace,
 ) -> Number:  # fmt: skip
-    """Give the angle in [0, pi] of the rotation between two."""
+    """Return the angle in [0, pi] of the rotation between two."""
     return 2.0 * arc(ax, ay, az, aw, bx, by, bz, bw, xp)
 
 
@@ -156,7 +156,7 @@ def ends(start: Components, between: Components, end: Components, fraction: Numb
 
 
 def to_matrix(x: Number, y: Number, z: Number, w: Number) -> Matrix:
-    """Give the rotation matrix r11 .. r33, row-major.
+    """Return the rotation matrix r11 .. r33, row-major.
 
     Dividing by the norm actually computed makes multiples of 90 degrees exact and forgives a few eps of norm.
     """
@@ -216,7 +216,7 @@ def complaint(x: float, y: float, z: float, w: float, norm: float, *, normalize:
 
 
 def between(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:
-    """Give the shortest rotation that turns the direction a into the direction b.
+    """Return the shortest rotation that turns the direction a into the direction b.
 
     The turn by twice the angle between a and the bisector a + b.  Near opposite directions the bisector is all
     rounding along a - b, which is taken out of it (a + b itself is exact there); opposite to 1 eps: half a turn
@@ -236,7 +236,7 @@ def between(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Numb
 
 
 def _sideways(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
-    """Give a vector at right angles to a unit vector, from the coordinate axis farthest from it."""
+    """Return a vector at right angles to a unit vector, from the coordinate axis farthest from it."""
     use_x = (abs(x) <= abs(y)) & (abs(x) <= abs(z))
     use_y = abs(y) <= abs(z)
     zero = 0.0 * x
@@ -256,7 +256,7 @@ def check_directions(ax: float, ay: float, az: float, bx: float, by: float, bz: 
 
 
 def unit_vector(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
-    """Give the direction of a non-zero vector of any length; the scaling by a power of two is exact."""
+    """Return the direction of a non-zero vector of any length; the scaling by a power of two is exact."""
     shift = -xp.frexp(xp.maximum(xp.maximum(abs(x), abs(y)), abs(z)))[1]
     x, y, z = xp.ldexp(x, shift), xp.ldexp(y, shift), xp.ldexp(z, shift)
     length = xp.length(x, y, z)
@@ -264,5 +264,5 @@ def unit_vector(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
 
 
 def cross(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Vector:
-    """Give the vector product."""
+    """Return the vector product."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

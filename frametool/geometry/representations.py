@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.geometry.kinds import Components, Namespace, Quaternion
+    from frametool.geometry.types import Components, Namespace, Quaternion
 
     Check = Callable[..., Components]
 
@@ -51,14 +51,14 @@ class Representation:
     def to_quaternion(
         self, components: Components, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
     ) -> Quaternion:
-        """Give x, y, z, w of components in column order; `degrees` touches the angle columns only, `axes` Euler's."""
+        """Return x, y, z, w of components in column order; `degrees` touches the angle columns only, `axes` Euler's."""
         result: Quaternion = self._forward(components, xp, degrees, axes)
         return result
 
     def from_quaternion(
         self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
     ) -> Components:
-        """Give the components in column order of a unit quaternion."""
+        """Return the components in column order of a unit quaternion."""
         result: Components = self._backward((x, y, z, w), xp, degrees, axes)
         return result
 
@@ -184,12 +184,12 @@ class Notation:
         return tuple(name + suffix * (index in angles) for index, name in enumerate(self.representation.columns))
 
     def to_quaternion(self, components: Components, xp: Namespace, *, degrees: bool = False) -> Quaternion:
-        """Give x, y, z, w; `degrees` counts where the notation itself says no unit."""
+        """Return x, y, z, w; `degrees` counts where the notation itself says no unit."""
         unit = degrees if self.degrees is None else self.degrees
         return self.representation.to_quaternion(components, xp, degrees=unit, axes=self.bound_axes())
 
     def from_quaternion(self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False) -> Components:
-        """Give the components of a unit quaternion; `degrees` counts where the notation itself says no unit."""
+        """Return the components of a unit quaternion; `degrees` counts where the notation itself says no unit."""
         unit = degrees if self.degrees is None else self.degrees
         return self.representation.from_quaternion(x, y, z, w, xp, degrees=unit, axes=self.bound_axes())
 
@@ -204,7 +204,7 @@ class Notation:
         return self.to_quaternion(self.representation.checked(components, normalize=normalize), xp, degrees=degrees)
 
     def bound_axes(self) -> str:
-        """Give the Euler axes; raise ValueInvalid where `euler` was named without them."""
+        """Return the Euler axes; raise ValueInvalid where `euler` was named without them."""
         if self.representation.name == "euler" and self.axes is None:
             raise ValueInvalid(f"{self.spec} needs its axes: write euler:rzyx (one of {', '.join(sorted(euler.AXES))})")
         return self.axes or "sxyz"
@@ -231,7 +231,7 @@ def notation(spec: str) -> Notation:
 
 
 def checked_axes(axes: str) -> str:
-    """Give the name of an Euler convention back if it is one; else raise ValueInvalid with those there are."""
+    """Return the name of an Euler convention back if it is one; else raise ValueInvalid with those there are."""
     if axes in euler.AXES:
         return axes
     near = _both_readings(axes.lower()) or did_you_mean(axes.lower(), euler.AXES) or ";"
@@ -249,7 +249,7 @@ def _both_readings(letters: str) -> str:
 
 
 def axes_name(order: str, frame: str) -> str:
-    """Give the tf name of Euler axes told as order and frame: `zyx`, `intrinsic` is `rzyx`."""
+    """Return the tf name of Euler axes told as order and frame: `zyx`, `intrinsic` is `rzyx`."""
     prefix = {"intrinsic": "r", "extrinsic": "s"}.get(frame)
     if prefix is None:
         raise ValueInvalid(f"unknown Euler frame {frame!r}; write intrinsic (rotating axes) or extrinsic (static axes)")

@@ -13,7 +13,7 @@ from frametool.geometry.quaternion import cross
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Components, Namespace, Number, Pair, Rigid, Vector
+    from frametool.geometry.types import Components, Namespace, Number, Pair, Rigid, Vector
 
 SERIES_EXP = 1.5  # rad: above, a - sin(a) loses less than a digit; below, ten terms of its series are exact
 SERIES_LOG = 0.6  # rad: the same for 1 - (a/2) cot(a/2) and six terms
@@ -29,7 +29,7 @@ def compose(
     atx: Number, aty: Number, atz: Number, ax: Number, ay: Number, az: Number, aw: Number,
     btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number,
 ) -> Rigid:  # fmt: skip
-    """Give a_from_c of a_from_b and b_from_c."""
+    """Return a_from_c of a_from_b and b_from_c."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(ax, ay, az, aw)
     x, y, z, w = quaternion.compose(ax, ay, az, aw, bx, by, bz, bw)
     return (
@@ -39,7 +39,7 @@ def compose(
 
 
 def inverse(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number) -> Rigid:
-    """Give b_from_a of a_from_b."""
+    """Return b_from_a of a_from_b."""
     x, y, z, w = quaternion.conjugate(x, y, z, w)
     rx, ry, rz = quaternion.rotate(x, y, z, w, tx, ty, tz)
     return 0.0 - rx, 0.0 - ry, 0.0 - rz, x, y, z, w
@@ -57,7 +57,7 @@ def relative(
     atx: Number, aty: Number, atz: Number, ax: Number, ay: Number, az: Number, aw: Number,
     btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number,
 ) -> Rigid:  # fmt: skip
-    """Give inverse(a) b; the translations are subtracted first, so that near poses keep their digits."""
+    """Return inverse(a) b; the translations are subtracted first, so that near poses keep their digits."""
     x, y, z, w = quaternion.conjugate(ax, ay, az, aw)
     tx, ty, tz = quaternion.rotate(x, y, z, w, btx - atx, bty - aty, btz - atz)
     return tx, ty, tz, *quaternion.compose(x, y, z, w, bx, by, bz, bw)
@@ -68,7 +68,7 @@ def interpolate(
     btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number,
     fraction: Number, xp: Namespace,
 ) -> Rigid:  # fmt: skip
-    """Give the pose between two: the translation along the straight line, the rotation by slerp, as tf2 does.
+    """Return the pose between two: the translation along the straight line, the rotation by slerp, as tf2 does.
 
     fraction: 0 gives a and 1 gives b to the bit; outside is extrapolated.
     """
@@ -88,13 +88,13 @@ def distance(
     atx: Number, aty: Number, atz: Number, ax: Number, ay: Number, az: Number, aw: Number,
     btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number, xp: Namespace,
 ) -> Pair:  # fmt: skip
-    """Give the metres and the radians between two poses."""
+    """Return the metres and the radians between two poses."""
     metres = xp.length(btx - atx, bty - aty, btz - atz)
     return metres, quaternion.distance(ax, ay, az, aw, bx, by, bz, bw, xp)
 
 
 def to_matrix(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number) -> Components:
-    """Give the upper twelve entries m11 .. m34 of the homogeneous matrix, row-major; the last row is 0 0 0 1."""
+    """Return the upper twelve entries m11 .. m34 of the homogeneous matrix, row-major; the last row is 0 0 0 1."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(x, y, z, w)
     return r11, r12, r13, tx, r21, r22, r23, ty, r31, r32, r33, tz
 
@@ -102,7 +102,7 @@ def to_matrix(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Numbe
 def to_homogeneous(
     tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, _xp: Namespace
 ) -> Components:
-    """Give the sixteen entries of the homogeneous matrix, row-major."""
+    """Return the sixteen entries of the homogeneous matrix, row-major."""
     return *to_matrix(tx, ty, tz, x, y, z, w), 0.0, 0.0, 0.0, 1.0
 
 
@@ -114,7 +114,7 @@ def check_twist(vx: float, vy: float, vz: float, wx: float, wy: float, wz: float
 
 
 def exp(vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number, xp: Namespace) -> Rigid:
-    """Give the transform reached by a constant twist in unit time.
+    """Return the transform reached by a constant twist in unit time.
 
     v in metres, w in radians, linear part first as in ROS messages.
     Source: Murray, Li & Sastry 1994: t = v + B w x v + C w x (w x v), B = (1 - cos a)/a^2, C = (a - sin a)/a^3.
@@ -136,7 +136,7 @@ def exp(vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number, 
 
 
 def log(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Components:
-    """Give the twist vx, vy, vz, wx, wy, wz whose `exp` is this transform, with an angle up to pi.
+    """Return the twist vx, vy, vz, wx, wy, wz whose `exp` is this transform, with an angle up to pi.
 
     Source: v = t - w x t / 2 + D w x (w x t), D = (1 - (a/2) cot(a/2))/a^2, by its series below 0.6 rad.
     """

@@ -6,7 +6,7 @@ Knows no text and no files; radians only. One item is four Python floats and nee
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import axis_angle, batches, doors, euler, floats, matrix, mrp, quaternion, rotvec, six_d
+from frametool.geometry import axis_angle, dispatch, euler, floats, matrix, mrp, quaternion, rotvec, six_d, validation
 from frametool.geometry.representations import checked_axes
 
 TYPE_CHECKING = False
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
 
-    from frametool.geometry.kinds import Array, Components, Kernel, Numbers, Quaternion
+    from frametool.geometry.types import Array, Components, Kernel, Numbers, Quaternion
 
 NEAR = 1e-9  # rad: rotations closer than this count as close, three digits above the rounding of long chains
 
@@ -50,7 +50,7 @@ class Rotation:
 
     @classmethod
     def identity(cls) -> Rotation:
-        """Give the rotation that turns nothing."""
+        """Return the rotation that turns nothing."""
         return cls.of(0.0, 0.0, 0.0, 1.0)
 
     @classmethod
@@ -73,10 +73,10 @@ class Rotation:
         Raises:
             ValueInvalid: wrong shape, not finite, zero, or not of norm 1; names the first such row.
         """
-        given = doors.columns(xyzw, 4, "xyzw")
-        if doors.single(given):
+        given = validation.columns(xyzw, 4, "xyzw")
+        if validation.single(given):
             return cls.of(*quaternion.check(*given, normalize=normalize))
-        from frametool.geometry.sifting import unit_quaternions
+        from frametool.geometry.batch_validation import unit_quaternions
 
         return cls._of_columns(unit_quaternions(given, "xyzw", normalize=normalize))
 
@@ -89,10 +89,10 @@ class Rotation:
         Raises:
             ValueInvalid: wrong shape, not finite, mirrored, singular, not orthonormal; names the first such row.
         """
-        given = doors.matrices(matrices, 3, "matrix")
-        if doors.single(given):
+        given = validation.matrices(matrices, 3, "matrix")
+        if validation.single(given):
             return cls.of(*matrix.to_quaternion(*matrix.check(*given, normalize=normalize), floats))
-        from frametool.geometry.sifting import rotation_quaternions
+        from frametool.geometry.batch_validation import rotation_quaternions
 
         return cls._of_columns(rotation_quaternions(given, "matrix", normalize=normalize))
 
@@ -104,19 +104,20 @@ class Rotation:
     @classmethod
     def from_axis_angle(cls, axis: Numbers, angle: Numbers) -> Rotation:
         """Take axes of shape (..., 3), of any length but 0, and angles in radians of shape (...); they broadcast."""
-        given = (*doors.columns(axis, 3, "axis"), doors.scalars(angle, "angle"))
+        given = (*validation.columns(axis, 3, "axis"), validation.scalars(angle, "angle"))
         return cls._checked(given, "axis", axis_angle.to_quaternion, axis_angle.check)
 
     @classmethod
     def from_euler(cls, axes: str, angles: Numbers) -> Rotation:
         """Take angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`."""
-        given = doors.columns(angles, 3, "angles")
-        return cls._of_columns(batches.convert(euler.to_quaternion, 4, given, "angles", checked_axes(axes)))
+        given = validation.columns(angles, 3, "angles")
+        return cls._of_columns(dispatch.convert(euler.to_quaternion, 4, given, "angles", checked_axes(axes)))
 
     @classmethod
     def from_rpy(cls, rpy: Numbers) -> Rotation:
         """Take roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
-        return cls._of_columns(batches.convert(euler.to_quaternion, 4, doors.columns(rpy, 3, "rpy"), "rpy", "sxyz"))
+        angles = validation.columns(rpy, 3, "rpy")
+        return cls._of_columns(dispatch.convert(euler.to_quaternion, 4, angles, "rpy", "sxyz"))
 
     @classmethod
     def from_mrp(cls, parameters: Numbers) -> Rotation:
@@ -130,20 +131,20 @@ class Rotation:
 
     @classmethod
     def between(cls, start: Numbers, end: Numbers) -> Rotation:
-        """Give the shortest rotation that turns one direction, shape (..., 3), into another; lengths do not matter.
+        """Return the shortest rotation that turns one direction, shape (..., 3), into another; lengths do not matter.
 
         For opposite directions the axis is at right angles to the start and to the coordinate axis farthest from it.
         """
-        parts = (*doors.columns(start, 3, "start"), *doors.columns(end, 3, "end"))
+        parts = (*validation.columns(start, 3, "start"), *validation.columns(end, 3, "end"))
         return cls._checked(parts, "start, end", quaternion.between, quaternion.check_directions)
 
     @classmethod
     def _from(cls, value: Numbers, width: int, name: str, kernel: Kernel, check: Any) -> Rotation:
-        return cls._checked(doors.columns(value, width, name), name, kernel, check)
+        return cls._checked(validation.columns(value, width, name), name, kernel, check)
 
     @classmethod
     def _checked(cls, given: Components, name: str, kernel: Kernel, check: Any) -> Rotation:
-        return cls._of_columns(batches.checked(kernel, 4, given, name, check))
+        return cls._of_columns(dispatch.checked(kernel, 4, given, name, check))
 
     @classmethod
     def _of_columns(cls, components: Components) -> Rotation:
@@ -151,47 +152,47 @@ class Rotation:
         return cls.of(x, y, z, w)
 
     def as_quaternion(self) -> Array:
-        """Give x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""
-        return batches.rows(quaternion.from_quaternion, 4, self._components)
+        """Return x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""
+        return dispatch.rows(quaternion.from_quaternion, 4, self._components)
 
     def as_matrix(self) -> Array:
-        """Give matrices of shape (..., 3, 3); columns are the turned axes."""
-        nine = batches.rows(lambda x, y, z, w, _xp: quaternion.to_matrix(x, y, z, w), 9, self._components)
+        """Return matrices of shape (..., 3, 3); columns are the turned axes."""
+        nine = dispatch.rows(lambda x, y, z, w, _xp: quaternion.to_matrix(x, y, z, w), 9, self._components)
         return nine.reshape(*self.shape, 3, 3)
 
     def as_rotvec(self) -> Array:
-        """Give rotation vectors of shape (..., 3), radians, of length 0 to pi."""
-        return batches.rows(rotvec.from_quaternion, 3, self._components)
+        """Return rotation vectors of shape (..., 3), radians, of length 0 to pi."""
+        return dispatch.rows(rotvec.from_quaternion, 3, self._components)
 
     def as_axis_angle(self) -> tuple[Array, Any]:
-        """Give unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x."""
-        four = batches.rows(axis_angle.from_quaternion, 4, self._components)
+        """Return unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x."""
+        four = dispatch.rows(axis_angle.from_quaternion, 4, self._components)
         return four[..., :3], four[..., 3] if four.ndim > 1 else float(four[3])
 
     def as_euler(self, axes: str) -> Array:
-        """Give angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`.
+        """Return angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`.
 
         The middle one lies in [-pi/2, pi/2], or in [0, pi] where first and third axis are the same; at gimbal lock
         (see `gimbal_lock`) the third is 0.
         """
-        return batches.rows(euler.from_quaternion, 3, self._components, checked_axes(axes))
+        return dispatch.rows(euler.from_quaternion, 3, self._components, checked_axes(axes))
 
     def as_rpy(self) -> Array:
-        """Give roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
+        """Return roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
         return self.as_euler("sxyz")
 
     def as_mrp(self) -> Array:
-        """Give modified Rodrigues parameters of shape (..., 3), of length 0 to 1."""
-        return batches.rows(mrp.from_quaternion, 3, self._components)
+        """Return modified Rodrigues parameters of shape (..., 3), of length 0 to 1."""
+        return dispatch.rows(mrp.from_quaternion, 3, self._components)
 
     def as_six_d(self) -> Array:
-        """Give the first two matrix columns, one after the other, of shape (..., 6)."""
-        return batches.rows(lambda x, y, z, w, _xp: six_d.from_quaternion(x, y, z, w), 6, self._components)
+        """Return the first two matrix columns, one after the other, of shape (..., 6)."""
+        return dispatch.rows(lambda x, y, z, w, _xp: six_d.from_quaternion(x, y, z, w), 6, self._components)
 
     def gimbal_lock(self, axes: str) -> Any:
         """Say per element whether the angles of a convention are at gimbal lock, to 1 eps."""
         locked = euler.locked(*self._components, checked_axes(axes))
-        return bool(locked) if doors.single(self._components) else locked
+        return bool(locked) if validation.single(self._components) else locked
 
     def __matmul__(self, other: Rotation) -> Rotation:
         """Compose: a_from_b @ b_from_c is a_from_c."""
@@ -202,28 +203,28 @@ class Rotation:
             product = _new(Rotation)
             product._components = quaternion.compose(*ours, *theirs)
             return product
-        return self._of_columns(batches.run(quaternion.compose, 4, (*ours, *theirs)))
+        return self._of_columns(dispatch.run(quaternion.compose, 4, (*ours, *theirs)))
 
     def inverse(self) -> Rotation:
-        """Give the rotation back."""
+        """Return the rotation back."""
         return Rotation.of(*quaternion.conjugate(*self._components))
 
     def canonical(self) -> Rotation:
-        """Give the same rotation, its quaternion with the canonical sign."""
-        return self._of_columns(batches.run_with_xp(quaternion.from_quaternion, 4, self._components))
+        """Return the same rotation, its quaternion with the canonical sign."""
+        return self._of_columns(dispatch.run_with_xp(quaternion.from_quaternion, 4, self._components))
 
     def apply(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
-        given = doors.columns(vectors, 3, "vectors")
-        return batches.moved(quaternion.rotate, self._components, quaternion.to_matrix, given, "vectors")
+        given = validation.columns(vectors, 3, "vectors")
+        return dispatch.moved(quaternion.rotate, self._components, quaternion.to_matrix, given, "vectors")
 
     def angle(self) -> Any:
-        """Give the angle of rotation in [0, pi] radians."""
-        return batches.number(quaternion.angle, self._components)
+        """Return the angle of rotation in [0, pi] radians."""
+        return dispatch.number(quaternion.angle, self._components)
 
     def distance(self, other: Rotation) -> Any:
-        """Give the angle in [0, pi] radians of the rotation between two."""
-        return batches.number(quaternion.distance, (*self._components, *require(other, "other").components))
+        """Return the angle in [0, pi] radians of the rotation between two."""
+        return dispatch.number(quaternion.distance, (*self._components, *require(other, "other").components))
 
     def is_close(self, other: Rotation, *, angle: float = NEAR) -> Any:
         """Say per element whether two rotations are within an angle in radians; q and -q are one."""
@@ -234,20 +235,20 @@ class Rotation:
 
         fraction: a number, or an array that broadcasts with the rotations.
         """
-        parts = (*self._components, *require(other, "other").components, doors.scalars(fraction, "fraction"))
-        return self._of_columns(batches.run_with_xp(quaternion.slerp, 4, parts))
+        parts = (*self._components, *require(other, "other").components, validation.scalars(fraction, "fraction"))
+        return self._of_columns(dispatch.run_with_xp(quaternion.slerp, 4, parts))
 
     def mean(self, weights: Numbers | None = None) -> Rotation:
-        """Give the chordal mean of all elements: the rotation with the least sum of squared matrix differences.
+        """Return the chordal mean of all elements: the rotation with the least sum of squared matrix differences.
 
         Source: Markley et al. 2007, the eigenvector of the largest eigenvalue of sum(w q q^T).
         """
         import numpy as np
 
-        if doors.single(self._components):
+        if validation.single(self._components):
             return self
-        heavy = None if weights is None else doors.weights(weights, self.shape)
-        moment = batches.second_moment(self._components, heavy)
+        heavy = None if weights is None else validation.weights(weights, self.shape)
+        moment = dispatch.second_moment(self._components, heavy)
         return Rotation.from_quaternion(np.linalg.eigh(moment)[1][:, 3], normalize=True).canonical()
 
     @property
@@ -265,7 +266,7 @@ class Rotation:
         """Choose elements as numpy does."""
         if not self.shape:
             raise TypeError("one rotation has no elements")
-        return self._of_columns(batches.chosen(self._components, index))
+        return self._of_columns(dispatch.chosen(self._components, index))
 
     def __iter__(self) -> Iterator[Rotation]:
         """Go along the first axis."""
@@ -279,7 +280,7 @@ class Rotation:
 
 
 def require(value: object, name: str) -> Rotation:
-    """Give a rotation back; raise ValueInvalid for anything else."""
+    """Return a rotation back; raise ValueInvalid for anything else."""
     if isinstance(value, Rotation):
         return value
     raise ValueInvalid(f"{name}: expected a Rotation, got {type(value).__name__}")

@@ -9,11 +9,11 @@ LIMIT = 1e150  # beyond, the square of the length overflows (and no digit of a t
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Namespace, Number, Quaternion, Vector
+    from frametool.geometry.types import Namespace, Number, Quaternion, Vector
 
 
 def to_quaternion(rx: Number, ry: Number, rz: Number, xp: Namespace, *, degrees: bool = False) -> Quaternion:
-    """Give the quaternion x, y, z, w of a rotation vector in radians or degrees.
+    """Return the quaternion x, y, z, w of a rotation vector in radians or degrees.
 
     Exact down to 1e-300: an angle too small to be divided by stands for all smaller ones, with the same quotient.
     The unit axis is taken first, so that multiples of 90 degrees about a coordinate axis are exact.
@@ -24,7 +24,7 @@ def to_quaternion(rx: Number, ry: Number, rz: Number, xp: Namespace, *, degrees:
 
 
 def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace, *, degrees: bool = False) -> Vector:
-    """Give the rotation vector of a unit quaternion, of length 0 to pi (or 180 degrees).
+    """Return the rotation vector of a unit quaternion, of length 0 to pi (or 180 degrees).
 
     Relative accuracy holds down to 1e-300.  Half a turn leaves with the sign the quaternion has.
     """

@@ -13,7 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-    from frametool.geometry.kinds import Namespace, Number, Rigid
+    from frametool.geometry.types import Namespace, Number, Rigid
 
     Way: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number, Number]
 
@@ -22,7 +22,7 @@ def prepare(
     atx: Number, aty: Number, atz: Number, ax: Number, ay: Number, az: Number, aw: Number,
     btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number, xp: Namespace,
 ) -> Way:  # fmt: skip
-    """Give the step dx, dy, dz in metres, c as x, y, z, w, and twice the arc theta in radians.
+    """Return the step dx, dy, dz in metres, c as x, y, z, w, and twice the arc theta in radians.
 
     The arc is the shorter one; at exactly half a turn the sign of b decides.  Equal rotations have arc 0 and c 0.
     """
@@ -46,7 +46,7 @@ def along(
     dx: Number, dy: Number, dz: Number, cx: Number, cy: Number, cz: Number, cw: Number, arc: Number,
     fraction: Number, xp: Namespace,
 ) -> Rigid:  # fmt: skip
-    """Give the pose at a fraction of the way from a, by what `prepare` gave; unit to some eps."""
+    """Return the pose at a fraction of the way from a, by what `prepare` gave; unit to some eps."""
     sine, cosine = xp.half_sincos(fraction * arc)
     return (
         atx + fraction * dx, aty + fraction * dy, atz + fraction * dz,

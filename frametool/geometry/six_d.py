@@ -12,11 +12,11 @@ PARALLEL = 1e-12  # sine between the columns: below, rounding decides the plane 
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.kinds import Components, Namespace, Number, Quaternion
+    from frametool.geometry.types import Components, Namespace, Number, Quaternion
 
 
 def to_quaternion(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:
-    """Give the quaternion of two columns, orthonormalised by Gram and Schmidt.
+    """Return the quaternion of two columns, orthonormalised by Gram and Schmidt.
 
     The columns need be neither unit nor at right angles, but not parallel.
     The second is cleared of the first twice: once leaves a residue where they are nearly parallel (Giraud 2005).
@@ -31,7 +31,7 @@ def to_quaternion(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz
 
 
 def from_quaternion(x: Number, y: Number, z: Number, w: Number) -> Components:
-    """Give r11, r21, r31 and r12, r22, r32."""
+    """Return r11, r21, r31 and r12, r22, r32."""
     r11, r12, _, r21, r22, _, r31, r32, _ = to_matrix(x, y, z, w)
     return r11, r21, r31, r12, r22, r32
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import TypeAlias
 
-    from frametool.geometry.kinds import Number
+    from frametool.geometry.types import Number
 
     Six: TypeAlias = tuple[Number, Number, Number, Number, Number, Number]
     Rows: TypeAlias = Sequence[Sequence[float]]
@@ -22,7 +22,7 @@ def move_wrench(
     tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number,
     fx: Number, fy: Number, fz: Number, mx: Number, my: Number, mz: Number,
 ) -> Six:  # fmt: skip
-    """Give force and torque about the target's origin: f' = R f, m' = R m + t x f'.
+    """Return force and torque about the target's origin: f' = R f, m' = R m + t x f'.
 
     f in N and m in Nm about the source's origin. Source: Murray, Li, Sastry 1994, eq. 2.66.
     """
@@ -36,7 +36,7 @@ def move_twist(
     tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number,
     vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number,
 ) -> Six:  # fmt: skip
-    """Give the velocity of the same rigid body at the target's origin: w' = R w, v' = R v + t x w'.
+    """Return the velocity of the same rigid body at the target's origin: w' = R w, v' = R v + t x w'.
 
     v in m/s is that of the body's point at the source's origin. Source: Murray, Li, Sastry 1994, eq. 2.58.
     """

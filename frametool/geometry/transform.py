@@ -6,7 +6,7 @@ Knows no names and no time. `a_from_b` takes points seen in b to the same points
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import batches, doors, floats, matrix, rigid
+from frametool.geometry import dispatch, floats, matrix, rigid, validation
 from frametool.geometry.rotation import NEAR, Rotation, require
 
 TYPE_CHECKING = False
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
 
-    from frametool.geometry.kinds import Array, Components, Numbers, Rigid
+    from frametool.geometry.types import Array, Components, Numbers, Rigid
 
 NEAR_BY = 1e-9  # metres: translations closer than this count as close
 _new = object.__new__
@@ -32,9 +32,9 @@ class Transform:
 
     def __init__(self, rotation: Rotation, translation: Numbers) -> None:
         """Join a rotation and a translation of shape (..., 3) in metres; batch shapes broadcast."""
-        shift = doors.columns(translation, 3, "translation")
+        shift = validation.columns(translation, 3, "translation")
         parts = (*shift, *require(rotation, "rotation").components)
-        self._components = doors.joined(parts, "translation")
+        self._components = validation.joined(parts, "translation")
 
     @classmethod
     def of(cls, tx: Any, ty: Any, tz: Any, x: Any, y: Any, z: Any, w: Any) -> Transform:
@@ -45,12 +45,12 @@ class Transform:
 
     @property
     def components(self) -> Rigid:
-        """Give tx, ty, tz, x, y, z, w: floats of one transform, else arrays of the batch's shape."""
+        """Return tx, ty, tz, x, y, z, w: floats of one transform, else arrays of the batch's shape."""
         return self._components
 
     @classmethod
     def identity(cls) -> Transform:
-        """Give the transform that moves nothing."""
+        """Return the transform that moves nothing."""
         return cls.of(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
     @classmethod
@@ -69,9 +69,9 @@ class Transform:
         Raises:
             ValueInvalid: wrong shapes, not finite, or no rotation; names the first such row.
         """
-        shift = doors.columns(xyz, 3, "xyz")
+        shift = validation.columns(xyz, 3, "xyz")
         rotation = Rotation.from_quaternion(xyzw, normalize=normalize)
-        return cls._of_columns(doors.joined((*shift, *rotation.components), "xyz"))
+        return cls._of_columns(validation.joined((*shift, *rotation.components), "xyz"))
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Transform:
@@ -80,25 +80,25 @@ class Transform:
         Raises:
             ValueInvalid: wrong shape, another last row, not finite, or no rotation; names the first such row.
         """
-        m = doors.matrices(matrices, 4, "matrix")
-        doors.check_last_row(m, "matrix")
+        m = validation.matrices(matrices, 4, "matrix")
+        validation.check_last_row(m, "matrix")
         turned = (*m[0:3], *m[4:7], *m[8:11])
-        if doors.single(m):
+        if validation.single(m):
             rotation: Any = matrix.to_quaternion(*matrix.check(*turned, normalize=normalize), floats)
         else:
-            from frametool.geometry.sifting import rotation_quaternions
+            from frametool.geometry.batch_validation import rotation_quaternions
 
             rotation = rotation_quaternions(turned, "matrix", normalize=normalize)
-        return cls._of_columns(doors.joined((m[3], m[7], m[11], *rotation), "matrix"))
+        return cls._of_columns(validation.joined((m[3], m[7], m[11], *rotation), "matrix"))
 
     @classmethod
     def exp(cls, twist: Numbers) -> Transform:
-        """Give the transform reached by constant twists (vx, vy, vz, wx, wy, wz), shape (..., 6), in unit time.
+        """Return the transform reached by constant twists (vx, vy, vz, wx, wy, wz), shape (..., 6), in unit time.
 
         Linear part first, as in ROS messages: metres, then radians.
         """
-        given = doors.columns(twist, 6, "twist")
-        return cls._of_columns(batches.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
+        given = validation.columns(twist, 6, "twist")
+        return cls._of_columns(dispatch.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
 
     @classmethod
     def _of_columns(cls, components: Components) -> Transform:
@@ -108,7 +108,7 @@ class Transform:
     @property
     def xyz(self) -> Array:
         """The translations, shape (..., 3), metres."""
-        return batches.stacked(self._components[:3])
+        return dispatch.stacked(self._components[:3])
 
     @property
     def xyzw(self) -> Array:
@@ -126,12 +126,12 @@ class Transform:
         return self.xyz
 
     def as_matrix(self) -> Array:
-        """Give homogeneous matrices of shape (..., 4, 4)."""
-        return batches.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
+        """Return homogeneous matrices of shape (..., 4, 4)."""
+        return dispatch.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
 
     def log(self) -> Array:
-        """Give the twists (vx, vy, vz, wx, wy, wz), shape (..., 6), whose `exp` this is; angles up to pi."""
-        return batches.rows(rigid.log, 6, self._components)
+        """Return the twists (vx, vy, vz, wx, wy, wz), shape (..., 6), whose `exp` this is; angles up to pi."""
+        return dispatch.rows(rigid.log, 6, self._components)
 
     def __matmul__(self, other: Transform) -> Transform:
         """Compose: a_from_b @ b_from_c is a_from_c."""
@@ -142,20 +142,20 @@ class Transform:
             product = _new(Transform)
             product._components = rigid.compose(*ours, *theirs)
             return product
-        return self._of_columns(batches.run(rigid.compose, 7, (*ours, *theirs)))
+        return self._of_columns(dispatch.run(rigid.compose, 7, (*ours, *theirs)))
 
     def inverse(self) -> Transform:
-        """Give b_from_a of a_from_b."""
-        return self._of_columns(batches.run(rigid.inverse, 7, self._components))
+        """Return b_from_a of a_from_b."""
+        return self._of_columns(dispatch.run(rigid.inverse, 7, self._components))
 
     def relative(self, other: Transform) -> Transform:
-        """Give the pose of the other seen from this one: self.inverse() @ other, near poses keeping their digits."""
-        return self._of_columns(batches.run(rigid.relative, 7, (*self._components, *_components_of(other))))
+        """Return the pose of the other seen from this one: self.inverse() @ other, near poses keeping their digits."""
+        return self._of_columns(dispatch.run(rigid.relative, 7, (*self._components, *_components_of(other))))
 
     def apply(self, points: Numbers) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
-        given = doors.columns(points, 3, "points")
-        return batches.moved(rigid.apply, self._components, rigid.to_matrix, given, "points")
+        given = validation.columns(points, 3, "points")
+        return dispatch.moved(rigid.apply, self._components, rigid.to_matrix, given, "points")
 
     def apply_vector(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
@@ -166,12 +166,12 @@ class Transform:
 
         fraction: a number, or an array that broadcasts with the transforms.
         """
-        parts = (*self._components, *_components_of(other), doors.scalars(fraction, "fraction"))
-        return self._of_columns(batches.run_with_xp(rigid.interpolate, 7, parts))
+        parts = (*self._components, *_components_of(other), validation.scalars(fraction, "fraction"))
+        return self._of_columns(dispatch.run_with_xp(rigid.interpolate, 7, parts))
 
     def distance(self, other: Transform) -> tuple[Any, Any]:
-        """Give the metres and the radians between two."""
-        metres, radians = batches.run_with_xp(rigid.distance, 2, (*self._components, *_components_of(other)))
+        """Return the metres and the radians between two."""
+        metres, radians = dispatch.run_with_xp(rigid.distance, 2, (*self._components, *_components_of(other)))
         return metres, radians
 
     def is_close(self, other: Transform, *, angle: float = NEAR, distance: float = NEAR_BY) -> Any:
@@ -181,14 +181,14 @@ class Transform:
         return bool(close) if type(metres) is float else close
 
     def canonical(self) -> Transform:
-        """Give the same transform, its quaternion with the canonical sign."""
+        """Return the same transform, its quaternion with the canonical sign."""
         return Transform.of(*self._components[:3], *self.rotation.canonical().components)
 
     def mean(self, weights: Numbers | None = None) -> Transform:
-        """Give the weighted mean of all elements: of the translations, and the chordal one of the rotations."""
+        """Return the weighted mean of all elements: of the translations, and the chordal one of the rotations."""
         if not self.shape:
             return self
-        return Transform(self.rotation.mean(weights), batches.mean_rows(self._components[:3], weights))
+        return Transform(self.rotation.mean(weights), dispatch.mean_rows(self._components[:3], weights))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -205,7 +205,7 @@ class Transform:
         """Choose elements as numpy does."""
         if not self.shape:
             raise TypeError("one transform has no elements")
-        return self._of_columns(batches.chosen(self._components, index))
+        return self._of_columns(dispatch.chosen(self._components, index))
 
     def __iter__(self) -> Iterator[Transform]:
         """Go along the first axis."""
@@ -220,7 +220,7 @@ class Transform:
 
 
 def _components_of(other: object) -> Rigid:
-    """Give the components of a transform; raise ValueInvalid for anything else."""
+    """Return the components of a transform; raise ValueInvalid for anything else."""
     if isinstance(other, Transform):
         return other.components
     raise ValueInvalid(f"other: expected a Transform, got {type(other).__name__}")

@@ -42,7 +42,7 @@ class FollowController:
         self.max_angular = math.inf if max_angular is None else _checked("max_angular", max_angular, 0.0)
 
     def command(self, x: float, y: float) -> Twist:
-        """Give the command for a target seen at x ahead, y to the left (metres).
+        """Return the command for a target seen at x ahead, y to the left (metres).
 
         Raises ValueInvalid when a gain makes the velocity infinite.
         """
@@ -57,7 +57,7 @@ class FollowController:
             raise ValueInvalid(unbounded(self.gain_linear, self.gain_angular, distance)) from None
 
     def due_ns(self, count: int) -> int:
-        """Give the time of the control step of that number, from 0; rounded once, so that no rate drifts."""
+        """Return the time of the control step of that number, from 0; rounded once, so that no rate drifts."""
         return round(count * BILLION / self.rate)
 
 
@@ -71,7 +71,7 @@ def _limited(value: float, most: float) -> float:
 
 
 def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:
-    """Give a number back if it is finite and within its bounds."""
+    """Return a number back if it is finite and within its bounds."""
     if not math.isfinite(value):
         raise ValueInvalid(f"{name} must be finite, found {value}")
     if not least <= value <= most:

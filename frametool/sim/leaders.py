@@ -47,7 +47,7 @@ class Leader(Protocol):
     due_ns: int | None
 
     def command(self, pose: TurtlePose) -> Twist | Heading | None:
-        """Give the command that is due, if any, and settle when the next one is."""
+        """Return the command that is due, if any, and settle when the next one is."""
 
 
 class Script:
@@ -65,7 +65,7 @@ class Script:
         self._advance()
 
     def command(self, pose: TurtlePose) -> Twist | None:  # noqa: ARG002 - a script does not look
-        """Give the command that is due."""
+        """Return the command that is due."""
         twist = self._next
         self._advance()
         return twist
@@ -111,7 +111,7 @@ class Mailbox:
             self._failure = error
 
     def command(self, pose: TurtlePose) -> Twist | Heading | None:  # noqa: ARG002 - whoever posts does the looking
-        """Give the newest command whose time has come.
+        """Return the newest command whose time has come.
 
         Raises Curtain when it was closed.
         """
@@ -135,7 +135,7 @@ class Periodic:
         self._drive = drive
 
     def command(self, pose: TurtlePose) -> Twist:
-        """Give this moment's command."""
+        """Return this moment's command."""
         now_ns = self.due_ns or 0
         self.due_ns = now_ns + self._period_ns
         return self._drive(now_ns, pose)
@@ -215,7 +215,7 @@ LEADERS: dict[str, Callable[[int], Leader]] = {
 
 
 def built_in(name: str, seed: int = 0) -> MakeLeader:
-    """Give what makes a built-in leader anew for each run.
+    """Return what makes a built-in leader anew for each run.
 
     Raises ValueInvalid for a name that is not in LEADERS.
     """
@@ -225,12 +225,12 @@ def built_in(name: str, seed: int = 0) -> MakeLeader:
 
 
 def scripted(commands: Iterable[TimedTwist]) -> MakeLeader:
-    """Give what makes a leader of (nanoseconds, Twist) pairs; a list can be run again, an iterator once."""
+    """Return what makes a leader of (nanoseconds, Twist) pairs; a list can be run again, an iterator once."""
     return lambda: Script(commands)
 
 
 def _ahead(pose: TurtlePose) -> TurtlePose:
-    """Give the place 2 m ahead."""
+    """Return the place 2 m ahead."""
     return pose._replace(x=math.cos(pose.theta) * 2.0 + pose.x, y=math.sin(pose.theta) * 2.0 + pose.y)
 
 

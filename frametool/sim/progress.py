@@ -48,7 +48,7 @@ class Progress:
                 self.gone[name] = (follow.leader if name in step.states else name, step.t_ns)
 
     def lines(self) -> Iterator[str]:
-        """Give the summary: one line a follower, then the walls."""
+        """Yield the summary: one line a follower, then the walls."""
         if self.t_ns is None:
             yield "ended before the first step"
             return
@@ -70,7 +70,7 @@ class Progress:
 
 
 def goal(leader: State, follow: Follow, now_ns: int) -> State:
-    """Give where a follower's target is, in the world."""
+    """Return where a follower's target is, in the world."""
     x, y = offset(follow.target, now_ns)
     cosine, sine = math.cos(leader.theta), math.sin(leader.theta)
     return State(leader.x + cosine * x - sine * y, leader.y + sine * x + cosine * y, leader.theta)

@@ -63,7 +63,7 @@ class Scene(NamedTuple):
 
     @property
     def followers(self) -> dict[str, Follow]:
-        """Give the turtles that follow another, by name."""
+        """Return the turtles that follow another, by name."""
         return {actor.name: actor.driver for actor in self.actors if isinstance(actor.driver, Follow)}
 
 
@@ -94,6 +94,6 @@ def tutorial(
 
 
 def _beside(spawn: Place, count: int) -> Place:
-    """Give the place of one of several followers; the first stands at `spawn` itself, wherever that is."""
+    """Return the place of one of several followers; the first stands at `spawn` itself, wherever that is."""
     x, y, theta = spawn
     return (x, y, theta) if not count else ((x - count) % (2.0 * CENTRE), y, theta)

@@ -231,7 +231,7 @@ class Chase:
         )
 
     def _look(self, buffer: TransformBuffer) -> tuple[float, float]:
-        """Give the target as the turtle sees it: at the latest common time, or where it was a while ago."""
+        """Return the target as the turtle sees it: at the latest common time, or where it was a while ago."""
         if not self.follow.delay_ns:
             return buffer.lookup(self.turtle, self.frame).components[:2]
         now_ns = buffer.latest(WORLD, self.turtle)
@@ -276,7 +276,7 @@ def simulate(scene: Scene) -> Iterator[Step]:
 
 
 def _parts(scene: Scene) -> Iterator[tuple[int, Part]]:
-    """Give everybody who acts, with the time of the first act."""
+    """Yield everybody who acts, with the time of the first act."""
     yield 0, Ticker()
     carrots = {(follow.leader, follow.target) for follow in scene.followers.values() if follow.target != "leader"}
     yield from ((0, Carrot(leader, target)) for leader, target in sorted(carrots))

@@ -86,7 +86,7 @@ def grid(gain_linear: ArrayLike, gain_angular: ArrayLike, leader: MakeLeader | s
 
 
 def rows(gain_linear: Sequence[float], gain_angular: Sequence[float], many: Many) -> Iterator[dict[str, float | None]]:
-    """Give a grid as records, nan as None."""
+    """Yield a grid as records, nan as None."""
     columns = [many.time_to_reach.tolist(), many.overshoot.tolist(), many.distance.tolist(), many.wall_hits.tolist()]
     names = ("time_to_reach", "overshoot", "final_distance", "wall_hits")
     for row, linear in enumerate(gain_linear):
@@ -230,6 +230,6 @@ class _Crowd:
             raise ValueInvalid(unbounded(self.gain_linear[first], self.gain_angular[first], distance[first]))
 
     def result(self, leader: State) -> tuple[Any, ...]:
-        """Give the fields of Many."""
+        """Return the fields of Many."""
         distance = self._distance(leader, np.empty_like(self.x), self._two)
         return self.x, SIZE - self.down, self.theta, distance, self.reached, self.overshoot, self.hits

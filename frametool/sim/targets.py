@@ -21,7 +21,7 @@ def frame_of(turtle: str, target: str) -> str:
 
 
 def offset(target: str, now_ns: int) -> tuple[float, float]:
-    """Give where a target stands in its leader's frame, in metres."""
+    """Return where a target stands in its leader's frame, in metres."""
     if target == "leader":
         return 0.0, 0.0
     if target == "carrot":
@@ -31,5 +31,5 @@ def offset(target: str, now_ns: int) -> tuple[float, float]:
 
 
 def planar(x: float, y: float, theta: float) -> Transform:
-    """Give a pose in the plane as a transform."""
+    """Return a pose in the plane as a transform."""
     return Transform.of(x, y, 0.0, 0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0))

@@ -58,7 +58,7 @@ class State(NamedTuple):
     theta: float
 
     def distance(self, other: State) -> float:
-        """Give the metres to another turtle."""
+        """Return the metres to another turtle."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
 
@@ -124,12 +124,12 @@ class Turtle:
 
     @property
     def state(self) -> State:
-        """Give where the turtle is, in double precision, y up."""
+        """Return where the turtle is, in double precision, y up."""
         return State(self._x, SIZE - self._down, self._theta)
 
     @property
     def pose(self) -> TurtlePose:
-        """Give what turtlesim would publish now, float32."""
+        """Return what turtlesim would publish now, float32."""
         ahead, turning, aside = self._velocity
         return _rounded(self._x, SIZE - self._down, self._theta, math.sqrt(ahead * ahead + aside * aside), turning)
 

@@ -96,7 +96,7 @@ class World:
         self.clears += 1
 
     def turtle(self, name: str) -> Turtle:
-        """Give a turtle by name.
+        """Return a turtle by name.
 
         Raises ServiceRefused when there is none: its services went with it.
         """
@@ -150,7 +150,7 @@ class World:
 
 
 def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float | str]:
-    """Give a service's arguments with the defaults of the table.
+    """Return a service's arguments with the defaults of the table.
 
     Raises ValueInvalid for a service or argument that does not exist, or one that is missing.
     """

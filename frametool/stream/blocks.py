@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.formats.numbers import explain_angle, explain_number, parse_angle
 from frametool.geometry import arrays, rigid
 from frametool.stream.faults import NULL, STOP, Fault
-from frametool.stream.movers import NOWHERE, by_frame, by_time
-from frametool.stream.pieces import Const, In, Instead, Out
-from frametool.stream.rotations import read_rotations
+from frametool.stream.row_layout import IDENTITY, POSE, TURN, pose_of
+from frametool.stream.row_rotations import read_rotations
+from frametool.stream.row_transforms import NOWHERE, by_frame, by_time
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
-from frametool.stream.shape import IDENTITY, POSE, TURN, pose_of
+from frametool.stream.text_parts import Const, In, Instead, Out
+from frametool.text.numbers import explain_angle, explain_number, parse_angle
 from frametool.text.parse import parse_floats
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.geometry.kinds import Components, Rigid
+    from frametool.geometry.types import Components, Rigid
     from frametool.stream.operation import Operation
-    from frametool.stream.pieces import Piece
+    from frametool.stream.row_layout import Shape, Target
     from frametool.stream.rows import Block
-    from frametool.stream.shape import Shape, Target
-    from frametool.stream.when import Timed
-    from frametool.text.arrays import Flags, Floats, Ints
+    from frametool.stream.stamp_source import Timed
+    from frametool.stream.text_parts import Piece
+    from frametool.text.array_types import Flags, Floats, Ints
     from frametool.text.spans import Spans
 
 
@@ -122,7 +122,7 @@ class Run:
         return None
 
     def _movers(self) -> list[Rigid | None]:
-        """Give the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
+        """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
         plan, block = self.plan, self.block
         shapes = max(len(plan.shapes), 1)
         if plan.timed is not None and self.count:
@@ -180,7 +180,7 @@ class Run:
             self._blame(row, name, f"the last row of a 4x4 pose is 0 0 0 1, found {found}")
 
     def _results(self, moved: list[Components]) -> tuple[Floats, Ints]:
-        """Give the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
+        """Return the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
         numbers: list[Floats] = []
         locked = np.zeros(self.count, np.int64)
         for target, parts in zip(self.plan.targets, moved, strict=True):
@@ -201,14 +201,14 @@ class Run:
         self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
 
     def first_fault(self) -> int | None:
-        """Give the place of the first bad row, if the run stops there."""
+        """Return the place of the first bad row, if the run stops there."""
         if self.plan.on_error != STOP:
             return None
         bad = [int(self.block.places[row]) for row in self.reasons]
         return min([*bad, *(each.place for each in self.block.broken)], default=None)
 
     def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
-        """Give what is written before place `end`: results, rows without one, and what passes."""
+        """Return what is written before place `end`: results, rows without one, and what passes."""
         odd = list(self.block.odd)
         if end is not None:
             self._keep(self.block.places[self.rows] < end)
@@ -240,13 +240,13 @@ class Run:
         return [(self.block.places[rows], assemble(pieces, parts, None, np.zeros(len(rows), np.int64)))]
 
     def faults(self) -> list[Fault]:
-        """Give what is wrong, line by line."""
+        """Return what is wrong, line by line."""
         found = [Fault(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
         return sorted(found + [Fault(each.line, each.column, each.reason) for each in self.block.broken])
 
 
 def _without_result(piece: Piece, null: bytes) -> Piece:
-    """Give what stands in a row without a result: nulls for its numbers, the input for what was put in its place."""
+    """Return what stands in a row without a result: nulls for its numbers, the input for what was put in its place."""
     if isinstance(piece, Out):
         return Const(piece.between.join([null] * (piece.last - piece.first)))
     return In(piece.part) if isinstance(piece, Instead) else piece
@@ -278,7 +278,7 @@ def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]
 
 
 def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
-    """Give the good row before each row, and the row; the very first row's is itself."""
+    """Return the good row before each row, and the row; the very first row's is itself."""
     full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
     if not good:
         return [pose, pose]

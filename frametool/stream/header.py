@@ -55,7 +55,7 @@ class Pose(NamedTuple):
 
 
 def find_positions(names: Sequence[str]) -> list[Columns]:
-    """Give every three columns that can be a position."""
+    """Return every three columns that can be a position."""
     found = []
     quaternions = {(each.prefix, each.suffix) for each in find_quaternions(names)}
     turns = {place for name in WITH_XYZ for each in _of_representation(name, names, None) for place in each.places}
@@ -70,7 +70,7 @@ def find_positions(names: Sequence[str]) -> list[Columns]:
 
 
 def find_quaternions(names: Sequence[str], *, bare: bool = False) -> list[Columns]:
-    """Give quaternions written x y z w under a common prefix or suffix; without either only if `bare`."""
+    """Return quaternions written x y z w under a common prefix or suffix; without either only if `bare`."""
     form = notation("quaternion")
     matches = _matches(["x", "y", "z", "w"], names)
     return [
@@ -79,7 +79,7 @@ def find_quaternions(names: Sequence[str], *, bare: bool = False) -> list[Column
 
 
 def find_rotations(names: Sequence[str], given: Notation | None) -> list[Columns]:
-    """Give every set of columns that can be a rotation, of the given notation if there is one."""
+    """Return every set of columns that can be a rotation, of the given notation if there is one."""
     searched = SEARCHED if given is None else (SAME_COLUMNS.get(given.representation.name, given.representation.name),)
     found = [each for name in searched for each in _of_representation(name, names, given)]
     if "quaternion" in searched:
@@ -110,7 +110,7 @@ def _with_unit(name: str, unit: str, given: Notation | None) -> Notation:
 
 
 def _matches(base: Sequence[str], names: Sequence[str]) -> Iterator[tuple[tuple[int, ...], str, str]]:
-    """Give the places of columns called prefix + base + suffix for all of the base, with the affixes."""
+    """Yield the places of columns called prefix + base + suffix for all of the base, with the affixes."""
     folded = [name.casefold() for name in names]
     where = {name: index for index, name in reversed(list(enumerate(folded)))}
     for index, name in enumerate(folded):
@@ -220,7 +220,7 @@ def _form_of(places: Sequence[int], shown: Sequence[str], given: Notation | None
 
 
 def _form_by_names(chosen: Sequence[str], given: Notation | None) -> Notation | None:
-    """Give the notation whose columns these are, in their order."""
+    """Return the notation whose columns these are, in their order."""
     for name in (*SEARCHED, "wxyz", *([given.representation.name] if given else ())):
         axes = given if given is not None and given.representation.name == name else None
         for each in _of_representation(name, chosen, axes):
@@ -230,7 +230,7 @@ def _form_by_names(chosen: Sequence[str], given: Notation | None) -> Notation | 
 
 
 def _places(word: str, names: Sequence[str] | None, width: int) -> list[int]:
-    """Give the places of a column's name, or of a number or range from 1."""
+    """Return the places of a column's name, or of a number or range from 1."""
     if names and word in names:
         return [names.index(word)]
     first, dash, last = word.partition("-")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.geometry import quaternion, rigid
-from frametool.stream.shape import VECTOR
+from frametool.stream.row_layout import VECTOR
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.geometry.kinds import Components, Namespace, Rigid
+    from frametool.geometry.types import Components, Namespace, Rigid
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 
@@ -52,7 +52,7 @@ class Operation(NamedTuple):
         return quaternion.rotate(*mover[3:], x, y, z) if kind == VECTOR else rigid.apply(*mover, x, y, z)
 
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
-        """Give the resulting pose, and what else is known about it."""
+        """Return the resulting pose, and what else is known about it."""
         result: Rigid = rigid.inverse(*poses[0]) if self.inverse else poses[0]
         left = edge or self.left
         if left is not None:

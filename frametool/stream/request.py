@@ -10,9 +10,9 @@ from frametool.stream.operation import Operation
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frametool.geometry.kinds import Rigid
     from frametool.geometry.representations import Notation
-    from frametool.stream.when import Timed
+    from frametool.geometry.types import Rigid
+    from frametool.stream.stamp_source import Timed
 
 
 class Request(NamedTuple):

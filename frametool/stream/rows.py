@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.stream.pieces import Const, IfLocked, In, Instead, Out
+from frametool.stream.text_parts import Const, IfLocked, In, Instead, Out
 from frametool.text.fixed import fixed_spans
 from frametool.text.shortest import shortest_spans
 from frametool.text.spans import MARGIN, Spans, framed, join
@@ -17,8 +17,8 @@ from frametool.text.spans import MARGIN, Spans, framed, join
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from frametool.stream.pieces import Piece
-    from frametool.text.arrays import Floats, Ints
+    from frametool.stream.text_parts import Piece
+    from frametool.text.array_types import Floats, Ints
 
 
 class Broken(NamedTuple):
@@ -76,7 +76,7 @@ def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
 
 
 def separators(pieces: Iterable[Piece], count: int) -> bytes:
-    """Give the character that follows each number of the result."""
+    """Return the character that follows each number of the result."""
     after = bytearray(b"," * count)
     for piece in pieces:
         if isinstance(piece, Out) and piece.between:
@@ -85,7 +85,7 @@ def separators(pieces: Iterable[Piece], count: int) -> bytes:
 
 
 def assemble(pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints) -> list[Spans]:
-    """Give the spans, in order, that make up the rows; locked: (n,) 1 where angles are not unique."""
+    """Return the spans, in order, that make up the rows; locked: (n,) 1 where angles are not unique."""
     return [_spans(piece, parts, values, locked) for piece in pieces]
 
 
@@ -108,7 +108,7 @@ def chosen(spans: Spans, rows: Ints) -> Spans:
 
 
 def texts_as_rows(odd: Sequence[tuple[int, bytes]]) -> tuple[Ints, list[Spans]]:
-    """Give texts as rows at their places."""
+    """Return texts as rows at their places."""
     lengths = np.array([len(text) for _, text in odd], np.int64)
     ends = np.cumsum(lengths) + MARGIN
     data = framed(b"".join(text for _, text in odd))

@@ -16,7 +16,7 @@ from frametool.text.spans import Spans
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.stream.layout import Layout
+    from frametool.stream.output_columns import Layout
     from frametool.text.cells import Cells
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -72,7 +72,7 @@ def open_table(block: bytes, delimiter: bytes, *, header: bool, source: str) -> 
 
 
 def _comments(text: bytes) -> int:
-    """Give the length of the comments and empty lines at the start."""
+    """Return the length of the comments and empty lines at the start."""
     end = 0
     for line in text.splitlines(keepends=True):
         if line.strip() and not line.startswith(COMMENT):
@@ -82,7 +82,7 @@ def _comments(text: bytes) -> int:
 
 
 def _first_record(text: bytes, delimiter: bytes) -> bytes:
-    """Give the first line, its end included; a quoted cell may hold line ends."""
+    """Return the first line, its end included; a quoted cell may hold line ends."""
     end = text.find(b"\n") + 1
     while delimiter and end and text.count(b'"', 0, end) % 2:
         end = text.find(b"\n", end) + 1
@@ -90,7 +90,7 @@ def _first_record(text: bytes, delimiter: bytes) -> bytes:
 
 
 def _cells(line: bytes, delimiter: bytes) -> list[bytes]:
-    """Give the raw cells of one line."""
+    """Return the raw cells of one line."""
     if not delimiter:
         return line.split()
     count = int(split_delimited(line, delimiter, 0).counts[0]) if line.strip() else 0
@@ -146,14 +146,14 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
 
 
 def _as_slice(places: Sequence[int]) -> slice | list[int]:
-    """Give neighbouring columns as a slice, which copies nothing."""
+    """Return neighbouring columns as a slice, which copies nothing."""
     if places and tuple(places) == tuple(range(places[0], places[0] + len(places))):
         return slice(places[0], places[0] + len(places))
     return list(places)
 
 
 def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans:
-    """Give the span from one cell to another in every row, with what stands before or after as told."""
+    """Return the span from one cell to another in every row, with what stands before or after as told."""
     starts = {
         "cell": lambda: cells.starts[:, first],
         "line": lambda: cells.line_starts[cells.rows],

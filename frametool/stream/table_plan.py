@@ -9,15 +9,15 @@ from frametool.geometry.representations import notation
 from frametool.stream.blocks import Plan
 from frametool.stream.faults import Misused
 from frametool.stream.header import Pose, find_poses, named_pose
-from frametool.stream.layout import Kept, New, Told, lay_out, refuse_repeated
-from frametool.stream.shape import POINT, POSE, Shape, Target
+from frametool.stream.output_columns import Kept, New, Told, lay_out, refuse_repeated
+from frametool.stream.row_layout import POINT, POSE, Shape, Target
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.geometry.representations import Notation
     from frametool.stream.header import Columns
-    from frametool.stream.layout import Column, Layout
+    from frametool.stream.output_columns import Column, Layout
     from frametool.stream.request import Request
     from frametool.stream.table import Table
 
@@ -237,7 +237,7 @@ def _new_columns(poses: Sequence[Pose], target: Target, request: Request) -> lis
 
 
 def _affixed(names: Sequence[str], columns: Columns | None, request: Request, poses: int) -> list[str]:
-    """Give new names the affixes of those they come from, or the prefix asked for."""
+    """Add to new names the affixes of those they come from, or the prefix asked for."""
     if request.prefix or columns is None or poses > 1:
         return [request.prefix + name for name in names]
     suffix = "" if "deg" in columns.suffix or "rad" in columns.suffix else columns.suffix

@@ -15,7 +15,7 @@ import numpy as np
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
-    from frametool.text.arrays import Bytes, Flags, Ints
+    from frametool.text.array_types import Bytes, Flags, Ints
 
 _NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
 MOST_QUOTED = 1 << 20  # bytes of a record whose quote is still open
@@ -41,15 +41,15 @@ class Cells(NamedTuple):
     ends: Ints
 
     def column(self, index: int) -> Spans:
-        """Give the spans of one column."""
+        """Return the spans of one column."""
         return Spans(self.data, self.starts[:, index], self.ends[:, index])
 
     def odd_lines(self) -> Ints:
-        """Give the lines with another number of cells, empty ones and comments among them."""
+        """Return the lines with another number of cells, empty ones and comments among them."""
         return np.delete(np.arange(len(self.counts)), self.rows)
 
     def line(self, index: int) -> bytes:
-        """Give the bytes of one line with its end."""
+        """Return the bytes of one line with its end."""
         return self.data[self.line_starts[index] : self.line_ends[index]].tobytes()
 
     def lines_before(self, index: int) -> int:
@@ -95,7 +95,7 @@ def split_blank(block: bytes, columns: int, *, comment: bytes = b"#") -> Cells:
 
 
 def whole_records(text: bytes, delimiter: bytes = b",") -> int:
-    """Give how many bytes of the text are whole lines, the last of which ends outside quotes."""
+    """Return how many bytes of the text are whole lines, the last of which ends outside quotes."""
     end = text.rfind(b"\n") + 1
     if _ends_outside_quotes(text[:end], delimiter):
         return end
@@ -107,7 +107,7 @@ def whole_records(text: bytes, delimiter: bytes = b",") -> int:
 
 
 def torn_record(text: bytes, delimiter: bytes) -> int | None:
-    """Give where the record begins that has a quote opened and not closed; None where all are closed."""
+    """Return where the record begins that has a quote opened and not closed; None where all are closed."""
     if _ends_outside_quotes(text, delimiter):
         return None
     start = 0
@@ -130,14 +130,14 @@ def _ends_outside_quotes(lines: bytes, delimiter: bytes) -> bool:
 
 
 def without_quotes(cells: Spans) -> Spans:
-    """Give the spans without the quotes around those that have them; for text that holds no quote itself."""
+    """Return the spans without the quotes around those that have them; for text that holds no quote itself."""
     first, last = cells.data[cells.starts], cells.data[cells.ends - 1]
     quoted = (first == _QUOTE) & (last == _QUOTE) & (cells.ends - cells.starts > 1)
     return Spans(cells.data, cells.starts + quoted, cells.ends - quoted)
 
 
 def _closed(block: bytes) -> tuple[Bytes, int]:
-    """Give the block between margins, with a line end if it has none, and where that ends."""
+    """Return the block between margins, with a line end if it has none, and where that ends."""
     data = framed(block)
     end = MARGIN + len(block)
     if not block or block.endswith(b"\n"):

@@ -18,7 +18,7 @@ import numpy as np
 from frametool.text.powers import halves, power_of_ten, product_error
 
 if TYPE_CHECKING:
-    from frametool.text.arrays import Floats, Ints
+    from frametool.text.array_types import Floats, Ints
 
 # Sizes whose products with the powers, and the errors of these, stay normal floats.
 _LEAST, _GREATEST = 1e-270, 1e270
@@ -40,7 +40,7 @@ class Decimals(NamedTuple):
 
 
 def shortest_decimals(size: Floats) -> Decimals:
-    """Give the shortest decimals that read back as these floats, which carry no sign.
+    """Return the shortest decimals that read back as these floats, which carry no sign.
 
     Zero, infinity, nan, subnormal and extreme numbers are unsure, too. Digits may end with zeros.
     """

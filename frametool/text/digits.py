@@ -12,7 +12,7 @@ from frametool.text.powers import TENS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.text.arrays import Ints, Words
+    from frametool.text.array_types import Ints, Words
 
 
 def _word(byte: int) -> np.uint64:
@@ -27,7 +27,7 @@ _ONES_AND_TEN_THOUSANDS = np.uint64(1 + (10000 << 32))
 
 
 def read_eight_digits(digits: Words) -> Words:
-    """Give the numbers that words of eight digit values (characters ^ ZEROS) write.
+    """Return the numbers that words of eight digit values (characters ^ ZEROS) write.
 
     Source: three multiplications, Lemire 2018.
     """
@@ -44,7 +44,7 @@ def read_eight_digits(digits: Words) -> Words:
 
 
 def not_digits(digits: Words) -> Words:
-    """Give words that are zero where all eight digit values are 0 to 9."""
+    """Return words that are zero where all eight digit values are 0 to 9."""
     beyond = digits + _ABOVE_NINE
     beyond |= digits
     beyond &= _HIGH
@@ -52,7 +52,7 @@ def not_digits(digits: Words) -> Words:
 
 
 def first_point(characters: Words) -> Ints:
-    """Give the place, 0 to 7, of the first point in words of eight characters; 8 if there is none."""
+    """Return the place, 0 to 7, of the first point in words of eight characters; 8 if there is none."""
     others = characters ^ _POINTS
     found = others - _ONES
     found &= ~others
@@ -72,7 +72,7 @@ def _four_digits() -> tuple[Words, Words]:
 
 
 def eight_digits(numbers: Ints) -> Words:
-    """Give the characters of integers in 0 .. 99999999, with leading zeros."""
+    """Return the characters of integers in 0 .. 99999999, with leading zeros."""
     low, high = _four_digits()
     narrow = numbers.astype(np.uint32)
     upper = narrow // np.uint32(10000)

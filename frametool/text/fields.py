@@ -19,7 +19,7 @@ from frametool.text.spans import MARGIN, Spans, framed
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.text.arrays import Bytes, Flags, Ints, Words
+    from frametool.text.array_types import Bytes, Flags, Ints, Words
 
 WIDTH = 40
 POINT = 15
@@ -68,12 +68,12 @@ class Fields:
         return starts - negative
 
     def whole_starts(self, whole: Ints) -> Ints:
-        """Give where the first digits of the whole parts stand in `data`."""
+        """Return where the first digits of the whole parts stand in `data`."""
         return self.origins + POINT - count_digits(whole)
 
 
 def _left_digits(numbers: Ints, digits: int) -> Words:
-    """Give the characters of integers of so many digits, filled up with 0 to eight."""
+    """Return the characters of integers of so many digits, filled up with 0 to eight."""
     if digits == 1:
         return numbers.view(np.uint64) + ZEROS
     return eight_digits(numbers * 10 ** (8 - digits) if digits < 8 else numbers)
@@ -88,7 +88,7 @@ def with_separators(spans: Spans, separators: bytes, rows: int) -> Spans:
 
 
 def replaced(spans: Spans, places: Ints, texts: Sequence[str]) -> Spans:
-    """Give the spans with those at `places` replaced by other text, each followed by one spare byte."""
+    """Return the spans with those at `places` replaced by other text, each followed by one spare byte."""
     if not texts:
         return spans
     added = framed("".join(f"{text} " for text in texts).encode())

@@ -11,7 +11,7 @@ from frametool.text.powers import halves, product_error
 from frametool.text.spans import Spans, join
 
 if TYPE_CHECKING:
-    from frametool.text.arrays import Flags, Floats, Ints
+    from frametool.text.array_types import Flags, Floats, Ints
 
 # Below this every scaled value and its nearest integer are exact.
 _GREATEST_SCALED = 9e15
@@ -58,7 +58,7 @@ def _slow_places(size: Floats, precision: int, limit: float) -> Ints:
 
 
 def _scaled(size: Floats, precision: int) -> Ints:
-    """Give the integers nearest to size * 10**precision, exactly; an exact half goes to the even one."""
+    """Return the integers nearest to size * 10**precision, exactly; an exact half goes to the even one."""
     power = 10.0**precision
     product = size * power
     nearest = np.rint(product)

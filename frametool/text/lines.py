@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         """A binary stream that gives what has arrived."""
 
         def read1(self, size: int, /) -> bytes:
-            """Give at most `size` bytes, waiting only while there are none; nothing at the end."""
+            """Return at most `size` bytes, waiting only while there are none; nothing at the end."""
 
 
 BLOCK_BYTES = 1 << 19
@@ -31,7 +31,7 @@ _LONGEST_WAIT_S = 0.02
 
 
 def whole_lines(text: bytes) -> int:
-    """Give how many bytes of the text are whole lines."""
+    """Return how many bytes of the text are whole lines."""
     return text.rfind(b"\n") + 1
 
 
@@ -86,7 +86,7 @@ def _read_piece(stream: Source, size: int, ready: Callable[[int], bool]) -> byte
 
 
 def _readiness(stream: Source) -> Callable[[int], bool]:
-    """Give a function that tells whether the stream has more within so many milliseconds; never, if it cannot tell."""
+    """Return a function that tells whether more comes within so many milliseconds; False if it cannot tell."""
     import select
 
     try:

@@ -18,7 +18,7 @@ from frametool.text.powers import LEAST_POWER, halves, power_of_ten, powers_of_t
 from frametool.text.spans import Spans, windows
 
 if TYPE_CHECKING:
-    from frametool.text.arrays import Bytes, Flags, Floats, Ints, Words
+    from frametool.text.array_types import Bytes, Flags, Floats, Ints, Words
 
 _NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[ \t]*")
 _MOST_WORDS = 3
@@ -170,7 +170,7 @@ def _fraction_digits(data: Bytes, starts: Ints, length: Ints, words: int) -> lis
 
 
 def _tail(words: list[Words]) -> Ints:
-    """Give the integer that the words after the first fraction word write, below 10**16."""
+    """Return the integer that the words after the first fraction word write, below 10**16."""
     total = np.zeros(1, np.uint64)
     for word in words:
         total = total * np.uint64(10**8) + read_eight_digits(word)
@@ -193,7 +193,7 @@ def _scale(mantissa: _Mantissa, power: Floats, rest: Floats, sure: Flags) -> Flo
 
 
 def _as_two_floats(mantissa: _Mantissa) -> tuple[Floats, Floats]:
-    """Give the mantissa as the sum of a float and what that lacks."""
+    """Return the mantissa as the sum of a float and what that lacks."""
     high, low = _split_integer(mantissa.whole)
     if mantissa.words == 1:
         return high, low

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from frametool.text.arrays import Floats, Ints
+    from frametool.text.array_types import Floats, Ints
 
 _SPLITTER = 134217729.0
 # Beyond these exponents a product or its error leaves the range of normal floats.
@@ -27,7 +27,7 @@ def halves(value: Floats) -> tuple[Floats, Floats]:
 
 
 def product_error(a: tuple[Floats, Floats], b: tuple[Floats, Floats], product: Floats) -> Floats:
-    """Give what the rounded product of two floats, given as their halves, lacks to the exact one."""
+    """Return what the rounded product of two floats, given as their halves, lacks to the exact one."""
     (a_high, a_low), (b_high, b_low) = a, b
     error = a_high * b_high
     error -= product
@@ -39,7 +39,7 @@ def product_error(a: tuple[Floats, Floats], b: tuple[Floats, Floats], product: F
 
 @cache
 def power_of_ten(exponent: int) -> tuple[float, float]:
-    """Give 10**exponent as a float and the float nearest to what it lacks."""
+    """Return 10**exponent as a float and the float nearest to what it lacks."""
     above, below = (10**exponent, 1) if exponent >= 0 else (1, 10**-exponent)
     high = above / below
     numerator, denominator = high.as_integer_ratio()

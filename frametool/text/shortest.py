@@ -14,7 +14,7 @@ from frametool.text.powers import TENS
 from frametool.text.spans import Spans, join
 
 if TYPE_CHECKING:
-    from frametool.text.arrays import Bytes, Floats, Ints, Words
+    from frametool.text.array_types import Bytes, Floats, Ints, Words
 
 # repr writes an exponent below the first and from the second on; between GREATEST_WHOLE and there Python does it.
 _LEAST_PLAIN = 1e-4
@@ -67,7 +67,7 @@ def _all_spans(flat: Floats) -> Spans:
 
 
 def _unusual(size: Floats, unsure: Ints) -> tuple[Ints, Ints]:
-    """Give the places written with an exponent, and those left to Python."""
+    """Return the places written with an exponent, and those left to Python."""
     single = unsure[size[unsure] != 0]
     inner = size[size != 0] if not size.all() else size
     if inner.min(initial=1) >= _LEAST_PLAIN and inner.max(initial=1) < GREATEST_WHOLE:

@@ -13,7 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.text.arrays import Bytes, Ints
+    from frametool.text.array_types import Bytes, Ints
 
 # Around every span this many bytes of `data` may be read, whatever they hold: copies go by whole windows.
 MARGIN = 64
@@ -29,7 +29,7 @@ class Spans(NamedTuple):
     ends: Ints
 
     def text(self, *place: int) -> bytes:
-        """Give the bytes of one span, by its row and, if there are columns, its column."""
+        """Return the bytes of one span, by its row and, if there are columns, its column."""
         return self.data[int(self.starts[place]) : int(self.ends[place])].tobytes()
 
 
@@ -84,7 +84,7 @@ def _copy_windows(out: Bytes, places: Ints, parts: Sequence[Spans], width: int) 
 
 
 def _gather(parts: Sequence[Spans], some: slice, width: int) -> np.ndarray:
-    """Give a batch of rows of windows, one for each span."""
+    """Return a batch of rows of windows, one for each span."""
     gathered = [windows(part.data, width)[part.starts[some]] for part in parts]
     return gathered[0] if len(parts) == 1 else np.concatenate(gathered, axis=1)
 

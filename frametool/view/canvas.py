@@ -32,12 +32,12 @@ class Canvas:
         self._cells[cell] = bits | DOTS[down % 4][across % 2], colour
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Give line and column of a place."""
+        """Return line and column of a place."""
         across, down = self._dots(x, y)
         return down // 4, across // 2
 
     def row(self, line: int) -> Iterator[tuple[str, str]]:
-        """Give the characters of a line, each with its colour."""
+        """Yield the characters of a line, each with its colour."""
         for column in range(self.columns):
             bits, colour = self._cells.get((line, column), (0, ""))
             yield (chr(BRAILLE + bits) if bits else " "), colour

@@ -64,7 +64,7 @@ class Drawing:
             curves.angular.append(command.twist.angular_z)
 
     def colour(self, turtle: str) -> str:
-        """Give a turtle's colour: `#rrggbb`."""
+        """Return a turtle's colour: `#rrggbb`."""
         names = sorted({*self.turtles, *self.curves})
         return COLOURS[names.index(turtle) % len(COLOURS)] if turtle in names else COLOURS[-1]
 

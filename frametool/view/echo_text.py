@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.formats.results import rotation_numbers
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
+from frametool.grammar.result import rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frametool.formats.results import Result, Style
+    from frametool.grammar.result import Result, Style
 
 DECIMALS = 3
 ROTATIONS = (("quaternion", "Quaternion"), ("rpy_rad", "RPY (radian)"), ("rpy_deg", "RPY (degree)"))
@@ -24,7 +24,7 @@ def write_heading(target: str, source: str) -> str:
 
 
 def write_block(result: Result, style: Style) -> str:
-    """Give one block; a path that stands still has no time."""
+    """Return one block; a path that stands still has no time."""
     decimals = DECIMALS if style.precision is None else style.precision
     stamp_ns = result.extras.get("stamp_ns")
     pose = result.pose
@@ -36,7 +36,7 @@ def write_block(result: Result, style: Style) -> str:
 
 
 def _matrix(result: Result, decimals: int) -> Iterable[str]:
-    """Give the four rows of the homogeneous matrix."""
+    """Yield the four rows of the homogeneous matrix."""
     numbers = rigid.to_homogeneous(*result.pose.components, floats)
     for row in range(4):
         cells = (_fixed(value, decimals) for value in numbers[4 * row : 4 * row + 4])

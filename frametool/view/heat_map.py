@@ -26,13 +26,13 @@ class Map(NamedTuple):
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Give the least and the greatest value."""
+        """Return the least and the greatest value."""
         known = [value for row in self.values for value in row if value == value]  # noqa: PLR0124 - nan
         return (min(known), max(known)) if known else (0.0, 0.0)
 
 
 def plot(gain_linear: Sequence[float], gain_angular: Sequence[float], many: Many, suffix: str) -> str | bytes:
-    """Give the maps as a picture of the kind that a suffix names: .svg, .html, .png."""
+    """Return the maps as a picture of the kind that a suffix names: .svg, .html, .png."""
     maps = [Map("time to reach (s)", many.time_to_reach.tolist()), Map("overshoot (m)", many.overshoot.tolist())]
     if suffix == ".png":
         return _png(maps, gain_linear, gain_angular)
@@ -79,7 +79,7 @@ def _bar(left: float, top: float, bounds: tuple[float, float]) -> Iterator[str]:
 
 
 def _colour(value: float, bounds: tuple[float, float]) -> str:
-    """Give the colour of a value between its bounds; none for nan."""
+    """Return the colour of a value between its bounds; none for nan."""
     if value != value:  # noqa: PLR0124 - nan
         return "none"
     low, high = bounds

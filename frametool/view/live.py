@@ -86,7 +86,7 @@ class Screen:
         return COLOURS[sorted(self._states).index(name) % len(COLOURS)]
 
     def _picture(self) -> Panel:
-        """Give the whole picture."""
+        """Return the whole picture."""
         canvas = self._canvas
         turtles = {
             canvas.cell(state.x / SIZE, state.y / SIZE): (_arrow(state), f"bold {self._colour(name)}")
@@ -104,7 +104,7 @@ class Screen:
 
 
 def _arrow(state: State) -> str:
-    """Give the arrow nearest to a heading."""
+    """Return the arrow nearest to a heading."""
     return ARROWS[round(state.theta / (math.pi / 4.0)) % 8]
 
 

@@ -24,12 +24,12 @@ td, th {padding: .2em .8em; text-align: right}
 
 
 def plot(drawing: Drawing) -> str:
-    """Give the drawing as an HTML document."""
+    """Return the drawing as an HTML document."""
     return f"{HEAD}{plot_svg.plot(drawing)}{_table(drawing)}</body>\n</html>\n"
 
 
 def _table(drawing: Drawing) -> str:
-    """Give what each follower saw and did last."""
+    """Return what each follower saw and did last."""
     rows = "".join(
         f"<tr><td>{escape(name)}</td><td>{curve.times[-1]:g}</td><td>{curve.distance[-1]:.4f}</td>"
         f"<td>{curve.linear[-1]:.4f}</td><td>{curve.angular[-1]:.4f}</td></tr>\n"

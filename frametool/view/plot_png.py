@@ -28,7 +28,7 @@ def require_matplotlib() -> None:
 
 
 def figure(width: float, height: float) -> Any:
-    """Give an empty figure of so many inches, bound to no window."""
+    """Return an empty figure of so many inches, bound to no window."""
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -39,14 +39,14 @@ def figure(width: float, height: float) -> Any:
 
 
 def as_png(drawn: Any) -> bytes:
-    """Give a figure as the bytes of a PNG, without a date in them."""
+    """Return a figure as the bytes of a PNG, without a date in them."""
     stream = io.BytesIO()
     drawn.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()
 
 
 def plot(drawing: Drawing) -> bytes:
-    """Give the drawing as a PNG."""
+    """Return the drawing as a PNG."""
     drawn = figure(11.0, 5.6)
     rows = panels(drawing)
     grid = drawn.add_gridspec(max(len(rows), 1), 2 if rows else 1)

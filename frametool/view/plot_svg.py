@@ -39,21 +39,21 @@ class Panel(NamedTuple):
 
 
 def plot(drawing: Drawing) -> str:
-    """Give the drawing as an SVG document."""
+    """Return the drawing as an SVG document."""
     rows = panels(drawing)
     parts = [*_window(drawing), *(part for panel in rows for part in _panel(panel))]
     return document(WIDTH if rows else HEIGHT, HEIGHT, parts)
 
 
 def document(width: float, height: float, parts: Iterable[str]) -> str:
-    """Give an SVG of this size in pixels, on white."""
+    """Return an SVG of this size in pixels, on white."""
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
     style = f'font-family="sans-serif" font-size="12" fill="{INK}"'
     return f'{head} {style}>\n<rect width="100%" height="100%" fill="#fff"/>\n{"".join(parts)}</svg>\n'
 
 
 def panels(drawing: Drawing) -> list[Panel]:
-    """Give the diagrams of a drawing; none where nobody follows."""
+    """Return the diagrams of a drawing; none where nobody follows."""
     curves = {name: curve for name, curve in drawing.curves.items() if curve.times}
     if not curves:
         return []
@@ -125,7 +125,7 @@ def _panel(panel: Panel) -> Iterator[str]:
 
 
 def ticks(low: float, high: float) -> list[float]:
-    """Give round numbers that enclose two values: 1, 2 or 5 times a power of ten apart, four to ten of them."""
+    """Return round numbers that enclose two values: 1, 2 or 5 times a power of ten apart, four to ten of them."""
     span = (high - low) or 1.0
     step = 10.0 ** math.floor(math.log10(span / 4.0))
     step *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if span / (step * factor) <= 6.0)
@@ -134,7 +134,7 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _bounds(values: Iterable[float]) -> tuple[float, float]:
-    """Give the least and the greatest value, zero included."""
+    """Return the least and the greatest value, zero included."""
     known = [0.0, *values]
     return min(known), max(known)
 

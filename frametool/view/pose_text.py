@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import printable
-from frametool.formats.results import is_locked, rotation_entry, rotation_numbers
 from frametool.frames.stamps import format_stamp
 from frametool.geometry.representations import notation
+from frametool.grammar.result import is_locked, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.formats.pose import Pose
-    from frametool.formats.results import Result, Style
     from frametool.geometry.representations import Notation
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result, Style
 
 EVERYTHING = ("quaternion", "rpy_rad", "rpy_deg", "axis_angle_rad", "matrix")
 LABELS = {
@@ -40,7 +40,7 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Give one line a point, aligned, with its frame."""
+    """Return one line a point, aligned, with its frame."""
     rows = [
         (record.get("frame"), next(value for value in record.values() if isinstance(value, list))) for record in records
     ]
@@ -53,7 +53,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 
 
 def _describe(result: Result, style: Style) -> str:
-    """Give the heading and the aligned lines of one pose."""
+    """Return the heading and the aligned lines of one pose."""
     pose = result.pose
     lines: list[Line] = []
     if pose.position is not None:
@@ -79,7 +79,7 @@ def _heading(result: Result) -> str:
 
 
 def _rotation_lines(pose: Pose, form: Notation, style: Style) -> Iterator[Line]:
-    """Give the lines of one representation."""
+    """Yield the lines of one representation."""
     name = form.representation.name
     label = LABELS.get(name, name) + (f" {form.axes}" if form.axes else "")
     unit = ("deg" if style.in_degrees(form) else "rad") if form.representation.angles else ""
@@ -110,7 +110,7 @@ def _names(form: Notation) -> Sequence[str]:
 
 
 def _extra_lines(result: Result) -> Iterator[tuple[str, Sequence[tuple[str, float]], str]]:
-    """Give the lines of what is only said about a pose."""
+    """Yield the lines of what is only said about a pose."""
     units = {"distance": "m", "angle": "rad", "angle_deg": "deg"}
     for key, value in result.extras.items():
         if isinstance(value, float):

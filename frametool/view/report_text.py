@@ -9,7 +9,7 @@ from frametool.frames.stamps import format_stamp
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.formats.results import Style
+    from frametool.grammar.result import Style
 
 
 def _seconds(value: float | None) -> str:
@@ -39,7 +39,7 @@ LEFT = ("parent", "child")
 
 
 def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noqa: ARG001 - the numbers here are for reading
-    """Give the edges as an aligned table; columns that say nothing are left out."""
+    """Return the edges as an aligned table; columns that say nothing are left out."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
     shown = [key for key in COLUMNS if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
     rows = [[COLUMNS[key][0] for key in shown], *([COLUMNS[key][1](entry[key]) for key in shown] for entry in edges)]

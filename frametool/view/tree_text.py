@@ -6,15 +6,15 @@ import sys
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable
-from frametool.formats.labels import edge_label
 from frametool.frames.tree import FrameTree
+from frametool.grammar.edge_label import edge_label
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.formats.results import Style
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.transform import Transform
+    from frametool.grammar.result import Style
 
 
 DEEPEST = 1000  # levels; the lines of a drawing grow with its depth
@@ -50,18 +50,18 @@ def print_tree(tree: FrameTree | TransformBuffer, style: Style, color: str = "au
 
 
 def _label(tree: FrameTree | TransformBuffer, child: str, transform: Transform, style: Style) -> tuple[str, ...]:
-    """Give the pose of an edge, and how it moves: its newest pose then."""
+    """Return the pose of an edge, and how it moves: its newest pose then."""
     label = edge_label(transform, style)
     if isinstance(tree, FrameTree):
         return label
-    from frametool.frames.listing import motion
+    from frametool.frames.report import motion
 
     track = tree.track(child)
     return label if track is None or track.standing else (*label, motion(track))
 
 
 def _padded(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[tuple[Line, str]]:
-    """Give the lines with the blanks that bring their poses below one another."""
+    """Yield the lines with the blanks that bring their poses below one another."""
     lines = list(_lines(tree, style))
     width = max((len(line.branch) + cells(line.frame) for line in lines), default=0)
     firsts = max((len(line.label[0]) for line in lines if line.label), default=0)

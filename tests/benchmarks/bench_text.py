@@ -22,7 +22,7 @@ from frametool.text.spans import Spans, join
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frametool.text.arrays import Floats
+    from frametool.text.array_types import Floats
 
 ROWS, COLUMNS, REPEATS = 8000, 3, 40
 FULL = np.random.default_rng(1).uniform(-100.0, 100.0, (ROWS, COLUMNS))

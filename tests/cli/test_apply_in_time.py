@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from frametool.documents.source import Source
 from frametool.formats.load import load_sources
-from frametool.formats.source import Source
 from frametool.frames.tree import FrameTree
 from frametool.geometry import rigid
 

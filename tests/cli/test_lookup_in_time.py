@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.formats.as_received import ODD
+from frametool.ros.tf2_input import ODD
 
 if TYPE_CHECKING:
     from collections.abc import Callable

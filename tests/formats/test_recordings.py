@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from frametool.documents import chunks
 from frametool.errors import FileProblem, FormatError, FrametoolWarning
-from frametool.formats import pieces
 from frametool.formats.recordings import Recording
-from frametool.formats.results import Style
-from frametool.formats.ros_form import message_text
+from frametool.grammar.result import Style
+from frametool.ros.echo_format import message_text
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frametool.formats.samples import Sample
+    from frametool.ros.samples import Sample
 
 EPOCH = 1_700_000_000_123_456_789
 EXPECTED = [
@@ -100,7 +100,7 @@ def read(tmp_path: Path, text: str | bytes) -> list[Sample]:
 def test_every_form_gives_the_same_samples_however_the_bytes_are_cut(
     form: str, block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pieces, "BLOCK", block)
+    monkeypatch.setattr(chunks, "BLOCK", block)
     assert [each[:4] for each in read(tmp_path, FORMS[form])] == EXPECTED
 
 

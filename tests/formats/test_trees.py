@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from frametool import FrameTree, load
+from frametool.documents.source import Source
 from frametool.errors import BadTopology, FormatError
 from frametool.formats.records import read_poses
-from frametool.formats.source import Source
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,9 +13,9 @@ import pytest
 
 from frametool import Transform, TransformBuffer
 from frametool.errors import LookupFailed, NoDataAt, NotConnected, UnknownFrame
-from frametool.formats.results import Style
-from frametool.formats.tf2_listing import write_tree
 from frametool.frames.tf2 import Refused
+from frametool.grammar.result import Style
+from frametool.ros.tf2_listing import write_tree
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 KINDS = {

@@ -15,7 +15,7 @@ import pytest
 
 from frametool.errors import FrametoolWarning, ValueInvalid
 from frametool.geometry import euler
-from frametool.geometry.axes import AXES, axes_change
+from frametool.geometry.conventions import AXES, axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -363,7 +363,7 @@ def test_one_item_loads_no_numpy() -> None:
     program = (
         "import sys; from frametool.geometry.transform import Transform\n"
         "from frametool.geometry.rotation import Rotation\n"
-        "from frametool.geometry.axes import axes_change\n"
+        "from frametool.geometry.conventions import axes_change\n"
         "a = Transform(Rotation.from_rpy([0.1, 0.2, 0.3]), [1, 2, 3]); b = a @ a.inverse(); a.interpolate(b, 0.5)\n"
         "a.distance(b), a.is_close(b), a.relative(b), repr(a), a.rotation.slerp(b.rotation, 0.5), a.rotation.angle()\n"
         "sys.exit(bool({'numpy', 'dataclasses', 'typing', 'decimal', 'yaml', 'rich', 'click'} & set(sys.modules)))"

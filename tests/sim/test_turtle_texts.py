@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import pytest
 import yaml
 
+from frametool.documents.source import Source
 from frametool.errors import FormatError
-from frametool.formats.source import Source
+from frametool.sim.command_file import read_script, read_twists
 from frametool.sim.leaders import KEYS
-from frametool.sim.records import EMITS, FORMS, Writer, table
 from frametool.sim.scene import tutorial
-from frametool.sim.scenes import read_scene
+from frametool.sim.scene_file import read_scene
 from frametool.sim.simulate import simulate
+from frametool.sim.step_writer import EMITS, FORMS, Writer, table
 from frametool.sim.turtle import CENTRE, Twist
-from frametool.sim.twists import read_script, read_twists
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 from frametool.errors import FrametoolError
 from frametool.geometry.representations import notation
-from frametool.stream.detect import RECORDS
-from frametool.stream.documents import run_records
 from frametool.stream.faults import Policy
 from frametool.stream.operation import Operation
+from frametool.stream.record_stream import run_records
 from frametool.stream.request import Request
 from frametool.stream.run import run
-from frametool.stream.tables import run_table
+from frametool.stream.stream_form import RECORDS
+from frametool.stream.table_stream import run_table
 
 QUARTER = (1.0, 2.0, 3.0, 0.0, 0.0, 0.7071067811865476, 0.7071067811865476)
 MOVE = Request(Operation(left=QUARTER, moves=True), way=lambda _own: QUARTER)

@@ -1,0 +1,294 @@
+"""`frametool apply`: points, vectors and poses moved into another frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline
+from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.times import TIME, at_ns, rules, rules_options
+from frametool.cli.trees import FRAME, announce, frame_name, load_tree
+from frametool.errors import FormatError, ValueInvalid
+from frametool.formats.points import Point, read_moveables
+from frametool.geometry import quaternion, rigid
+from frametool.grammar.pose import Pose
+from frametool.stream.operation import Operation
+from frametool.stream.request import Request
+from frametool.stream.stamp_source import Timed
+from frametool.text.numbers import NotFinite, parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from frametool.documents.source import Source
+    from frametool.formats.assembly import Rules
+    from frametool.formats.recordings import Recording
+    from frametool.geometry.types import Components, Rigid
+
+CHOICES = ("point", "vector", "pose")
+
+
+@click.command(cls=Command, name="apply")
+@click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
+@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
+@click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
+@rotation_options
+@pose_options
+@result_options("points")
+@click.option(
+    "--frame-column",
+    "frame_column",
+    type=TEXT,
+    metavar="NAME",
+    help="without SOURCE, the column that names each row's frame",
+)
+@click.option(
+    "--time-column",
+    "time_column",
+    type=TEXT,
+    metavar="NAME",
+    help="move each row at its own time: the column or key of its stamp, seconds; nanoseconds where it ends in _ns",
+)
+@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest; messages: their own]")
+@rules_options
+@stream_options
+def command(
+    arguments: tuple[str, ...],
+    pose: str | None,
+    more: Sequence[str],
+    deg: bool,
+    normalize: bool,
+    kind: str | None,
+    frame_column: str | None,
+    time_column: str | None,
+    at: int | str | None,
+    moving: bool,
+    cache: int | None,
+    tf2: str | None,
+    **options: Any,
+) -> int:
+    """Move points, vectors and poses from SOURCE into TARGET.
+
+    \b
+      frametool apply robot.yaml map camera_optical 0 0 1
+      frametool apply --transform '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' 1 0 0
+      frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
+
+    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
+    each record says its own frame; without records standard input is read.
+
+    \b
+      ros2 topic echo /clicked_point | frametool apply tf.txt map
+
+    Records may be ROS messages, as the echo tools print them or as JSON lines: PointStamped, Vector3Stamped,
+    PoseStamped, PoseWithCovarianceStamped, WrenchStamped, TwistStamped, TransformStamped. Frame and stamp are those
+    of each header; the stamp and all other fields stay. Each 3x3 block C of a pose's covariance becomes R C R^T. A
+    wrench is that about TARGET's origin: force R f, torque R m + t x R f. A twist is the velocity of the same rigid
+    body at TARGET's origin: angular R w, linear R v + t x R w.
+
+    \b
+      printf 'stamp,x,y,z\\n0.5,1,0,0\\n2,1,0,0\\n' | frametool apply examples/drive.yaml map lidar --time-column stamp
+
+    Stamps are decimal seconds (12.5) or nanoseconds (12500000000ns, or a name like stamp_ns), exact to the nanosecond.
+    A row at a time without data is a bad row, as --on-error says.
+    """
+    stream = Stream(options)
+    output = Output("points", deg=deg, **options)
+    if pose is None:
+        way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2), at)
+    elif time_column is not None or at is not None:
+        raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
+    else:
+        way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
+    if time_column is not None:
+        _check_timed(rest, at)
+    elif rest in ((), ("-",)) and (recording := _messages(stream)) is not None:
+        from frametool.cli.messages import move_messages
+
+        announce(recording)
+        return move_messages(recording, kind, way, output, stream.policy(recording.name), normalize=normalize)
+    if rest in ((), ("-",)):
+        wishes = _wishes(way, frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
+        outcome = stream.run(wishes, output, as_spelled=time_column is not None)
+        if isinstance(outcome, int):
+            return outcome
+        rest = (outcome,)
+    elif stream.path:
+        raise click.UsageError("-i FILE and records are two inputs; give one")
+    records = _records(rest, kind, degrees=deg, normalize=normalize)
+    output.moved([move(each, way.from_frame(own_frame(each), None), way.target) for each in records])
+    return 0
+
+
+def _check_timed(records: tuple[str | Source, ...], at: int | str | None) -> None:
+    """Refuse what does not belong together with each row's own time."""
+    if at is not None:
+        raise click.UsageError("--time-column gives each row its own time; leave --at out")
+    if records not in ((), ("-",)):
+        raise click.UsageError("--time-column is for the rows of a stream; give records on the command line --at TIME")
+
+
+def _wishes(way: Way, frame_column: str | None, time_column: str | None) -> Request:
+    """Say how a stream's rows move: all from one frame, or each from the one it names; all alike, or in time."""
+    has_source = way.has_source and frame_column is None
+    timed = None if time_column is None else Timed(time_column, way.at_times, way.from_frame)
+    fixed = way.from_frame(None, None) if has_source and timed is None else None
+    frames = () if has_source else (frame_column or "",)
+
+    def edge_of(own: str | None) -> Rigid:
+        return way.from_frame(own, None)
+
+    return Request(
+        Operation(left=fixed, moves=True), frames=frames, edge_of=edge_of if frames else None, way=edge_of,
+        timed=timed, told=way.target,
+    )  # fmt: skip
+
+
+class Way(NamedTuple):
+    """Where records go: the target, and the transform that takes them there from the frame they are given in."""
+
+    target: str | None
+    from_frame: Callable[[str | None, int | None], Rigid]
+    at_times: Callable[[str | None, Any], Components]  # columns of such transforms, nan where there is no data
+    has_source: bool  # whether all come from one frame
+
+
+def move(record: Pose | Point, target_from_source: Rigid, target: str | None) -> Pose | Point:
+    """Return a record as seen from the target: points shift and rotate, vectors rotate, poses compose."""
+    if isinstance(record, Pose):
+        return Pose.of(rigid.compose(*target_from_source, *record.components), record.name, target)
+    if record.is_vector:
+        x, y, z = quaternion.rotate(*target_from_source[3:], *record.position)
+    else:
+        x, y, z = rigid.apply(*target_from_source, *record.position)
+    return record._replace(position=(x, y, z), frame=target)
+
+
+def _way_by_tree(
+    arguments: tuple[str, ...], more: Sequence[str], chosen_rules: Rules, chosen: int | str | None
+) -> tuple[Way, tuple[str | Source, ...]]:
+    """Take tree, target and, if one is named, source from the arguments; the rest are records.
+
+    chosen: the time of all lookups, where one was chosen.
+    """
+    if len(arguments) < 2:
+        raise click.UsageError("name TREE and TARGET, or give --transform")
+    tree = load_tree(arguments[0], more, chosen_rules)
+    target, rest = frame_name(arguments[1], tree), arguments[2:]
+    source = None
+    if rest and not is_record(rest[0]):
+        source, rest = frame_name(rest[0], tree), rest[1:]
+
+    if not {target, source or target} <= set(tree.frames):
+        tree.lookup(target, source or target)  # raises, and names the nearest frames
+
+    plain: dict[str, str] = {}  # so that a leading / is told of once
+
+    def start(own: str | None) -> str:
+        if own and own not in plain:
+            plain[own] = frame_name(own, tree)
+        if (settled := _settled(own and plain[own], source)) is None:
+            raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
+        return settled
+
+    def from_frame(own: str | None, own_ns: int | None) -> Rigid:
+        return tree.lookup(target, start(own), own_ns if chosen is None else at_ns(chosen)).components
+
+    def at_times(own: str | None, times_ns: Any) -> Components:
+        return tree.lookup_many(target, start(own), times_ns, missing="nan").components
+
+    return Way(target, from_frame, at_times, source is not None), rest
+
+
+def _way_by_pose(pose: Pose) -> Way:
+    """Move everything by one pose; where it names its frames, records must be given in its name."""
+
+    def from_frame(own: str | None, _own_ns: int | None = None) -> Rigid:
+        _settled(own, pose.name)
+        return pose.components
+
+    return Way(pose.parent, from_frame, lambda own, _times_ns: from_frame(own), has_source=True)
+
+
+def own_frame(record: Pose | Point) -> str | None:
+    """Return the frame a record says it is given in."""
+    return record.parent if isinstance(record, Pose) else record.frame
+
+
+def _settled(own: str | None, source: str | None) -> str | None:
+    """Settle which frame a record is given in: where both it and the command say, they must agree."""
+    if own and source is not None and own != source:
+        raise ValueInvalid(
+            f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame"
+        )
+    return own or source
+
+
+def is_record(argument: str) -> bool:
+    """Tell a record from a frame's name."""
+    return argument == "-" or is_inline(argument)
+
+
+def _records(
+    arguments: Sequence[str | Source], kind: str | None, *, degrees: bool, normalize: bool
+) -> Iterator[Pose | Point]:
+    """Read the records: bare numbers in threes, mappings, standard input."""
+    pending: list[str] = []
+    for argument in arguments:
+        if isinstance(argument, str) and not is_record(argument):
+            pending.append(argument)
+            continue
+        yield from _points(pending, kind)
+        pending = []
+        yield from _read(argument, kind, degrees=degrees, normalize=normalize)
+    yield from _points(pending, kind)
+
+
+def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
+    """Take bare numbers three at a time."""
+    if kind == "pose" and texts:
+        raise click.UsageError("a pose is a mapping, e.g. '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'")
+    try:
+        numbers = [parse_number(text) for text in texts]
+    except NotFinite:
+        raise
+    except ValueInvalid as error:
+        raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
+    if len(numbers) % 3:
+        raise click.UsageError(f"points are three numbers each, found {len(numbers)}")
+    for at in range(0, len(numbers), 3):
+        x, y, z = numbers[at : at + 3]
+        yield Point((x, y, z), kind or "point")
+
+
+def _messages(stream: Stream) -> Recording | None:
+    """Take a stream for stamped ROS messages where its first bytes tell; None for any other."""
+    opened = stream.opened()
+    if opened.isatty():
+        return None
+    from frametool.formats.recordings import open_messages
+
+    return open_messages(stream.path or "-", opened)
+
+
+def _read(argument: str | Source, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
+    """Read records from a mapping or from standard input, and take them for what --as says."""
+    source = source_of(argument) if isinstance(argument, str) else argument
+    try:
+        records = read_moveables(source, degrees=degrees, normalize=normalize)
+    except FormatError as error:
+        raise usage_if_inline(error) from None
+    for record in records:
+        if kind == "pose" and isinstance(record, Point):
+            yield Pose(record.position, None, record.name, record.frame)
+        elif kind in ("point", "vector") and isinstance(record, Pose):
+            raise ValueInvalid(f"a record has a rotation and cannot be taken for a {kind}")
+        elif kind in ("point", "vector") and isinstance(record, Point) and record.is_vector != (kind == "vector"):
+            yield record._replace(key=kind)
+        else:
+            yield record

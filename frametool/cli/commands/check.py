@@ -1,0 +1,80 @@
+"""`frametool check`: what is wrong or odd in trees and recordings."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+from frametool.cli.command import FILE, Command
+from frametool.cli.recordings import opened
+from frametool.cli.trees import verbose_option
+from frametool.lint.findings import RULES, WRITERS, Finding
+from frametool.lint.reading import read_all
+from frametool.lint.rules import lint
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.formats.recordings import Recording
+    from frametool.lint.reading import Seen
+
+FAILED = 1
+
+
+class CheckCommand(Command):
+    """A command whose help lists the rules."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the rules with their levels, then the exit codes."""
+        with formatter.section("Rules"):
+            formatter.write_dl([(f"{rule} ({level})", about) for rule, (level, about) in RULES.items()])
+        super().format_epilog(ctx, formatter)
+
+
+@click.command(cls=CheckCommand, name="check")
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
+              help="how findings are written")  # fmt: skip
+@click.option("--strict", is_flag=True, help="let warnings fail too")
+@verbose_option
+def command(files: Sequence[str], form: str, strict: bool) -> int:
+    """Look for mistakes in FILES, trees and recordings, taken together as one tree.
+
+    \b
+      frametool check robot.yaml
+      frametool check drive.yaml --strict
+      frametool check robot.yaml --format github
+      ros2 topic echo /tf > tf.txt; frametool check tf.txt tf_static.txt
+
+    Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
+    --strict also if there is a warning; notes never fail. - is standard input.
+    """
+    findings: list[Finding] = []
+    recordings = opened(files)
+    findings += lint(_everything(recordings, findings))
+    order = {recording.name: index for index, recording in enumerate(recordings)}
+    findings.sort(key=lambda each: (order.get(each.source, 0), each.line, each.column))
+    sys.stdout.write(WRITERS[form](findings))
+    return FAILED if _fails(findings, strict=strict) else 0
+
+
+def _everything(recordings: Sequence[Recording], findings: list[Finding]) -> Iterator[Seen]:
+    """Read all files; what cannot be read is found at once."""
+    for recording in recordings:
+        before = len(findings)
+        seen = None
+        for seen in read_all(recording, findings.append):
+            yield seen
+        if seen is None and len(findings) == before:
+            findings.append(Finding("empty", "no transforms in it", recording.name, 1, 1))
+
+
+def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:
+    """Count on stderr, and tell whether the files pass."""
+    counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
+    said = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
+    if said:
+        click.echo(f"frametool: {said}", err=True)
+    return bool(counts["error"] or (strict and counts["warning"]))

@@ -1,0 +1,104 @@
+"""`frametool convert`: one rotation or pose in other representations."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.poses import is_inline, pose_from_numbers, poses_from
+from frametool.cli.streaming import Stream, one_notation, stream_options
+from frametool.errors import ValueInvalid
+from frametool.geometry import quaternion
+from frametool.geometry.representations import notation
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+
+if TYPE_CHECKING:
+    from frametool.geometry.representations import Notation
+    from frametool.grammar.readers import Quaternion
+
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+@click.command(cls=Command, name="convert", short_help="one rotation or pose in other representations")
+@click.argument("values", nargs=-1, type=TEXT, metavar="[VALUES.. | POSE]")
+@click.option(
+    "--axes",
+    type=TEXT,
+    metavar="NAME",
+    help="the pose at the same place with these axes; alone, the pose of such axes on a ROS body: "
+    "optical, opengl, frd, flu, enu, ned, or A_from_B",
+)
+@rotation_options
+@pose_options
+@result_options("poses")
+@click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
+@stream_options
+def command(
+    values: tuple[str, ...],
+    given: tuple[Notation, ...] | None,
+    axes: str | None,
+    deg: bool,
+    normalize: bool,
+    unwrap: bool,
+    **options: Any,
+) -> int:
+    """Write one rotation or pose in other representations.
+
+    \b
+      frametool convert --from rpy_deg 0 0 90
+      frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
+      frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle --format json
+      frametool convert --axes optical --to rpy_deg
+
+    VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
+    its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
+    poses; without any argument standard input is read.
+    """
+    stream = Stream(options)
+    output = Output("poses", deg=deg, **options)
+    turn = None if axes is None else _axes(axes)
+    if stream.path or values == ("-",) or not (values or axes):
+        if values not in ((), ("-",)):
+            raise click.UsageError("-i FILE and VALUES are two inputs; give one")
+        from frametool.stream.operation import Operation
+        from frametool.stream.request import Request
+
+        operation = Operation(right=None if turn is None else (0.0, 0.0, 0.0, *turn))
+        forms = output.notations or (notation("quaternion"),)
+        outcome = stream.run(
+            Request(operation, 1, "", one_notation(given), deg, normalize, forms, unwrap=unwrap), output
+        )
+        if isinstance(outcome, int):
+            return outcome
+        poses = poses_from(outcome, degrees=deg, normalize=normalize)
+    elif not values:
+        poses = [Pose()]
+    elif not is_inline(values[0]) and (given or len(values) > 1):
+        poses = [pose_from_numbers(values, given, degrees=deg, normalize=normalize)]
+    else:
+        poses = [pose for each in values for pose in poses_from(each, degrees=deg, normalize=normalize)]
+    poses = [each._replace(rotation=_turned(each.rotation or IDENTITY, turn)) for each in poses]
+    output.poses(Result(pose) for pose in poses)
+    output.tell_of_lock(poses)
+    return 0
+
+
+def _turned(rotation: Quaternion, turn: Quaternion | None) -> Quaternion:
+    """Turn a rotation's axes; without a turn its bits stay as they are."""
+    turned: Quaternion = rotation if turn is None else quaternion.compose(*rotation, *turn)
+    return turned
+
+
+def _axes(name: str) -> Quaternion:
+    """Return the rotation that --axes names."""
+    from frametool.geometry.conventions import named_rotation
+
+    try:
+        rotation: Quaternion = named_rotation(name).components
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+    return rotation

@@ -1,0 +1,44 @@
+"""`frametool interpolate`: poses on the way from one to another."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.poses import combinations
+from frametool.errors import ValueInvalid
+from frametool.geometry import floats, rigid
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+
+
+@click.command(cls=Command, name="interpolate")
+@click.argument("a", type=TEXT)
+@click.argument("b", type=TEXT)
+@click.argument("fractions", nargs=-1, required=True, type=Number())
+@rotation_options
+@pose_options
+@result_options("poses")
+def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: bool, **options: Any) -> None:
+    """Print poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
+
+    \b
+      frametool interpolate '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0], rpy_deg: [0, 0, 90]}' 0.5
+      frametool interpolate '{rpy_deg: [0, 0, 0]}' '{rpy_deg: [0, 0, 90]}' 0 0.25 0.5 0.75 1 --format csv
+
+    The rotation takes the shorter arc. Fractions outside 0 .. 1 extrapolate. Unlike a screw motion, position and
+    rotation are independent.
+    """
+    output = Output("poses", deg=deg, **options)
+    pairs = combinations((a, b), degrees=deg, normalize=normalize)
+    output.poses([_between(*pair, fraction=fraction) for pair in pairs for fraction in fractions])
+
+
+def _between(a: Pose, b: Pose, *, fraction: float) -> Result:
+    if a.parent is not None and b.parent is not None and a.parent != b.parent:
+        raise ValueInvalid(f"A is given in {a.parent!r} and B in {b.parent!r}; give both in one frame")
+    components = rigid.interpolate(*a.components, *b.components, fraction, floats)
+    return Result(Pose.of(components, a.name if a.name == b.name else None, a.parent or b.parent))

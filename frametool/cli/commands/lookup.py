@@ -1,0 +1,140 @@
+"""`frametool lookup`: where one frame is seen from another, and when."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import FILE, Command, result_options, rotation_options
+from frametool.cli.lookup_rows import RowFrames, column_options
+from frametool.cli.output import Output
+from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.times import TIME, at_ns, read_times, rules, rules_options, times_option
+from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.errors import LookupFailed
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.tree import FrameTree
+
+
+@click.command(cls=Command, name="lookup")
+@click.argument("tree", type=FILE)
+@click.argument("target", type=FRAME, required=False, metavar="TARGET")
+@click.argument("source", type=FRAME, required=False, metavar="SOURCE")
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
+@click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns, or latest  [default: latest]")
+@click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE, where --at is that at TARGET")
+@click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")
+@times_option
+@rules_options
+@rotation_options
+@result_options("poses")
+@column_options
+@stream_options
+def command(
+    tree: str, target: str | None, source: str | None, more: Sequence[str], at: int | str | None,
+    source_at: int | str | None, fixed: str | None, times: str | None, moving: bool, cache: int | None, tf2: str | None,
+    **options: Any,
+) -> int:  # fmt: skip
+    """Print the pose of SOURCE in TARGET: the transform that maps points in SOURCE to points in TARGET.
+
+    \b
+      frametool lookup robot.yaml map camera_optical
+      frametool lookup robot.yaml base_link lidar --to rpy_deg --format json
+      frametool lookup drive.yaml map base_link --at 2.5
+      frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
+      frametool lookup drive.yaml base_link base_link --at 4 --source-at 2.5 --fixed map
+
+    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. --deg is about the angles of
+    the result; the tree's own are what its file says. Between two samples of a moving frame positions are interpolated
+    along the line and rotations by slerp, edge by edge, as tf2 does; nothing is extrapolated. With --times, --on-error
+    is stop (the default) or skip: times without data are left out; null is for tables.
+    """
+    by_row, stream = RowFrames(options), Stream(options)
+    output = Output("poses", **options)
+    if not by_row and (target is None or source is None):
+        raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
+    _check(at, source_at, fixed, times)
+    if times is not None and stream.options["on_error"] == "null":
+        raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
+    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
+    if by_row or target is None or source is None:
+        return by_row.run(stream, output, frames, target=target, source=source, at=at_ns(at))
+    if tf2 is None:
+        target, source = frame_name(target, frames), frame_name(source, frames)
+        fixed = fixed and frame_name(fixed, frames)
+    if times is not None:
+        asked = read_times(times)
+        results = _many(frames, target, source, asked, skip=stream.options["on_error"] == "skip")
+        skipped = [at for at, result in zip(asked, results, strict=True) if result is None]
+        _tell_skipped(frames, (target, source), skipped, len(asked), in_json=output.told == "json")
+        output.poses(found := [result for result in results if result is not None])
+        return 3 if len(found) < len(results) else 0
+    if fixed is not None:
+        output.poses([_across(frames, target, at_ns(at), source, at_ns(source_at), fixed)])
+    else:
+        output.poses([_one(frames, target, source, at_ns(at))])
+    return 0
+
+
+def _check(at: int | str | None, source_at: int | str | None, fixed: str | None, times: str | None) -> None:
+    """Refuse options that do not belong together."""
+    if (source_at is None) != (fixed is None):
+        raise click.UsageError("--source-at and --fixed belong together: two times need a frame that stands still")
+    if times is not None and (at is not None or fixed is not None):
+        raise click.UsageError("--times says all the times; leave --at, --source-at and --fixed out")
+
+
+def _one(frames: FrameTree | TransformBuffer, target: str, source: str, at: int | None) -> Result:
+    """Look up at one time, or the latest."""
+    stamp = frames.latest(target, source) if at is None else at
+    pose = Pose.of(frames.lookup(target, source, stamp).components, source, target)
+    return Result(pose, {} if stamp is None else {"stamp_ns": stamp})
+
+
+def _across(
+    frames: FrameTree | TransformBuffer, target: str, at: int | None, source: str, source_at: int | None, fixed: str
+) -> Result:
+    """Look up across two times."""
+    found = frames.lookup_across(target, at, source, source_at, fixed)
+    at = frames.latest(target, fixed) if at is None else at
+    source_at = frames.latest(fixed, source) if source_at is None else source_at
+    stamps = {key: stamp for key, stamp in (("stamp_ns", at), ("source_stamp_ns", source_at)) if stamp is not None}
+    return Result(Pose.of(found.components, source, target), {**stamps, "fixed": fixed})
+
+
+def _many(
+    frames: FrameTree | TransformBuffer, target: str, source: str, times: Sequence[int], *, skip: bool
+) -> list[Result | None]:
+    """Look up at many times; None for those without data that are skipped."""
+    found = frames.lookup_many(target, source, times, missing="nan" if skip else "raise")
+    rows = zip(*(column.tolist() for column in found.components), strict=True)
+    results = [Result(Pose.of(row, source, target), {"stamp_ns": at}) for at, row in zip(times, rows, strict=True)]
+    return [result if isfinite(result.pose.components[6]) else None for result in results]
+
+
+def _tell_skipped(
+    frames: FrameTree | TransformBuffer, ends: tuple[str, str], skipped: Sequence[int], asked: int, *,
+    in_json: bool, most: int = 10,
+) -> None:  # fmt: skip
+    """Say why times were skipped: the reasons of the first, then how many; each as an object if results are JSON."""
+    if not skipped:
+        return
+    from frametool.cli.error_json import as_json
+    from frametool.documents.json_writer import dump
+
+    for at in skipped[:most]:
+        try:
+            frames.lookup(*ends, at)
+        except LookupFailed as error:
+            click.echo(as_json(error) if in_json else f"frametool: {error} (skipped)", err=True)
+    total = f"{len(skipped)} of {asked} times skipped"
+    whole = {"error": "times_skipped", "message": total, "skipped": len(skipped), "asked": asked}
+    click.echo(dump(whole) if in_json else f"frametool: {total}", err=True)

@@ -1,0 +1,81 @@
+"""`frametool static`: the arguments of static_transform_publisher, from a tree or back into one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.trees import load_tree
+from frametool.documents.source import Source
+from frametool.errors import ValueInvalid, warn
+from frametool.frames.tree import FrameTree
+from frametool.grammar.readers import NotARotation, Reading
+from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_positional
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.grammar.pose import Pose
+
+
+def _flag_options(function: Callable[..., None]) -> Callable[..., None]:
+    """Add the flags of static_transform_publisher."""
+    for name in reversed(FLAGS):
+        metavar = "FRAME" if name.endswith("id") else "N"
+        option = click.option(f"--{name}", type=TEXT, metavar=metavar, help="as static_transform_publisher has it")
+        function = option(function)
+    return function
+
+
+@click.command(cls=Command, name="static")
+@click.argument("arguments", nargs=-1, type=TEXT, metavar="[TREE | X Y Z .. PARENT CHILD]")
+@_flag_options
+@rotation_options
+@pose_options
+@result_options("tree")
+def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any) -> None:
+    """Write the static_transform_publisher arguments of a TREE, or read such arguments into a tree.
+
+    \b
+      frametool static robot.yaml
+      frametool static robot.yaml --format static1 --to rpy
+      frametool static --x 0.1 --yaw 1.5 --frame-id base --child-frame-id camera
+      frametool static 0.1 0 0.2 1.5 0 0 base camera --format json
+
+    A tree is written one line an edge, static2 (flags) unless --format says static1 (x y z qx qy qz qw PARENT CHILD)
+    or another form. With --to rpy angles are written: --roll --pitch --yaw, and yaw pitch roll in static1, in radians.
+    Arguments that are read, in either spelling, become a tree entry: the pose of the child in its parent. Their angles
+    are radians, as the tool has them; --deg is about the result.
+    """
+    flags = {name: value for name in FLAGS if (value := options.pop(name.replace("-", "_"))) is not None}
+    form = options.pop("format_name")
+    if not flags and len(arguments) == 1:
+        output = Output("tree", format_name=form or "static2", deg=deg, **options)
+        tree = load_tree(arguments[0])
+        if not isinstance(tree, FrameTree):
+            raise ValueInvalid(moving_frames(track.child for track in tree.tracks() if not track.standing))
+        output.tree(tree)
+        return
+    output = Output("tree", format_name=form, deg=deg, **options)
+    tree = FrameTree("arguments")
+    pose = _pose(arguments, flags, Reading(Source("arguments", ""), normalize=normalize))
+    tree.add_components(pose.parent or "", pose.name or "", pose.components)
+    output.tree(tree)
+
+
+def _pose(arguments: Sequence[str], flags: dict[str, str], reading: Reading) -> Pose:
+    """Read the arguments of one call."""
+    if flags and arguments:
+        raise click.UsageError(f"extra arguments {' '.join(arguments)!r} beside the flags")
+    try:
+        pose = read_flags(flags, reading) if flags else read_positional(arguments, reading)
+    except NotARotation:
+        raise
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+    for _, message in reading.notes:
+        warn(message)
+    return pose

@@ -1,0 +1,52 @@
+"""`frametool tree`: the frames of a tree, drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import FILE, Command, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.times import TIME, at_ns, rules, rules_options
+from frametool.cli.trees import load_tree, verbose_option
+from frametool.frames.tree import FrameTree
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+@click.command(cls=Command, name="tree")
+@click.argument("tree", type=FILE)
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
+@click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest of each edge]")
+@click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
+              help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
+@rules_options
+@verbose_option
+@rotation_options
+@result_options("tree")
+def command(
+    tree: str, more: Sequence[str], at: int | str | None, color: str, moving: bool, cache: int | None, tf2: str | None,
+    **options: Any,
+) -> None:  # fmt: skip
+    """Draw the frames of TREE, each with its pose in its parent; those that move with their rate and interval too.
+
+    \b
+      frametool tree robot.yaml
+      frametool tree robot.yaml --format dot | dot -Tsvg -o robot.svg
+      frametool tree arm.yaml --with gripper.yaml --format yaml --to rpy_deg
+      frametool tree drive.yaml --at 2.5
+
+    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. yaml and json are trees again
+    and read back, frames that move with all their samples. dot draws what moves as ROS's view_frames does, tf2 is the
+    listing of tf2's all_frames_as_yaml. --at draws the tree as it stood at one time.
+    """
+    output = Output("tree", **options)
+    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
+    stamp = at_ns(at)
+    if stamp is not None and not isinstance(frames, FrameTree):
+        from frametool.frames.report import tree_at
+
+        frames = tree_at(frames, stamp)
+    output.tree(frames, color)

@@ -1,0 +1,1 @@
+"""Text to plain values and back, and from a path to its place: YAML and JSON."""

@@ -1,0 +1,119 @@
+"""YAML and JSON text to plain values, strictly, and from a path back to its place in the text.
+
+A document is dicts, lists, text and None: every scalar stays text as written, so that names stay names (`on`, `007`,
+`12:30`) and numbers are read by the one rule of `frametool.text.numbers`.  Places are not kept while reading; they
+are found again when a message needs them.
+"""
+
+from __future__ import annotations
+
+import re
+
+from frametool.documents.json_reader import json_marks, looks_like_json, parse_json
+from frametool.documents.marks import longest_found
+from frametool.documents.source import Source, check_text, decode, placed_error, read_text, within
+from frametool.errors import FormatError
+from frametool.text.numbers import odd_characters
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from typing import Any
+
+    from frametool.documents.marks import Path
+
+__all__ = [
+    "Document",
+    "Source",
+    "decode",
+    "explain_scalar",
+    "format_error",
+    "locate",
+    "locate_many",
+    "parse_documents",
+    "read_text",
+]
+
+_BYTE_ORDER_MARK = "\ufeff"
+_TIGHT_COLON = r"([\w./-]+):(?=[^\s:/])"
+_EQUALS = r"([\w./-]+) ?="
+
+
+class Document:
+    """One document of a text: its value, its number in the text (empty ones count), and the text."""
+
+    __slots__ = ("index", "source", "value")
+
+    def __init__(self, value: Any, index: int, source: Source) -> None:
+        """Keep the three together."""
+        self.value = value
+        self.index = index
+        self.source = source
+
+
+def parse_documents(text: str, name: str, *, allowed_tags: Iterable[str] = ()) -> list[Document]:
+    """Read every document of a YAML or JSON text; empty ones are left out.
+
+    name: what messages call the text.  allowed_tags: YAML tags to read over, e.g. `!Rpy`; others are errors.
+    Values are dict, list, str or None (an empty value, `~`, `null`); keys are text, each once.
+    Raises FormatError with line and column.
+    """
+    source = Source(name, text.removeprefix(_BYTE_ORDER_MARK))
+    check_text(source)
+    values = parse_json(source) if looks_like_json(source.text) else None
+    if values is None:
+        from frametool.documents.yaml_events import parse_yaml
+
+        values = parse_yaml(source, frozenset(allowed_tags))
+    return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
+
+
+def locate(text: str, path: Path, *, key: bool = False) -> tuple[int, int]:
+    """Find line and column, from 1, of the value at a path, or of its key.
+
+    path: (document index, key or index, ...).  What is missing is placed at the nearest thing around it.
+    """
+    return locate_many(text, [path], key=key)[0]
+
+
+def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[tuple[int, int]]:
+    """Find the places of several paths in one pass over a text that parse_documents has read."""
+    source = Source("", text.removeprefix(_BYTE_ORDER_MARK))
+    if not paths:
+        return []
+    if looks_like_json(source.text) and parse_json(source) is not None:
+        found = json_marks(source, paths)
+    else:
+        from frametool.documents.yaml_events import yaml_marks
+
+        found = yaml_marks(source, paths)
+    return [within(source.text, *_place(path, found, key=key)) for path in paths]
+
+
+def _place(path: Path, found: dict[Path, tuple[tuple[int, int], tuple[int, int]]], *, key: bool) -> tuple[int, int]:
+    """Pick the mark of the key or of the value; without the very path there is no key of its own."""
+    nearest = longest_found(path, found)
+    if not nearest:
+        return 1, 1
+    of_key, of_value = found[nearest]
+    return of_key if key and nearest == path else of_value
+
+
+def format_error(
+    source: Source, path: Path, message: str, *, key: bool = False, error: type[FormatError] = FormatError
+) -> FormatError:
+    """Make the error for a value, or its key, at a path: placed, with the source line and a caret."""
+    bare = Source(source.name, source.text.removeprefix(_BYTE_ORDER_MARK))
+    line, column = locate(bare.text, path, key=key)
+    return placed_error(bare, line, column, message, error)
+
+
+def explain_scalar(text: str) -> str:
+    """Say why a text stands where a mapping was meant: no blank after a colon, an invisible character; or ""."""
+    if match := re.match(_TIGHT_COLON, text):
+        return f"write a blank after '{match[1]}:'"
+    if ":" in text and (odd := odd_characters(text)):
+        return f"it has {odd}; use an ordinary blank"
+    if match := re.match(_EQUALS, text):
+        return f"write '{match[1]}: ' instead of '='"
+    return ""

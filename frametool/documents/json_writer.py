@@ -1,0 +1,26 @@
+"""Plain values to JSON text on one line; how floats are written is the caller's."""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+
+def dump(value: Any, number: Callable[[float], str] = repr) -> str:
+    """Write plain values as JSON on one line; `number` writes the floats.
+
+    Not json.dumps, because that has no say in how floats are written.
+    """
+    if isinstance(value, float):
+        return number(value)
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{dump(key)}: {dump(each, number)}" for key, each in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(dump(each, number) for each in value) + "]"
+    if isinstance(value, str) and value.isascii() and value.isidentifier():
+        return f'"{value}"'  # keys and most names, without importing json
+    import json
+
+    return json.dumps(value, ensure_ascii=False)

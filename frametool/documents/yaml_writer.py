@@ -1,0 +1,130 @@
+"""Plain values to YAML text, without the YAML library: one look for all that is printed.
+
+    name: camera
+    xyz: [1.0, 2.0e-05, 3.0]
+    quaternion: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
+
+Text is quoted wherever YAML 1.1 or 1.2 would read something else than that text.
+"""
+
+from __future__ import annotations
+
+import re
+
+from frametool.errors import ValueInvalid
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import Any
+
+# begins with a letter, _ or /; then also digits . - and single blanks: no indicator, number or date looks so
+_PLAIN = r"(?:[^\W\d]|/)[\w./-]*(?: [\w./-]+)*"
+_WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null", "nan", "inf", "infinity"))
+_ESCAPED = r'["\\]|[^ -~\xa1-\u1fff\u3001-\ud7ff\uf900-\ufdff\U00010000-\U0003ffff]'
+_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+_LONGEST_KEY = 200  # of 1024 bytes that a parser looks ahead for the colon
+_WIDEST_FLOW_MAP = 8
+_INFINITE = float("inf")
+
+
+def dump(value: Any, number: Callable[[float], str] = repr) -> str:
+    """Write dicts, lists, text, numbers, truth values and None as one YAML document.
+
+    Lists of scalars and small maps of numbers stand on one line, all else in blocks.
+    number: writes a float; `1e-05` becomes `1.0e-05`, because YAML 1.1 needs the point.
+    Raises ValueInvalid for what no number is: nan, inf.
+    """
+    if (line := _one_line(value, number)) is not None and not (type(value) is dict and value):
+        return f"{line}\n"
+    return "".join(f"{line}\n" for line in _block(value, number))
+
+
+def quoted(text: str) -> str:
+    """Write a text as it is where that is safe, else in double quotes with escapes."""
+    if text.isascii() and text.isidentifier() and len(text) <= _LONGEST_KEY and text.lower() not in _WORDS:
+        return text  # most keys and names, before any pattern is compiled
+    plain = len(text) <= _LONGEST_KEY and re.fullmatch(_PLAIN, text)
+    if plain and text.lower() not in _WORDS and text.isprintable():
+        return text
+    return f'"{re.sub(_ESCAPED, _escape, text)}"'
+
+
+def key_text(key: str, beside: dict[str, Any]) -> str:
+    """Write a key; y beside x is the coordinate, which no reader in use takes for a truth value."""
+    return key if key == "y" and "x" in beside else quoted(key)
+
+
+def _escape(match: re.Match[str]) -> str:
+    """Write a character that may not stand in quotes as it is."""
+    code = ord(match[0])
+    if 0xD800 <= code < 0xE000:
+        raise ValueInvalid(f"{match.string!r} holds half a character and cannot be written")
+    return _ESCAPES.get(match[0]) or (f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}")
+
+
+def _scalar(value: Any, number: Callable[[float], str]) -> str:
+    """Write what is neither a list nor a map."""
+    if isinstance(value, str):
+        return quoted(value)
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return _float(value, number) if isinstance(value, float) else repr(value)
+
+
+def _float(value: float, number: Callable[[float], str]) -> str:
+    """Write a finite number with a point before the exponent."""
+    if not -_INFINITE < value < _INFINITE:
+        raise ValueInvalid(f"{value!r} is not finite and cannot be written")
+    text = number(value)
+    return text if "e" not in text or "." in text else text.replace("e", ".0e")
+
+
+def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
+    """Write a scalar, an empty or leaf list, or a small map of numbers; None for what needs a block."""
+    if isinstance(value, dict):
+        if len(value) > _WIDEST_FLOW_MAP or not all(_fits_flow(*item) for item in value.items()):
+            return None
+        return "{" + ", ".join(f"{key_text(key, value)}: {_scalar(each, number)}" for key, each in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        if any(isinstance(each, (dict, list, tuple)) for each in value):
+            return None
+        return "[" + ", ".join(_scalar(each, number) for each in value) + "]"
+    return _scalar(value, number)
+
+
+def _fits_flow(key: str, value: Any) -> bool:
+    """Say whether an entry may stand in a map on one line."""
+    return isinstance(value, (int, float)) and len(key) <= _LONGEST_KEY
+
+
+def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:
+    """Yield the lines of a list or map, not indented."""
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _entry(key, key_text(key, value), each, number)
+    else:
+        for each in value:
+            yield from _item(each, number)
+
+
+def _entry(key: str, written: str, value: Any, number: Callable[[float], str]) -> Iterator[str]:
+    """Yield the lines of one entry of a map."""
+    head = f"{written}:"
+    if len(key) > _LONGEST_KEY:
+        yield f"? {written}"
+        head = ":"
+    line = _one_line(value, number)
+    yield head if line is None else f"{head} {line}"
+    if line is None:
+        yield from (f"  {below}" for below in _block(value, number))
+
+
+def _item(value: Any, number: Callable[[float], str]) -> Iterator[str]:
+    """Yield the lines of one item of a list, the first after the dash."""
+    line = _one_line(value, number)
+    lines = _block(value, number) if line is None else iter((line,))
+    yield f"- {next(lines)}"
+    yield from (f"  {below}" for below in lines)

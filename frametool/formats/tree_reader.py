@@ -1,0 +1,227 @@
+"""Frame trees in YAML and JSON: nested, as a list, or as ROS messages; documents in, edges out.
+
+    frames: {base: {lidar: {xyz: [0.9, 0, 2], rpy_deg: [0, 0, 90]}}}          nested: a root's keys are its children
+    frames: [{name: lidar, parent: base, xyz: [0.9, 0, 2]}]                   list, any order
+    {name: lidar, parent: base, xyz: [0.9, 0, 2]}                             one edge, as `lookup` prints it
+    {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a frame that moves; seconds
+
+Metres, radians unless said; every pose is that of the frame in its parent: parent_from_child.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import ValueInvalid
+from frametool.frames.stamps import parse_stamp
+from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
+from frametool.grammar.readers import Misfit, as_mapping, kind, within
+from frametool.ros import messages
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.grammar.readers import Path, Reading
+
+TREE_KEYS = frozenset(("frames", "angles"))
+STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
+TIMED = frozenset(("samples", *STAMP_KEYS))
+CHILDREN = frozenset(("children", *TIMED))
+
+
+class Edge(NamedTuple):
+    """One line of a tree: the pose of `child` in `parent`; a root has no parent."""
+
+    parent: str | None
+    child: str
+    pose: Pose
+    path: Path
+    stamp_ns: int | None = None
+
+
+def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
+    """Yield the edges of one document, in its order.
+
+    Raises Misfit with the path from the document's top.
+    """
+    if type(value) is list:
+        yield from _entries(value, (), reading)
+    elif type(value) is not dict:
+        as_mapping(value, "a frame tree")
+    elif "frames" in value:
+        yield from _tree(value, reading)
+    elif messages.is_message(value):
+        yield from _messages(value, (), reading)
+    elif "name" in value or "parent" in value:
+        yield from _entry(value, (), reading)
+    else:
+        raise Misfit(
+            f"no frame tree: expected frames:, transforms: or an entry with name: and parent:; "
+            f"found the keys {', '.join(map(repr, list(value)[:8]))}",
+        )
+
+
+def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
+    if unknown := [key for key in document if key not in TREE_KEYS]:
+        raise Misfit(f"unknown key {unknown[0]!r} beside frames; expected angles", (unknown[0],), key=True)
+    if "angles" in document:
+        reading.degrees = read_angle_unit(document["angles"])
+    frames = document["frames"]
+    if type(frames) is list:
+        yield from _entries(frames, ("frames",), reading)
+    elif frames is not None:
+        for root, children in as_mapping(frames, "a mapping of root frames or a list of entries").items():
+            yield from _below_root(root, children, reading)
+
+
+def _below_root(root: str, children: Any, reading: Reading) -> Iterator[Edge]:
+    """Walk one nested tree, parents before children; a stack, so that no tree is too deep."""
+    path: Path = ("frames", root)
+    yield Edge(None, root, Pose(), path)
+    pending = [(root, children, path)]
+    while pending:
+        parent, entries, path = pending.pop()
+        if entries is None:
+            continue
+        deeper = []
+        for child, entry in _children(entries, path).items():
+            here = (*path, child)
+            yield from _nested(parent, child, entry, here, reading)
+            if entry is not None and "children" in entry:
+                deeper.append((child, entry["children"], (*here, "children")))
+        pending.extend(reversed(deeper))
+
+
+def _children(entries: Any, path: Path) -> dict[str, Any]:
+    try:
+        return as_mapping(entries, "the children as a mapping by name")
+    except Misfit as misfit:
+        raise misfit.below(*path) from None
+
+
+def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -> Iterator[Edge]:
+    """Yield the edge of a nested entry, or its samples."""
+    reading.here = path
+    try:
+        if entry is None:
+            entry = {}
+        if child in POSE_KEYS and type(entry) is not dict:
+            raise Misfit(
+                f"{child!r} stands where a frame's name is expected: a root has no pose, its keys are its children",
+                key=True,
+            )
+        for key in ("name", "parent"):
+            if key in as_mapping(entry, f"the pose of frame {child!r}"):
+                raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)
+        pose = read_pose(entry, reading, CHILDREN)
+        edges = _edges(entry, pose, parent, child, path, reading)
+    except Misfit as misfit:
+        raise misfit.below(*path) from None
+    yield from edges
+
+
+def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]:
+    """Walk a list of entries, ours or ROS messages."""
+    for index, entry in enumerate(entries):
+        here = (*path, index)
+        reading.here = here
+        if type(entry) is dict and messages.is_message(entry):
+            yield from _messages(entry, here, reading)
+        else:
+            yield from _entry(entry, here, reading)
+
+
+def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
+    """Read {name, parent, pose} or {name, parent, samples}; without parent and pose it only names a root."""
+    try:
+        pose = read_pose(as_mapping(entry, "an entry {name, parent, ..}"), reading, TIMED)
+        if pose.name is None:
+            raise Misfit("missing name; an entry is {name: .., parent: .., xyz: [..], ..}")
+        if pose.parent is None and (pose.position or pose.rotation):
+            raise Misfit(f"frame {pose.name!r} has a pose but no parent")
+        return _edges(entry, pose, pose.parent, pose.name, path, reading)
+    except Misfit as misfit:
+        raise misfit.below(*path) from None
+
+
+def _edges(
+    entry: dict[str, Any] | None, pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
+) -> list[Edge]:
+    """Return what one entry says: an edge that stands still or has one stamp, or the samples of one that moves."""
+    if entry is not None and "samples" in entry:
+        return read_samples(entry, pose, parent, child, path, reading)
+    if parent is not None and pose.position is None and pose.rotation is None:
+        reading.note(f"frame {child!r} has neither position nor rotation: taken as the identity")
+    return [Edge(parent, child, pose, path, stamp_of(entry or {}))]
+
+
+def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[Edge]:
+    """Read every TransformStamped of a ROS message."""
+    for message, here in messages.messages(value, path):
+        reading.here = here
+        try:
+            yield _message(message, here, reading)
+        except Misfit as misfit:
+            raise misfit.below(*here) from None
+
+
+def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
+    """Read one TransformStamped, checked, or as tf2 receives it."""
+    if reading.raw:
+        from frametool.ros.tf2_input import read_transform
+
+        parent, child, components, stamp_ns = read_transform(message)
+        return Edge(parent, child, Pose.of(components), path, stamp_ns)
+    parent, child, position, rotation, stamp_ns = messages.read_transform(message, reading)
+    return Edge(parent, child, Pose(position, rotation), path, stamp_ns)
+
+
+def read_samples(
+    entry: dict[str, Any], pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
+) -> list[Edge]:
+    """Read `samples: [{stamp: 0.0, xyz: [..]}, ..]`; a sample may name a parent of its own."""
+    if pose.position is not None or pose.rotation is not None or not STAMP_KEYS.isdisjoint(entry):
+        message = f"frame {child!r} has samples and a pose or a stamp beside them; put all into samples"
+        raise Misfit(message, ("samples",), key=True)
+    samples = entry["samples"]
+    if type(samples) is not list or not samples:
+        raise Misfit(f"expected samples as a list of {{stamp: .., xyz: [..], ..}}, found {kind(samples)}", ("samples",))
+    outer = reading.degrees
+    reading.degrees = read_angle_unit(entry["angles"]) if "angles" in entry else outer
+    edges = []
+    for index, sample in enumerate(samples):
+        reading.here = (*path, "samples", index)
+        moved, stamp_ns = within(("samples", index), _sample, sample, reading)
+        above = moved.parent or parent
+        if above is None:
+            raise Misfit(f"frame {child!r} moves but has no parent", ("samples", index))
+        edges.append(Edge(above, child, moved, reading.here, stamp_ns))
+    reading.degrees = outer
+    return edges
+
+
+def _sample(sample: Any, reading: Reading) -> tuple[Pose, int]:
+    """Read one pose with its stamp."""
+    pose = read_pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
+    if pose.name is not None:
+        raise Misfit("name is given by the entry; leave it out", ("name",), key=True)
+    stamp_ns = stamp_of(sample)
+    if stamp_ns is None:
+        raise Misfit("missing stamp; a sample is {stamp: 12.5, xyz: [..], ..}, in seconds")
+    return pose, stamp_ns
+
+
+def stamp_of(entry: dict[str, Any]) -> int | None:
+    """Read `stamp: 12.5` in seconds or `stamp_ns: 12500000000`, exactly; None where there is neither."""
+    if STAMP_KEYS.isdisjoint(entry):
+        return None
+    keys = [key for key in ("stamp", "stamp_ns") if key in entry]
+    if len(keys) > 1:
+        raise Misfit("stamp and stamp_ns in one entry; keep one", ("stamp",), key=True)
+    text = entry[keys[0]]
+    if type(text) is not str:
+        raise Misfit(f"expected a time, found {kind(text)}", (keys[0],))
+    try:
+        return parse_stamp(text if keys[0] == "stamp" else f"{text}ns")
+    except ValueInvalid as error:
+        raise Misfit(str(error), (keys[0],)) from None

@@ -1,0 +1,91 @@
+"""The error of a lookup at a time without data: which edge, how far off, and when the whole way has data."""
+
+from __future__ import annotations
+
+from frametool.errors import NoDataAt, TooEarly, TooLate
+from frametool.frames.stamps import BILLION, format_stamp
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.frames.track import Track
+
+OTHER_CLOCK = 10**8 * BILLION  # three years: beyond, one clock counts from 1970 and the other from its start
+
+
+def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDataAt:
+    """Compose the error for a lookup at a time, blaming the edge that is furthest from it.
+
+    path: the edges between the two frames, from the target to the source.
+    """
+    moving = [track for track in path if not track.standing]
+    worst = max(moving, key=lambda track: gap(track, at_ns))
+    first, last = worst.span
+    short = gap(worst, at_ns)
+    early = at_ns < first
+    begin, end = max(track.stamps[0] for track in moving), min(track.stamps[-1] for track in moving)
+    parent = worst.parents[0 if early else -1]
+    off = f"{seconds(short)} s too {'early' if early else 'late'}"
+    message = (
+        f"no data for {parent} -> {worst.child} at {format_stamp(at_ns)}; {_cover(first, last)} ({off}), "
+        f"{_way(target, source, path)}{_whole(moving, begin, end)}{_clocks(short)}"
+    )
+    return (TooEarly if early else TooLate)(
+        message, parent=parent, child=worst.child, at_ns=at_ns, first_ns=first, last_ns=last, short_ns=short,
+        short_s=short / BILLION, target=target, source=source, path=frames_on(target, source, path),
+        available_from_ns=begin if begin <= end else None, available_until_ns=end if begin <= end else None,
+    )  # fmt: skip
+
+
+def gap(track: Track, at_ns: int) -> int:
+    """Return how far a time lies outside of a track's samples, in nanoseconds."""
+    first, last = track.span
+    return max(first - at_ns, at_ns - last, 0)
+
+
+def seconds(duration_ns: int) -> str:
+    """Write a duration in seconds without idle zeros: `0.5`, `3`."""
+    return format_stamp(duration_ns).rstrip("0").rstrip(".")
+
+
+def _cover(first: int, last: int) -> str:
+    if first == last:
+        return f"its only sample is at {format_stamp(first)}"
+    return f"samples cover {format_stamp(first)} .. {format_stamp(last)}"
+
+
+def _way(target: str, source: str, path: Sequence[Track]) -> str:
+    """Write the way with arrows from source to target, cut in the middle when it is long."""
+    frames = frames_on(target, source, path)
+    if len(frames) > 12:
+        frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
+    return f"on the path {' <- '.join(frames)}"
+
+
+def frames_on(target: str, source: str, path: Sequence[Track]) -> list[str]:
+    """List the frames on a path from target to source, both included."""
+    frames = [target]
+    for track in path:
+        frames.append(track.parent if track.child == frames[-1] else track.child)
+    return frames if frames[-1] == source else [*frames, source]
+
+
+def _whole(moving: Sequence[Track], begin: int, end: int) -> str:
+    """Say when all edges have data, or which two never do."""
+    if len(moving) == 1:
+        return ""
+    if begin <= end:
+        return f"; the whole path has data from {format_stamp(begin)} until {format_stamp(end)}"
+    late = max(moving, key=lambda track: track.stamps[0])
+    early = min(moving, key=lambda track: track.stamps[-1])
+    return (
+        f"; {early.parent} -> {early.child} ends at {format_stamp(end)} before {late.parent} -> {late.child} "
+        f"begins at {format_stamp(begin)}: they never overlap"
+    )
+
+
+def _clocks(short: int) -> str:
+    if short < OTHER_CLOCK:
+        return ""
+    return "; that is years: one of the clocks counts from 1970, the other does not"

@@ -1,0 +1,146 @@
+"""Run kernels for the two values: floats directly, arrays in blocks, rows out for whoever asks for them.
+
+Loads numpy only where a batch or an array is asked for.
+"""
+
+from __future__ import annotations
+
+from frametool.errors import ValueInvalid
+from frametool.geometry import floats
+from frametool.geometry.validation import all_finite, at_first, complain_of, first_row, single, weights
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from frametool.geometry.types import Array, Components, Kernel, Numbers
+
+
+def convert(kernel: Kernel, count: int, given: Components, name: str, *args: object) -> Components:
+    """Run a kernel over what came in: floats for one item, else guarded blocks."""
+    if single(given):
+        return kernel(*given, *args, floats)
+    from frametool.geometry import arrays
+
+    return arrays.run(arrays.guarded(kernel, complain_of(given, name)), count, given, *args, arrays)
+
+
+def checked(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> Components:
+    """Run a kernel that not every finite input suits; `check` looks at one item, and at the first row that fails."""
+    if single(given):
+        check(*given)
+        return kernel(*given, floats)
+    from frametool.geometry import arrays
+
+    return arrays.run(arrays.guarded(kernel, lambda: _recheck(kernel, count, given, name, check)), count, given, arrays)
+
+
+def _recheck(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> None:
+    """Find the first row a kernel failed on and say why."""
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    all_finite(given, name)
+    bad = ~np.logical_and.reduce([np.isfinite(part) for part in arrays.run(kernel, count, given, arrays)])
+    if bad.any():
+        try:
+            check(*first_row(given, bad))
+        except ValueInvalid as error:
+            raise ValueInvalid(f"{at_first(name, bad)}: {error}") from None
+
+
+def run(kernel: Kernel, count: int, given: Components) -> Components:
+    """Run an arithmetic kernel on trusted components."""
+    if single(given):
+        return kernel(*given)
+    from frametool.geometry import arrays
+
+    return arrays.run(kernel, count, given)
+
+
+def run_with_xp(kernel: Kernel, count: int, given: Components) -> Components:
+    """Run a kernel that needs functions on trusted components."""
+    if single(given):
+        return kernel(*given, floats)
+    from frametool.geometry import arrays
+
+    return arrays.run(kernel, count, given, arrays)
+
+
+def number(kernel: Callable[..., Any], given: Components) -> Any:
+    """Run a kernel that gives one number."""
+    return run_with_xp(lambda *parts: (kernel(*parts),), 1, given)[0]
+
+
+def rows(kernel: Kernel, count: int, given: Components, *args: object) -> Array:
+    """Run a kernel that needs functions; give its components as rows (..., count)."""
+    if single(given):
+        return stacked(kernel(*given, *args, floats))
+    from frametool.geometry import arrays
+
+    return arrays.rows(kernel, count, given, *args, arrays)
+
+
+def moved(kernel: Kernel, mover: Components, flatten: Kernel, given: Components, name: str) -> Array:
+    """Move vectors: each by its own mover, or all by the matrix of one."""
+    import numpy as np
+
+    if single(given) and single(mover):
+        return np.array(kernel(*mover, *given))
+    from frametool.geometry import arrays
+
+    parts = (*mover, *given)
+    if single(mover):
+        kernel, parts = _matrix_kernel(flatten(*mover)), given
+    return arrays.rows(arrays.guarded(kernel, complain_of(given, name)), 3, parts)
+
+
+def _matrix_kernel(entries: Components) -> Kernel:
+    """Make the kernel of one matrix, three rows of three or of four."""
+    width = len(entries) // 3
+    a, b, c = entries[:width], entries[width : 2 * width], entries[2 * width :]
+
+    def kernel(x: Any, y: Any, z: Any) -> Components:
+        return tuple(sum(row[3:], row[0] * x + row[1] * y + row[2] * z) for row in (a, b, c))
+
+    return kernel
+
+
+def stacked(components: Components) -> Array:
+    """Return components as rows of a fresh array."""
+    import numpy as np
+
+    return np.stack(components, axis=-1)
+
+
+def chosen(components: Components, index: Any) -> Components:
+    """Index every component; what is left of one element becomes floats."""
+    return tuple(part[index] if getattr(part[index], "shape", ()) else float(part[index]) for part in components)
+
+
+def second_moment(components: Components, heavy: Array | None) -> Array:
+    """Return sum(w q q^T), 4 by 4, walked in blocks."""
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    flat = [part.reshape(-1) for part in components]
+    if not flat[0].size:
+        raise ValueInvalid("mean of no rotations; give at least one")
+    mass = None if heavy is None else heavy.reshape(-1)
+    total = np.zeros((4, 4))
+    for start, stop in arrays.blocks(flat[0].size):
+        block = np.stack([part[start:stop] for part in flat])
+        weighted = block if mass is None else block * mass[start:stop]
+        total += np.einsum("in,jn->ij", weighted, block)  # not @: BLAS would start threads
+    return total
+
+
+def mean_rows(components: Components, heavy: Numbers | None) -> Array:
+    """Return the weighted mean of each component."""
+    import numpy as np
+
+    mass = None if heavy is None else weights(heavy, components[0].shape)
+    return np.array([np.average(part, weights=mass) for part in components])

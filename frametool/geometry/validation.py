@@ -1,0 +1,173 @@
+"""The doors of the public face: lists and arrays in, checked components out.
+
+One item becomes Python floats without numpy; more become columns, views of the caller's array that are never
+written to. Errors name the argument, the shapes and the first bad row.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from frametool.errors import ValueInvalid
+from frametool.geometry.quaternion import SILENT
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from frametool.geometry.types import Array, Components, Numbers
+
+
+def single(components: Components) -> bool:
+    """Say whether components are the floats of one item."""
+    return all(type(part) is float for part in components)
+
+
+def columns(value: Any, width: int, name: str) -> Components:
+    """Take `(..., width)` numbers apart into columns; those of one item become floats and are checked to be finite.
+
+    Raises:
+        ValueInvalid: another shape, no numbers, or one item that is not finite.
+    """
+    if isinstance(value, (list, tuple)) and len(value) == width and all(type(part) in (float, int) for part in value):
+        return finite(tuple(map(float, value)), name)
+    array = as_numbers(value, name)
+    if array.ndim == 0 or array.shape[-1] != width:
+        raise ValueInvalid(f"{name}: expected shape (..., {width}), got {array.shape}")
+    return parts(array, name)
+
+
+def parts(array: Array, name: str) -> Components:
+    """Take the last axis of an array apart."""
+    if array.ndim == 1:
+        return finite(tuple(map(float, array.tolist())), name)
+    return tuple(array[..., index] for index in range(array.shape[-1]))
+
+
+def matrices(value: Numbers, size: int, name: str) -> Components:
+    """Take `(..., size, size)` numbers apart into size * size columns, row-major.
+
+    Raises:
+        ValueInvalid: another shape, no numbers, or one item that is not finite.
+    """
+    array = as_numbers(value, name)
+    if array.shape[-2:] != (size, size):
+        raise ValueInvalid(f"{name}: expected shape (..., {size}, {size}), got {array.shape}")
+    return parts(array.reshape(*array.shape[:-2], size * size), name)
+
+
+def scalars(value: Any, name: str) -> Any:
+    """Take one number as a float, or an array of any shape as it is.
+
+    Raises:
+        ValueInvalid: no numbers, or not finite.
+    """
+    if type(value) in (float, int):
+        return finite((float(value),), name)[0]
+    array = as_numbers(value, name)
+    return finite((float(array),), name)[0] if array.ndim == 0 else all_finite((array,), name)[0]
+
+
+def as_numbers(value: Numbers, name: str) -> Array:
+    """Make an array of real numbers of what is given, without a copy where it is one.
+
+    Raises:
+        ValueInvalid: ragged, or of another kind.
+    """
+    import numpy as np
+
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise ValueInvalid(f"{name}: the rows differ in length; expected an array of numbers") from None
+    if array.dtype.kind not in "fiu":
+        raise ValueInvalid(f"{name}: expected real numbers, got an array of {array.dtype}")
+    return array
+
+
+def finite(values: tuple[float, ...], name: str) -> tuple[float, ...]:
+    """Return the floats of one item back; raise ValueInvalid unless all are finite."""
+    if all(map(isfinite, values)):
+        return values
+    raise ValueInvalid(f"{name}: {' '.join(f'{value:g}' for value in values)} is not finite; give finite numbers")
+
+
+def complain_of(columns: Components, name: str) -> Callable[[], None]:
+    """Make the look for the first row that is not finite, for kernels that ran into one."""
+
+    def complain() -> None:
+        all_finite(columns, name)
+
+    return complain
+
+
+def all_finite(columns: Components, name: str) -> Components:
+    """Return columns back; raise ValueInvalid for the first row that is not finite."""
+    import numpy as np
+
+    bad = ~np.logical_and.reduce([np.isfinite(column) for column in np.broadcast_arrays(*columns)])
+    if bad.any():
+        raise ValueInvalid(f"{at_first(name, bad)}: {shown_row(columns, bad)} is not finite; give finite numbers")
+    return columns
+
+
+def at_first(name: str, bad: Any) -> str:
+    """Name the first bad row: `xyzw[3]`."""
+    import numpy as np
+
+    place = np.unravel_index(int(np.argmax(bad)), bad.shape)
+    return f"{name}[{', '.join(str(int(index)) for index in place)}]" if place else name
+
+
+def first_row(columns: Components, bad: Any) -> tuple[float, ...]:
+    """Return the numbers of the first bad row as floats."""
+    import numpy as np
+
+    row = int(np.argmax(bad))
+    return tuple(float(np.broadcast_to(column, bad.shape).reshape(-1)[row]) for column in columns)
+
+
+def shown_row(columns: Components, bad: Any) -> str:
+    """Show the numbers of the first bad row."""
+    return " ".join(f"{value:g}" for value in first_row(columns, bad))
+
+
+def joined(given: Components, name: str) -> Components:
+    """Bring components to one kind and shape, the first three finite, nothing shared with the caller."""
+    if single(given):
+        return given
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    out = np.empty((len(given), *arrays.batch_shape(given)))
+    for target, part in zip(out, given, strict=True):
+        target[...] = part
+    if not np.isfinite(out[:3].sum()):
+        all_finite(tuple(out[:3]), name)
+    return tuple(out)
+
+
+def check_last_row(entries: Components, name: str) -> None:
+    """Raise ValueInvalid unless the last rows of homogeneous matrices are 0 0 0 1, to 1e-6."""
+    off = sum(abs(entry - wanted) for entry, wanted in zip(entries[12:], (0.0, 0.0, 0.0, 1.0), strict=True))
+    bad = ~(off <= SILENT) if not isinstance(off, float) else not off <= SILENT
+    if bad if isinstance(bad, bool) else bad.any():
+        import numpy as np
+
+        mask = np.asarray(bad)
+        raise ValueInvalid(f"{at_first(name, mask)}: last row {shown_row(entries[12:], mask)}; expected 0 0 0 1")
+
+
+def weights(value: Numbers, shape: tuple[int, ...]) -> Array:
+    """Check weights: of the batch's shape, finite, none negative, not all 0."""
+    import numpy as np
+
+    array = as_numbers(value, "weights").astype(np.float64)
+    if array.shape != shape:
+        raise ValueInvalid(f"weights: expected shape {shape}, got {array.shape}")
+    all_finite((array,), "weights")
+    if (array < 0.0).any() or not array.any():
+        raise ValueInvalid("weights: expected none negative and not all 0")
+    return array

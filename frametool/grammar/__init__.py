@@ -1,0 +1,1 @@
+"""Plain values to poses, points and trees, and results back to plain values."""

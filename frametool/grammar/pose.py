@@ -1,0 +1,171 @@
+"""The grammar of one pose: the mapping that files, JSON lines, shell arguments and results share.
+
+    {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}          metres; fixed axes x, y, z
+    {name: camera, parent: base, xyz: [0, 0, 1], quaternion: {x: 0, y: 0, z: 0, w: 1}}
+
+The mapping is the pose of `name` in `parent`: parent_from_name. Reading takes dicts, lists and text as documents
+give them, and checks everything at this door.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import ValueInvalid, did_you_mean
+from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry.representations import REPRESENTATIONS
+from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
+from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_rotation
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from frametool.geometry.transform import Transform
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.readers import Quaternion, Vector
+
+POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001}
+TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
+DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg"))
+NAMES = frozenset(("name", "parent"))
+POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", AXES_KEY))
+AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie apart
+
+
+class Pose(NamedTuple):
+    """One record: the pose of `name` in `parent`; position or rotation is None where it was not given."""
+
+    position: Vector | None = None
+    rotation: Quaternion | None = None
+    name: str | None = None
+    parent: str | None = None
+
+    @classmethod
+    def of(cls, components: Sequence[float], name: str | None = None, parent: str | None = None) -> Pose:
+        """Make a pose of tx, ty, tz, x, y, z, w."""
+        tx, ty, tz, x, y, z, w = components
+        return cls((tx, ty, tz), (x, y, z, w), name, parent)
+
+    @property
+    def components(self) -> Rigid:
+        """Return tx, ty, tz, x, y, z, w; what is missing is 0 and the identity."""
+        return (*(self.position or (0.0, 0.0, 0.0)), *(self.rotation or (0.0, 0.0, 0.0, 1.0)))
+
+    @property
+    def transform(self) -> Transform:
+        """Return parent_from_name."""
+        from frametool.geometry.transform import Transform
+
+        return Transform.of(*self.components)
+
+
+def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] = ()) -> Pose:
+    """Read one pose; `also` names further keys, which the caller deals with.
+
+    Raises Misfit with the path of what is wrong below this mapping.
+    """
+    if not POSE_KEYS.issuperset(mapping):
+        _refuse_unknown_keys(mapping, also)
+    position: Vector | None = None
+    rotation: Quaternion | None = None
+    outer_degrees = reading.degrees
+    if "angles" in mapping:
+        reading.degrees = read_angle_unit(mapping["angles"])
+    key = ""
+    try:
+        for key, value in mapping.items():
+            if key in POSITION_KEYS:
+                position = _agreeing_position(position, read_position(value, POSITION_KEYS[key]))
+            elif key in ROTATION_KEYS or key == AXES_KEY:
+                moved, turned = read_rotation(key, value, reading)
+                rotation = turned if rotation is None else _agreeing_rotation(rotation, turned)
+                if moved is not None:
+                    position = _only_position(position, moved)
+    except Misfit as error:
+        raise error.below(key) from None
+    except ValueInvalid as error:
+        raise Misfit(str(error), (key,)) from None
+    finally:
+        reading.degrees = outer_degrees
+    name, parent = mapping.get("name", ""), mapping.get("parent", "")
+    if not (name and parent and type(name) is type(parent) is str):
+        name, parent = read_name(mapping, "name"), read_name(mapping, "parent")
+    pose = Pose(position, rotation, name, parent)
+    return inverted(pose) if "inverse" in mapping and _read_flag(mapping["inverse"]) else pose
+
+
+def inverted(pose: Pose) -> Pose:
+    """Return the inverse numbers under the same names: what `inverse: true` means."""
+    components = rigid.inverse(*pose.components)
+    return pose._replace(
+        position=None if pose.position is None else components[:3],
+        rotation=None if pose.rotation is None else components[3:],
+    )
+
+
+def read_name(mapping: dict[str, Any], key: str) -> str | None:
+    """Read a frame's name, verbatim; None where the key is missing."""
+    if key not in mapping:
+        return None
+    value = mapping[key]
+    if type(value) is not str or not value:
+        found = "nothing" if value in (None, "") else kind(value)
+        raise Misfit(f"{key} must be a frame's name, found {found}; leave {key} out or quote the name", (key,))
+    return value
+
+
+def read_angle_unit(value: Any) -> bool:
+    """Read `angles: deg` or `angles: rad`; True for degrees."""
+    if value not in ("deg", "rad"):
+        found = repr(value) if type(value) is str else kind(value)
+        raise Misfit(f"angles must be deg or rad, found {found}", ("angles",))
+    return bool(value == "deg")
+
+
+def _read_flag(value: Any) -> bool:
+    if value not in ("true", "false"):
+        found = repr(value) if type(value) is str else kind(value)
+        raise Misfit(f"inverse must be true or false, found {found}", ("inverse",))
+    return bool(value == "true")
+
+
+def read_position(value: Any, unit: float) -> Vector:
+    """Read [x, y, z] or {x, y, z}, in metres or in `unit` = 0.001 of them."""
+    x, y, z = read_numbers(value, ("x", "y", "z"), partial=True)
+    return (x, y, z) if unit == 1.0 else (x / 1000.0, y / 1000.0, z / 1000.0)  # dividing rounds once: 0.1 from 100
+
+
+def _only_position(given: Vector | None, moved: Vector) -> Vector:
+    if given is not None:
+        raise Misfit("a 4x4 matrix is the whole pose; leave xyz out, or write the 3x3 rotation")
+    return moved
+
+
+def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
+    """Accept a second spelling of the position if it says the same."""
+    if first is None:
+        return second
+    apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
+    if apart > AGREEMENT * (1.0 + max(map(abs, first))):
+        raise NotARotation(f"two positions in one entry disagree by {apart:.6g} m; keep one")
+    return first
+
+
+def _agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
+    """Accept a second spelling of the rotation if it says the same."""
+    import math
+
+    apart = quaternion.distance(*first, *second, floats)
+    if apart > AGREEMENT:
+        raise NotARotation(f"two rotations in one entry disagree by {math.degrees(apart):.6g} degrees; keep one")
+    return first
+
+
+def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:
+    """Name every unknown key of an entry, each with its nearest known one."""
+    known = POSE_KEYS.union(also)
+    unknown = [key for key in mapping if key not in known]
+    if unknown:
+        named = "; ".join(f"unknown key {key!r}{did_you_mean(key, known).replace('; ', ', ')}" for key in unknown)
+        choices = ", ".join(REPRESENTATIONS)
+        raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)

@@ -1,0 +1,134 @@
+"""Small readers of a document's values: what every grammar here is made of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import ValueInvalid
+from frametool.text.numbers import NotFinite, parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.documents.source import Source
+
+    Path = tuple[str | int, ...]
+    Vector = tuple[float, float, float]
+    Quaternion = tuple[float, float, float, float]
+
+
+INDICES: tuple[Path, ...] = tuple((index,) for index in range(16))
+
+
+class Misfit(ValueInvalid):
+    """A value that does not fit, with the keys and indices that lead to it from where reading began."""
+
+    def __init__(self, message: str, path: Path = (), *, key: bool = False) -> None:
+        """Keep the path; `key` says that the last key itself is wrong rather than its value."""
+        super().__init__(message)
+        self.path = path
+        self.key = key
+
+    def below(self, *outer: str | int) -> Misfit:
+        """Return the same misfit as seen from further up."""
+        return type(self)(str(self), (*outer, *self.path), key=self.key)
+
+
+class NotARotation(Misfit):
+    """Numbers that were read well but make no rotation."""
+
+
+class Reading:
+    """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
+
+    __slots__ = ("degrees", "here", "normalize", "notes", "raw", "source")
+
+    def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False) -> None:
+        """Begin at the top of a document of `source`; `notes` collects (path, message).
+
+        raw: take messages as they are; whoever gets them judges.
+        """
+        self.source = source
+        self.degrees = degrees
+        self.normalize = normalize
+        self.raw = raw
+        self.here: Path = ()
+        self.notes: list[tuple[Path, str]] = []
+
+    def note(self, message: str, *path: str | int) -> None:
+        """Keep something worth telling about a place below `here`."""
+        self.notes.append(((*self.here, *path), message))
+
+
+def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """Call a reader for something further down; its misfits then name the whole path."""
+    try:
+        return read(*arguments, **options)
+    except Misfit as misfit:
+        raise misfit.below(*path) from None
+
+
+def kind(value: Any) -> str:
+    """Say in words what a value is."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, dict):
+        return "a mapping"
+    return "a list" if isinstance(value, list) else repr(value)
+
+
+def as_mapping(value: Any, what: str) -> dict[str, Any]:
+    """Take a value for a mapping, or say what stands there instead."""
+    if type(value) is not dict:
+        from frametool.documents.document import explain_scalar
+
+        hint = explain_scalar(value) if type(value) is str else None
+        raise Misfit(f"expected {what}, found {kind(value)}" + (f"; {hint}" if hint else ""))
+    return value
+
+
+def read_number(value: Any) -> float:
+    """Read one number."""
+    if type(value) is not str:
+        raise Misfit(f"expected a number, found {kind(value)}")
+    return parse_number(value)
+
+
+def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> list[Any]:
+    """Return the values of a list of fixed length, or of a mapping by these names, in their order.
+
+    partial: names missing in a mapping count as 0.
+    """
+    if type(value) is list:
+        if len(value) != len(names):
+            raise Misfit(f"expected {len(names)} numbers ({' '.join(names)}), found {len(value)}")
+        return value
+    if type(value) is not dict:
+        raise Misfit(f"expected [{', '.join(names)}], found {kind(value)}")
+    if unknown := [key for key in value if key not in names]:
+        raise Misfit(f"unknown key {unknown[0]!r}; expected {', '.join(names)}", (unknown[0],), key=True)
+    if (missing := [name for name in names if name not in value]) and not partial:
+        raise Misfit(f"missing {', '.join(missing)}; expected {', '.join(names)}")
+    return [value.get(name, "0") for name in names]
+
+
+def read_numbers(value: Any, names: Sequence[str], *, partial: bool = False) -> tuple[float, ...]:
+    """Read a list of fixed length, or a mapping by these names, as floats."""
+    texts = read_texts(value, names, partial=partial)
+    try:
+        return tuple(map(parse_number, texts))
+    except (ValueInvalid, TypeError):
+        raise misfit_among(texts, value, names, read_number) from None
+
+
+def misfit_among(texts: Sequence[Any], value: Any, names: Sequence[str], read: Callable[[Any], Any]) -> Misfit:
+    """Find which of several values does not fit, and name its place."""
+    for index, text in enumerate(texts):
+        try:
+            read(text)
+        except Misfit as error:
+            return error.below(names[index] if type(value) is dict else index)
+        except ValueInvalid as error:
+            misfit = NotARotation if isinstance(error, NotFinite) else Misfit
+            return misfit(str(error), (names[index] if type(value) is dict else index,))
+    return Misfit("expected numbers")

@@ -1,0 +1,108 @@
+"""What `check` finds: one finding, the rules there are, and how findings are written.
+
+Example:
+    robot.yaml:9:17: error: quaternion 0 0 0 0.9 has norm 0.9; .. [denormalized]
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.documents.json_writer import dump
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+# rule -> (level, what it is about); an error fails, a warning fails under --strict, a note never
+RULES = {
+    "syntax": ("error", "text that is not YAML, JSON or what a tool prints, or lacks a part"),
+    "empty": ("warning", "a file without any transform"),
+    "denormalized": ("error", "a quaternion or matrix that is no rotation"),
+    "rounded": ("warning", "a quaternion or matrix off by 1e-6 to 1e-3: normalised"),
+    "mirrored": ("error", "a left-handed matrix"),
+    "not-finite": ("error", "NaN or infinity"),
+    "degrees": ("warning", "bare angles beyond a full turn: degrees?"),
+    "w-first": ("warning", "x = 1 of x, y, z, w: half a turn, or the identity with w first?"),
+    "identity": ("warning", "an entry with neither position nor rotation"),
+    "slash": ("warning", "a frame name that begins with /"),
+    "noise": ("note", "lines that a tool printed between messages"),
+    "odd": ("warning", "anything else worth a look while reading"),
+    "self": ("error", "a frame that is its own parent"),
+    "cycle": ("error", "frames that form a cycle"),
+    "two-parents": ("error", "a standing frame with two parents"),
+    "two-poses": ("error", "a standing frame with two poses in its parent"),
+    "static-and-moving": ("error", "a frame that stands still here and moves there"),
+    "several-roots": ("note", "frames that hang in more than one tree"),
+    "repeated": ("note", "the same sample twice"),
+    "repeated-stamp": ("warning", "two different samples of a frame at one stamp"),
+    "backward": ("warning", "samples of a frame that come after later ones"),
+    "gap": ("warning", "a pause more than 5 times the usual one"),
+    "jump": ("warning", "a step more than 10 times the usual one, and longer than 0.1 m or 0.2 rad"),
+    "disagreement": ("error", "a frame that goes far and back all the time: two publishers that disagree"),
+    "reparented": ("note", "a frame whose parent changes once or twice"),
+    "flicker": ("error", "a frame whose parent goes back and forth: two publishers that disagree"),
+}
+
+
+class Finding(NamedTuple):
+    """Something wrong or odd: the rule that says so, in words, and where."""
+
+    rule: str
+    message: str
+    source: str
+    line: int = 0
+    column: int = 0
+
+    @property
+    def level(self) -> str:
+        """Return error, warning or note."""
+        return RULES[self.rule][0]
+
+
+def write_text(findings: Iterable[Finding]) -> str:
+    """Return one line a finding, as compilers do."""
+    return "".join(f"{_place(each)}: {each.level}: {each.message} [{each.rule}]\n" for each in findings)
+
+
+def _place(finding: Finding) -> str:
+    return ":".join(str(part) for part in (finding.source, finding.line, finding.column) if part)
+
+
+def write_json(findings: Iterable[Finding]) -> str:
+    """Return one object a line."""
+    return "".join(
+        dump(
+            {
+                "file": each.source,
+                "line": each.line or None,
+                "column": each.column or None,
+                "level": each.level,
+                "rule": each.rule,
+                "message": each.message,
+            }
+        )
+        + "\n"
+        for each in findings
+    )
+
+
+def write_github(findings: Iterable[Finding]) -> str:
+    """Return workflow commands, which GitHub shows beside the lines of a pull request."""
+    return "".join(map(_command, findings))
+
+
+def _command(finding: Finding) -> str:
+    level = "notice" if finding.level == "note" else finding.level
+    place = {"file": finding.source, "line": finding.line, "col": finding.column, "title": finding.rule}
+    properties = ",".join(f"{key}={_escaped(str(value), ',:')}" for key, value in place.items() if value)
+    return f"::{level} {properties}::{_escaped(finding.message)}\n"
+
+
+def _escaped(text: str, more: str = "") -> str:
+    """Escape what would end a workflow command or one of its properties."""
+    for character in "%\r\n" + more:
+        text = text.replace(character, f"%{ord(character):02X}")
+    return text
+
+
+WRITERS = {"text": write_text, "json": write_json, "github": write_github}

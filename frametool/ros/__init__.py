@@ -1,0 +1,1 @@
+"""ROS messages, echo text, bags, publisher arguments, Foxglove; tf2's words."""

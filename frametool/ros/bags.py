@@ -1,0 +1,79 @@
+"""Bags: ROS 1, ROS 2 (sqlite3) and MCAP files through the rosbags library, the extra `frametool[bag]`.
+
+Every topic that holds transforms is read, with whatever namespace; what comes by a topic `tf_static` stands still.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import FileProblem, FormatError, FrametoolError
+from frametool.frames.stamps import BILLION
+from frametool.geometry import floats, quaternion
+from frametool.ros.echo_blocks import unit_components
+from frametool.ros.samples import Sample
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.ros.samples import Tally
+
+TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
+
+
+def read_bag(path: str, tally: Tally) -> Iterator[Sample]:
+    """Yield the transforms of a bag in the order they were recorded.
+
+    A sample's line is the number of its message among those with transforms.
+    Raises FileProblem when the extra is missing, FormatError for a bag that is broken or holds no transforms.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+    except ImportError:
+        raise FileProblem(f"{path}: bags are read with an extra; install it: pip install 'frametool[bag]'") from None
+    from pathlib import Path
+
+    if path == "-":
+        raise FileProblem("stdin: a bag cannot be read from a pipe; name its file")
+    try:
+        with AnyReader([Path(path)]) as reader:
+            yield from _transforms(reader, path, tally)
+    except FrametoolError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything, also MemoryError
+        said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
+        raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None
+
+
+def _transforms(reader: Any, path: str, tally: Tally) -> Iterator[Sample]:
+    """Walk the messages of every topic with transforms."""
+    topics = [connection for connection in reader.connections if connection.msgtype in TYPES]
+    if not topics:
+        known = ", ".join(sorted({connection.topic for connection in reader.connections}))
+        raise FormatError(f"no transforms in the bag; its topics: {known or 'none'}", source=path)
+    for number, (topic, received_ns, data) in enumerate(reader.messages(connections=topics), 1):
+        still = topic.topic.endswith("tf_static")
+        for transform in reader.deserialize(data, topic.msgtype).transforms:
+            sample = _sample(transform, number, path, tally)
+            yield sample._replace(stamp_ns=None if still else sample.stamp_ns, received_ns=received_ns)
+
+
+def _sample(message: Any, number: int, path: str, tally: Tally) -> Sample:
+    """Return one TransformStamped as a sample."""
+    moved, turned = message.transform.translation, message.transform.rotation
+    numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
+    parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(message.child_frame_id)
+    components = unit_components(tally, number, *numbers)
+    if components is None or not parent or not child:
+        raise FormatError(f"message {number}: {_complaint(parent, child, numbers)}", source=path)
+    stamp = message.header.stamp
+    return Sample(parent, child, components, stamp.sec * BILLION + stamp.nanosec, number)
+
+
+def _complaint(parent: str, child: str, numbers: tuple[float, ...]) -> str:
+    """Say what is wrong with a transform that was refused."""
+    if not parent or not child:
+        return f"{parent!r} -> {child!r}: an empty frame name"
+    x, y, z, w = numbers[3:]
+    problem = quaternion.complaint(x, y, z, w, floats.length(x, y, z, w), normalize=False)
+    return f"{parent} -> {child}: {problem or 'its position is not finite'}"

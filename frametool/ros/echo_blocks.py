@@ -1,0 +1,155 @@
+"""The fast way through `ros2 topic echo /tf` and `rostopic echo /tf`: one pattern for one transform.
+
+    transforms:
+    - header:
+        stamp:
+          sec: 1683377979
+    ..
+
+The pattern takes what the two tools print for plain numbers and plain names, and nothing else: other documents are
+left to the full reader, so that both give the same records.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.frames.stamps import BILLION
+from frametool.geometry import floats, quaternion
+from frametool.ros.samples import Sample
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from frametool.ros.samples import Components, Tally
+
+INFINITE = float("inf")
+NUMBER = "([-+0-9.eE]+)"
+WHOLE = " *([0-9]{1,20})"
+NAME = r"""([A-Za-z0-9_/][\w/.+-]*|"[^"\\\n]+"|'[^'\n]+')"""
+
+ROS2 = """\
+- header:
+    stamp:
+      sec:WHOLE
+      nanosec:WHOLE
+    frame_id: NAME
+  child_frame_id: NAME
+  transform:
+    translation:
+      x: NUMBER
+      y: NUMBER
+      z: NUMBER
+    rotation:
+      x: NUMBER
+      y: NUMBER
+      z: NUMBER
+      w: NUMBER
+"""
+ROS1 = """\
+  -
+    header:
+      seq: [0-9]+
+      stamp:
+        secs:WHOLE
+        nsecs:WHOLE
+      frame_id: NAME
+    child_frame_id: NAME
+    transform:
+      translation:
+        x: NUMBER
+        y: NUMBER
+        z: NUMBER
+      rotation:
+        x: NUMBER
+        y: NUMBER
+        z: NUMBER
+        w: NUMBER
+"""
+
+
+class Spelling(NamedTuple):
+    """How one of the tools prints a transform: a matcher of it, how many lines it takes, in which it begins."""
+
+    match: Callable[[str, int], re.Match[str] | None]
+    lines: int
+    first: int
+
+
+def _spelling(layout: str) -> Spelling:
+    """Make the matcher of a layout; rostopic leaves a blank where a block opens."""
+    pattern = layout.replace(":\n", ": ?\n").replace("-\n", "- ?\n")
+    for mark, group in (("NUMBER", NUMBER), ("WHOLE", WHOLE), ("NAME", NAME)):
+        pattern = pattern.replace(mark, group)
+    first = layout[: layout.index("header")].count("\n")
+    return Spelling(re.compile(pattern, re.ASCII).match, layout.count("\n"), first)
+
+
+SPELLINGS = (_spelling(ROS2), _spelling(ROS1))
+HEAD = re.compile("transforms: ?\n").match
+TAIL = "---\n"
+
+
+class Blocks:
+    """Read plain documents of a text one after the other; stop where one is not plain.
+
+    `at` is the offset reached, always at the beginning of a document, and `line` its number.
+    """
+
+    __slots__ = ("at", "line", "tally", "text")
+
+    def __init__(self, text: str, line: int, tally: Tally) -> None:
+        """Begin at the top of a text."""
+        self.text = text
+        self.at = 0
+        self.line = line
+        self.tally = tally
+
+    def samples(self) -> Iterator[Sample]:
+        """Yield the records of the documents from `at` on, up to one that is not plain."""
+        text = self.text
+        while head := HEAD(text, self.at):
+            spelling = SPELLINGS[text.startswith("  ", head.end())]
+            found = []
+            at, line = head.end(), self.line + 1
+            while entry := spelling.match(text, at):
+                sample = _sample(entry.groups(), self.tally, line + spelling.first)
+                if sample is None:
+                    return
+                found.append(sample)
+                at = entry.end()
+                line += spelling.lines
+            if not text.startswith(TAIL, at) and (at < len(text) or not found):
+                return
+            self.at, self.line = at + len(TAIL), line + 1
+            yield from found
+
+
+def _sample(texts: tuple[str, ...], tally: Tally, line: int) -> Sample | None:
+    """Make the record of one transform's texts; None for one that needs a closer look."""
+    parent, child = tally.names[texts[2]], tally.names[texts[3]]
+    try:
+        components = unit_components(tally, line, *map(float, texts[4:]))
+    except ValueError:
+        return None
+    if not parent or not child or components is None:
+        return None
+    return Sample(parent, child, components, int(texts[0]) * BILLION + int(texts[1]), line)
+
+
+def unit_components(
+    tally: Tally, line: int, tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float
+) -> Components | None:
+    """Check the numbers of one transform as every door does; None for those that are refused there."""
+    squared = x * x + y * y + z * z + w * w
+    if not abs(tx) + abs(ty) + abs(tz) < INFINITE:
+        return None
+    if abs(squared - 1.0) <= quaternion.UNIT:
+        return tx, ty, tz, x, y, z, w
+    off = abs(squared**0.5 - 1.0)
+    if not off <= quaternion.TOLERATED:
+        return None
+    if off > quaternion.SILENT:
+        tally.rough.append(line)
+    return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)

@@ -1,0 +1,169 @@
+"""ROS messages as the tools print them: `rostopic echo` (ros1) and `ros2 topic echo` (ros2), `---` after each.
+
+    header:                     header:·             rostopic leaves a blank behind a key that opens a block,
+      frame_id: map               frame_id: "map"    quotes names, and aligns nanoseconds to nine columns
+
+A message is a mapping in the order of its fields; its stamps are mappings too. Nothing here knows which messages
+there are, only that a transform, a point and a pose have a header.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.json_writer import dump as json_dump
+from frametool.documents.yaml_writer import dump, quoted
+from frametool.frames.stamps import BILLION
+from frametool.geometry.representations import notation
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result, rotation_numbers
+from frametool.ros.message_parts import STAMPS
+from frametool.ros.messages import MESSAGE_KEYS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from frametool.frames.tree import FrameTree
+    from frametool.grammar.result import Style
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Return TransformStamped messages; frames without a name are "", a stamp that is not known is 0."""
+    return write_messages((transform_stamped(result, style) for result in results), style)
+
+
+def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
+    """Return PointStamped and Vector3Stamped messages; what is a message already stays one."""
+    return write_messages((_stamped(record, style) for record in records), style)
+
+
+def write_tree(tree: FrameTree, style: Style) -> str:
+    """Return one TFMessage with every edge, as a latched /tf_static holds it."""
+    edges = (Result(Pose.of(transform.components, child, parent)) for parent, child, transform in tree.edges())
+    return write_messages([{"transforms": [transform_stamped(edge, style) for edge in edges]}], style)
+
+
+def write_messages(messages: Iterable[dict[str, Any]], style: Style) -> str:
+    """Return any messages, one document each."""
+    return "".join(message_text(message, style) for message in messages)
+
+
+def message_text(message: dict[str, Any], style: Style) -> str:
+    """Return one message and the line that ends it."""
+    message = _respelled(message, style.form)
+    lines = _ros1_lines(message, style, "") if style.form == "ros1" else _ros2_lines(message, style, "")
+    return "".join(f"{line}\n" for line in lines) + "---\n"
+
+
+def _respelled(value: Any, form: str) -> Any:
+    """Return a message with the headers and stamps of the other ROS, where it has those."""
+    if isinstance(value, list):
+        return [_respelled(each, form) for each in value]
+    if not isinstance(value, dict):
+        return value
+    for seconds, nanoseconds in STAMPS:
+        if value.keys() == {seconds, nanoseconds}:
+            return dict(zip(STAMPS[form == "ros1"], (value[seconds], value[nanoseconds]), strict=True))
+    made = {key: _respelled(each, form) for key, each in value.items()}
+    if "frame_id" in made and "stamp" in made:
+        seq = {"seq": made.pop("seq", 0)}
+        return seq | made if form == "ros1" else made
+    return made
+
+
+def transform_stamped(result: Result, style: Style) -> dict[str, Any]:
+    """Return a TransformStamped in the order of its fields."""
+    pose = result.pose
+    rotation = rotation_numbers(pose, notation("quaternion"), style)
+    return {
+        "header": header(pose.parent, result.extras.get("stamp_ns"), style),
+        "child_frame_id": pose.name or "",
+        "transform": {
+            "translation": dict(zip("xyz", pose.components, strict=False)),
+            "rotation": dict(zip("xyzw", rotation, strict=True)),
+        },
+    }
+
+
+def header(frame: str | None, stamp_ns: int | None, style: Style) -> dict[str, Any]:
+    """Return a header; ROS 1 numbers its messages."""
+    first = {"seq": 0} if style.form == "ros1" else {}
+    return first | {"stamp": stamp(stamp_ns or 0, style.form), "frame_id": frame or ""}
+
+
+def stamp(stamp_ns: int, form: str) -> dict[str, int]:
+    """Return nanoseconds as a message has them; the second part is never negative."""
+    seconds, nanoseconds = STAMPS[form == "ros1"]
+    whole, rest = divmod(stamp_ns, BILLION)
+    return {seconds: whole, nanoseconds: rest}
+
+
+def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
+    """Put a point or vector into its message; leave alone what has a header or is another message."""
+    if not MESSAGE_KEYS.isdisjoint(record) or not (position := _position(record)):
+        return record
+    key = "vector" if "vector" in record else "point"
+    return {"header": header(record.get("frame"), record.get("stamp_ns"), style), key: position}
+
+
+def _position(record: dict[str, Any]) -> dict[str, float] | None:
+    """Find the coordinates of a point in any of its spellings."""
+    inner = next((value for value in record.values() if isinstance(value, (list, dict))), record)
+    values: list[Any] = inner if isinstance(inner, list) else [inner.get(axis) for axis in "xyz"]
+    is_point = len(values) == 3 and all(type(each) is float for each in values)
+    return dict(zip("xyz", values, strict=True)) if is_point else None
+
+
+def _ros2_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[str]:
+    """Write block style as PyYAML does: items of a list stand as far left as its key."""
+    for key, value in mapping.items():
+        if isinstance(value, dict) and value:
+            yield f"{indent}{key}:"
+            yield from _ros2_lines(value, style, indent + "  ")
+        elif isinstance(value, list) and value:
+            yield f"{indent}{key}:"
+            for item in value:
+                yield from _ros2_item(item, style, indent)
+        else:
+            yield f"{indent}{key}: {_ros2_scalar(value, style)}"
+
+
+def _ros2_item(item: Any, style: Style, indent: str) -> Iterator[str]:
+    if not isinstance(item, dict):
+        yield f"{indent}- {_ros2_scalar(item, style)}"
+        return
+    lines = _ros2_lines(item, style, indent + "  ")
+    yield f"{indent}- {next(lines).lstrip()}"
+    yield from lines
+
+
+def _ros2_scalar(value: Any, style: Style) -> str:
+    if not isinstance(value, str):
+        return dump(value, style.number).rstrip("\n")
+    safe = quoted(value)
+    return safe if safe == value or not value.isprintable() else "'" + value.replace("'", "''") + "'"
+
+
+def _ros1_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[str]:
+    """Write as genpy does: a list of messages in items of their own, a list of numbers on one line."""
+    for key, value in mapping.items():
+        if isinstance(value, dict):
+            yield f"{indent}{key}: "
+            yield from _ros1_lines(value, style, indent + "  ")
+        elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
+            yield f"{indent}{key}: "
+            for item in value:
+                yield f"{indent}  - "
+                yield from _ros1_lines(item, style, indent + "    ")
+        elif isinstance(value, list):
+            yield f"{indent}{key}: [{', '.join(_ros1_scalar(item, style) for item in value)}]"
+        else:
+            yield f"{indent}{key}: {_ros1_scalar(value, style):>{9 if key == 'nsecs' else 0}}"
+
+
+def _ros1_scalar(value: Any, style: Style) -> str:
+    if isinstance(value, bool):
+        return str(value)
+    if isinstance(value, str):
+        return json_dump(value)
+    return style.number(value) if isinstance(value, float) else str(value)

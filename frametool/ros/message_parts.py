@@ -1,0 +1,98 @@
+"""What ROS messages are made of: header, stamp, frame names; read from plain values."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from frametool.frames.stamps import BILLION
+from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
+from frametool.grammar.rotation import read_rotation
+
+if TYPE_CHECKING:
+    from frametool.grammar.readers import Path, Quaternion, Reading, Vector
+
+STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
+_INTEGER = r"(?a) *[-+]?\d{1,25}"
+_LEFT_OUT = "<(array|sequence) type: .*>"
+
+
+def only(mapping: dict[str, Any], known: tuple[str, ...]) -> None:
+    """Refuse keys that are not known."""
+    for key in mapping:
+        if key not in known:
+            raise Misfit(f"unknown key {key!r}; expected {', '.join(known)}", (key,), key=True)
+
+
+def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
+    """Return a mapping inside a message; `what` says which keys the message has."""
+    if key not in message:
+        raise Misfit(f"missing {key}; {what}")
+    inner: dict[str, Any] = within((key,), as_mapping, message[key], f"{key} as a mapping")
+    return inner
+
+
+def frame_of(
+    mapping: dict[str, Any], key: str, path: Path, reading: Reading, *, may_be_empty: bool = False
+) -> str:
+    """Read a frame's name; one leading `/` goes, as tf2 does it, and is noted."""
+    name = mapping.get(key)
+    if may_be_empty and name in ("", None) and key in mapping:
+        return ""
+    here = (*path, key) if key in mapping else path
+    if type(name) is not str or not name:
+        raise Misfit(f"{key} must name a frame, found {kind(name or None)}", here)
+    if name.startswith("/") and len(name) > 1:
+        reading.note(slash_note(name), *here)
+        return name[1:]
+    return name
+
+
+def slash_note(name: str) -> str:
+    """Say that a name lost its leading `/`."""
+    return f"frame {name!r}: the leading / is no part of a name and was left out"
+
+
+def header_stamp(header: dict[str, Any]) -> int | None:
+    """Read the stamp of a header as nanoseconds; None where there is none."""
+    if "stamp" not in header:
+        return None
+    stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"])
+    return stamp_ns
+
+
+def read_stamp(value: Any) -> int:
+    """Read {sec, nanosec}, {secs, nsecs} or {sec, nsec} as nanoseconds."""
+    stamp = as_mapping(value, "stamp as {sec, nanosec}")
+    for seconds, nanoseconds in STAMPS:
+        if set(stamp) == {seconds, nanoseconds}:
+            return _whole(stamp, seconds) * BILLION + _whole(stamp, nanoseconds)
+    raise Misfit("expected stamp as {sec, nanosec} or {secs, nsecs}")
+
+
+def _whole(stamp: dict[str, Any], key: str) -> int:
+    text = stamp[key]
+    if type(text) is not str or not re.fullmatch(_INTEGER, text):
+        raise Misfit(f"{key} must be a whole number, found {kind(text)}", (key,))
+    return int(text)
+
+
+def whole_list(value: Any, what: str) -> list[Any]:
+    """Take a value for a list that was printed whole; the tools cut long ones unless told otherwise."""
+    if type(value) is str and re.fullmatch(_LEFT_OUT, value):
+        raise Misfit(f"the numbers are not there, only {value!r}: record without --no-arr (--noarr)")
+    if type(value) is not list:
+        raise Misfit(f"expected {what}, found {kind(value)}")
+    if "..." in value:
+        raise Misfit("the list was cut short here; record with `ros2 topic echo --full-length`", (value.index("..."),))
+    return value
+
+
+def read_rigid(mapping: dict[str, Any], keys: tuple[str, str], reading: Reading) -> tuple[Vector, Quaternion]:
+    """Read position and rotation under the keys that a kind of message has for them."""
+    for key in keys:
+        if key not in mapping:
+            raise Misfit(f"missing {key}")
+    x, y, z = within(keys[:1], read_numbers, mapping[keys[0]], ("x", "y", "z"))
+    _, rotation = within(keys[1:], read_rotation, "quaternion", mapping[keys[1]], reading)
+    return (x, y, z), rotation

@@ -1,0 +1,157 @@
+"""The arguments of static_transform_publisher, one call a line: the pose of the child in its parent.
+
+    --x 0.1 --y 0.0 --z 0.2 --qx 0.0 --qy 0.0 --qz 0.0 --qw 1.0 --frame-id base --child-frame-id camera      static2
+    0.1 0.0 0.2 0.0 0.0 0.0 1.0 base camera                                                                  static1
+
+Metres and radians; quaternions x, y, z, w. Angles are --roll --pitch --yaw in the new spelling and yaw, pitch, roll
+in the old one, about fixed axes. The old tf package has a period in ms at the end. `ros2 run tf2_ros
+static_transform_publisher` may stand before them.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from frametool.errors import ValueInvalid
+from frametool.geometry.representations import notation
+from frametool.grammar.pose import Pose
+from frametool.grammar.readers import INDICES, read_number
+from frametool.grammar.result import rotation_numbers
+from frametool.grammar.rotation import ROTATION_KEYS, rotation_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from frametool.frames.tree import FrameTree
+    from frametool.grammar.readers import Reading
+    from frametool.grammar.result import Result, Style
+
+CALL = "static_transform_publisher"
+XYZ = ("x", "y", "z")
+QUATERNION = ("qx", "qy", "qz", "qw")
+RPY = ("roll", "pitch", "yaw")
+FRAMES = ("frame-id", "child-frame-id")
+FLAGS = (*XYZ, *QUATERNION, *RPY, *FRAMES)
+_NUMBER = re.compile(r"[-+]?(\d|\.\d)")
+_FORMS = "x y z qx qy qz qw PARENT CHILD, or x y z yaw pitch roll PARENT CHILD"
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Return one line a pose; it must say which frame it is in which, and no frame may have two poses.
+
+    Raises ValueInvalid.
+    """
+    poses: dict[str, Pose] = {}
+    lines, moving = [], []
+    for pose in (result.pose for result in results):
+        lines.append(f"{_line(pose, style)}\n")
+        known = poses.setdefault(pose.name or "", pose)
+        if (known.parent, known.components) != (pose.parent, pose.components):
+            moving.append(known.name or "")
+    if moving:
+        raise ValueInvalid(moving_frames(dict.fromkeys(moving)))
+    return "".join(lines)
+
+
+def moving_frames(names: Iterable[str]) -> str:
+    """Say that frames have more than one pose."""
+    return f"frames move and cannot be published as static: {', '.join(names)}"
+
+
+def write_tree(tree: FrameTree, style: Style) -> str:
+    """Return one line an edge."""
+    return "".join(
+        f"{_line(Pose.of(transform.components, child, parent), style)}\n" for parent, child, transform in tree.edges()
+    )
+
+
+def _line(pose: Pose, style: Style) -> str:
+    from shlex import quote
+
+    if not pose.name or not pose.parent:
+        raise ValueInvalid(f"{CALL} needs the names of both frames; give name: and parent:")
+    angles = bool(style.notations) and style.notations[0].representation.name == "rpy"
+    numbers = rotation_numbers(pose, notation("rpy_rad" if angles else "quaternion"), style)
+    position = [style.number(value) for value in pose.components[:3]]
+    rotation = [style.number(value) for value in numbers]
+    if style.form == "static1":
+        cells = [*position, *(reversed(rotation) if angles else rotation), quote(pose.parent), quote(pose.name)]
+        return " ".join(cells)
+    cells = [*position, *rotation, quote(pose.parent), quote(pose.name)]
+    names = (*XYZ, *(RPY if angles else QUATERNION), *FRAMES)
+    return " ".join(f"--{name} {cell}" for name, cell in zip(names, cells, strict=True))
+
+
+def read_call(line: str, reading: Reading) -> Pose:
+    """Read one call as a shell would take it apart.
+
+    Raises ValueInvalid.
+    """
+    from shlex import split
+
+    try:
+        words = split(line, comments=True)
+    except ValueError as error:
+        raise ValueInvalid(f"a quote is not closed ({str(error).lower()})") from None
+    starts = [index for index, word in enumerate(words) if word.rsplit("/", 1)[-1] == CALL]
+    words = words[starts[-1] + 1 :] if starts else words
+    if words[-1:] == ["&"]:  # a script starts the tool in the background
+        del words[-1]
+    if any(word.startswith("--") for word in words):
+        return read_flags(_flags(words), reading)
+    return read_positional(words, reading)
+
+
+def _flags(words: Sequence[str]) -> dict[str, str]:
+    """Pair flags and values, `--x 1` or `--x=1`."""
+    found: dict[str, str] = {}
+    rest = iter(words)
+    for word in rest:
+        name, equals, value = word.removeprefix("--").partition("=")
+        if not word.startswith("--") or name not in FLAGS:
+            raise ValueInvalid(f"unknown argument {word!r}; the flags are --{', --'.join(FLAGS)}")
+        found[name] = value if equals else next(rest, "")
+        if not found[name]:
+            raise ValueInvalid(f"not enough arguments for --{name}")
+    return found
+
+
+def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
+    """Read the new spelling; what is missing is 0 or the identity."""
+    both = [name for name in (*QUATERNION, *RPY) if name in flags]
+    if any(name in QUATERNION for name in both) and any(name in RPY for name in both):
+        raise ValueInvalid(f"a quaternion and angles at once (--{', --'.join(both)}); keep one")
+    for name in FRAMES:
+        if not flags.get(name):
+            raise ValueInvalid(f"missing --{name}: a transform is that of a child frame in its parent")
+    angles = any(name in RPY for name in both)
+    rotation = [flags.get(name, "0") for name in RPY] if angles else [flags.get(name, "0") for name in QUATERNION]
+    if not angles and "qw" not in flags:
+        rotation[3] = "1"  # the tool's default, also beside other components: refused below unless they are 0
+    numbers = [flags.get(name, "0") for name in XYZ]
+    key = "rpy" if angles else "quaternion"
+    return _pose(numbers, key, rotation, flags["frame-id"], flags["child-frame-id"], reading)
+
+
+def read_positional(words: Sequence[str], reading: Reading) -> Pose:
+    """Read the old spelling: 8 or 9 words, maybe a period in ms after them; a numeric seventh means a quaternion."""
+    angles = len(words) >= 7 and not _NUMBER.match(words[6])
+    size = 6 if angles else 7
+    if len(words) not in (size + 2, size + 3):
+        raise ValueInvalid(f"{CALL} takes {_FORMS}; found {len(words)} words")
+    rotation = words[5:2:-1] if angles else words[3:7]
+    return _pose(words[:3], "rpy" if angles else "quaternion", rotation, words[size], words[size + 1], reading)
+
+
+def _pose(
+    position: Sequence[str], key: str, rotation: Sequence[str], parent: str, child: str, reading: Reading
+) -> Pose:
+    """Check the numbers of a call."""
+    x, y, z = map(read_number, position)
+    turned = rotation_of(ROTATION_KEYS[key], rotation, INDICES, reading)
+    if not parent or not child:
+        raise ValueInvalid(f"an empty frame name; {CALL} takes {_FORMS}")
+    if parent == child:
+        raise ValueInvalid(f"frame {child!r} is its own parent")
+    return Pose((x, y, z), turned, child, parent)

@@ -1,0 +1,82 @@
+"""One record of a recording: where a frame was seen from its parent, at one time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from frametool.ros.message_parts import slash_note
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import TypeAlias
+
+    Components: TypeAlias = tuple[float, float, float, float, float, float, float]
+
+
+class Sample(NamedTuple):
+    """The pose of `child` in `parent` as tx, ty, tz (metres), x, y, z, w (unit).
+
+    stamp_ns is None where the source says that the edge stands still; line is that of the record, 0 if there is none;
+    received_ns says when the recorder got it, if that is known.
+    """
+
+    parent: str
+    child: str
+    components: Components
+    stamp_ns: int | None
+    line: int = 0
+    received_ns: int | None = None
+
+
+class Names(dict[str, str]):
+    """Frame names by the text they stand in: quotes off, one leading `/` off; each is worked out once."""
+
+    def __init__(self) -> None:
+        """Begin with no name known; `slashed` collects those that began with `/`."""
+        super().__init__()
+        self.slashed: list[str] = []
+
+    def __missing__(self, text: str) -> str:
+        """Work a name out; "" for a text that YAML takes for nothing, which is no name."""
+        name = text[1:-1].replace("''", "'") if text[0] in "\"'" else text
+        self[text] = "" if text in {"null", "Null", "NULL"} else self.bare(name)
+        return self[text]
+
+    def bare(self, name: str) -> str:
+        """Take one leading `/` off, as tf2 does, and remember it."""
+        if not name.startswith("/") or len(name) == 1:
+            return name
+        if name not in self.slashed:
+            self.slashed.append(name)
+        return name[1:]
+
+
+class Tally:
+    """What is worth telling about a recording once it is read: counted here, told at the end."""
+
+    __slots__ = ("names", "noise", "notes", "others", "rough")
+
+    def __init__(self) -> None:
+        """Begin with nothing to tell; `rough` and `noise` hold line numbers, `others` and `notes` count."""
+        self.names = Names()
+        self.noise: list[tuple[int, str]] = []
+        self.rough: list[int] = []
+        self.others: dict[str, int] = {}
+        self.notes: dict[str, int] = {}
+
+    def told(self) -> Iterator[tuple[int, str]]:
+        """Yield one sentence for each kind of oddity, and the first line it is about."""
+        if self.rough:
+            count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
+            yield self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised"
+        if self.noise:
+            line, text = self.noise[0]
+            count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
+            yield line, f"{count} printed between messages skipped: {text!r}"
+        if self.others:
+            kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
+            yield 1, f"messages without transforms were left out: {kinds}"
+        for name in self.names.slashed:
+            self.notes.setdefault(slash_note(name), 1)
+        yield from ((line, note) for note, line in self.notes.items())

@@ -1,0 +1,149 @@
+"""Where in a row the results go: which columns stay, which are replaced, what the header then says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+from frametool.stream.faults import Misused
+from frametool.stream.text_parts import Const, In, Instead, Out
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.stream.text_parts import Piece
+
+Stretch: TypeAlias = tuple[int, int, str, str]
+
+
+class Kept(NamedTuple):
+    """A column of the input."""
+
+    place: int
+
+
+class New(NamedTuple):
+    """A number of the result, under its name."""
+
+    number: int
+    name: str
+
+
+class Told(NamedTuple):
+    """The same text in every row, in place of a column."""
+
+    place: int
+    text: str
+
+
+Column: TypeAlias = Kept | New | Told
+
+
+class Layout(NamedTuple):
+    """The columns of the output, and from where in a row its pieces come.
+
+    places: the columns our numbers are read from; frames: those that name frames; time: that of the stamps
+    stretches: (first, last column, where it begins, where it ends) of the text that passes
+    """
+
+    columns: tuple[Column, ...]
+    places: tuple[int, ...]
+    frames: tuple[int, ...]
+    pieces: tuple[Piece, ...]
+    stretches: tuple[Stretch, ...]
+    delimiter: bytes
+    null: bytes
+    time: int | None = None
+
+    def header(self, raw: Sequence[bytes]) -> bytes:
+        """Return the output's header, the kept names as they were written."""
+        cells = [
+            quoted(column.name, self.delimiter) if isinstance(column, New) else raw[column.place]
+            for column in self.columns
+        ]
+        return (self.delimiter or b" ").join(cells)
+
+    def null_row(self, cells: Sequence[bytes]) -> bytes:
+        """Return a row without a result, as far as its cells go."""
+        most = max((column.place for column in self.columns if not isinstance(column, New)), default=-1)
+        padded = [*cells, *[self.null] * (most + 1)]
+        given = [self.null if isinstance(column, New) else padded[column.place] for column in self.columns]
+        return (self.delimiter or b" ").join([*given, *cells[max(most + 1, max(self.places, default=-1) + 1) :]])
+
+
+def quoted(name: str, delimiter: bytes) -> bytes:
+    """Write a cell, in quotes where a reader would split it."""
+    text = name.encode()
+    if delimiter and any(mark in text for mark in (delimiter, b'"', b"\n", b"\r")):
+        return b'"' + text.replace(b'"', b'""') + b'"'
+    return text
+
+
+def lay_out(
+    columns: Sequence[Column], places: Sequence[int], frames: Sequence[int], width: int, delimiter: bytes
+) -> Layout:
+    """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch."""
+    between = delimiter or b" "
+    pieces: list[Piece] = []
+    stretches: list[Stretch] = []
+    groups = _grouped(columns)
+    for at, group in enumerate(groups):
+        last = at == len(groups) - 1
+        if isinstance(group[0], Kept):
+            begin, end = group[0].place, group[-1].place  # type: ignore[union-attr]
+            follows = not last and not isinstance(groups[at + 1][0], Kept)
+            ending = "line" if last and end == width - 1 else "gap" if follows and end < width - 1 else "cell"
+            stretches.append(
+                (begin, end, "line" if not at and not begin else "gap" if at and begin else "cell", ending)
+            )
+            pieces.append(In(len(stretches) - 1))
+            if follows and end == width - 1:
+                pieces.append(Const(between))
+        else:
+            pieces += _written(group, between, delimiter, stretches)
+            if not last and not isinstance(groups[at + 1][0], Kept):
+                pieces.append(Const(between))
+    if not stretches or stretches[-1][3] != "line":
+        stretches.append((width - 1, width - 1, "end", "line"))
+        pieces.append(In(len(stretches) - 1))
+    return Layout(
+        tuple(columns),
+        tuple(places),
+        tuple(frames),
+        tuple(pieces),
+        tuple(stretches),
+        delimiter,
+        b"" if delimiter else b"nan",
+    )
+
+
+def _written(group: Sequence[Column], between: bytes, delimiter: bytes, stretches: list[Stretch]) -> list[Piece]:
+    if isinstance(group[0], Told):
+        stretches.append((group[0].place, group[0].place, "cell", "cell"))
+        return [Instead(len(stretches) - 1, quoted(group[0].text, delimiter))]
+    first, last = group[0].number, group[-1].number  # type: ignore[union-attr]
+    return [Out(first, last + 1, between)]
+
+
+def _grouped(columns: Sequence[Column]) -> list[list[Column]]:
+    """Put neighbours of one kind together: columns that follow one another, numbers that do."""
+    groups: list[list[Column]] = []
+    for column in columns:
+        before = groups[-1][-1] if groups else None
+        if (isinstance(column, Kept) and isinstance(before, Kept) and column.place == before.place + 1) or (
+            isinstance(column, New) and isinstance(before, New) and column.number == before.number + 1
+        ):
+            groups[-1].append(column)
+        else:
+            groups.append([column])
+    return groups
+
+
+def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
+    """Raise Misused if a new column would be called as one that stays, or as another new one."""
+    kept = [names[column.place] for column in columns if not isinstance(column, New)]
+    new = [column.name for column in columns if isinstance(column, New)]
+    if twice := sorted({name for name in new if new.count(name) > 1}):
+        raise Misused(f"--to: columns {', '.join(twice)} would stand twice")
+    clash = sorted(set(new).intersection(kept))
+    if clash:
+        raise Misused(f"columns {', '.join(clash)} would stand twice; name the new ones with --prefix")

@@ -1,0 +1,301 @@
+"""What changes in the text of a record: numbers where they stand, members that are replaced, added or left out.
+
+Everything else stays as it is, byte for byte.  Knows the syntax of JSON and YAML only as far as members go: what
+stands between them, and how one is written.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.geometry.representations import notation
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result, Style
+from frametool.stream.find_poses import XYZ
+from frametool.stream.row_layout import POSE, Target, axes_of
+from frametool.stream.text_parts import Const, IfLocked, Out
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.documents.nodes import Node
+    from frametool.stream.find_poses import Holder
+    from frametool.stream.request import Request
+    from frametool.stream.text_parts import Piece
+
+STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
+MARK = "\0"
+SAMPLE = (0.5, 0.5, 0.5, 0.5)
+
+
+class Edit(NamedTuple):
+    """A stretch of the text and what stands there instead; an empty stretch is an insertion."""
+
+    start: int
+    end: int
+    pieces: tuple[Piece, ...]
+
+
+def target_of(holder: Holder, request: Request) -> Target:
+    """Settle how a record's result is written: as it was read unless told; a product always has both parts."""
+    shape, operation = holder.shape, request.operation
+    if shape.kind != POSE:
+        return Target(shape.unit, ())
+    forms = request.notations or ((shape.notation,) if shape.notation else ())
+    product = not operation.changes_nothing and not (operation.inverse and operation.left is operation.right is None)
+    product = product or operation.moves
+    if not forms and product:
+        forms = (notation("quaternion"),)
+    placed = shape.whole or shape.unit is not None or product
+    told = [(form, shape.degrees if not request.notations else request.in_degrees(form)) for form in forms]
+    whole = (
+        placed
+        and len(forms) == 1
+        and forms[0].representation.name == "matrix"
+        and (shape.whole or bool(request.notations))
+    )
+    unit = (shape.unit or 1.0) if placed and not whole else None
+    return Target(unit, tuple(told), request.keep_sign, whole)
+
+
+class Editor:
+    """The edits of one holder in a record; `first` numbers the results from there."""
+
+    def __init__(
+        self, text: str, root: Node, holder: Holder, target: Target, request: Request, *, json: bool, first: int
+    ) -> None:
+        """Know the text and what is wanted."""
+        self.text = text
+        self.root = root
+        self.node = root.at(holder.path)
+        self.holder = holder
+        self.target = target
+        self.request = request
+        self.json = json
+        self.first = first
+        self.edits: list[Edit] = []
+        self.dropped: set[str] = set()
+        self.slots: list[Node | None] = [None if path is None else root.at(path) for path in holder.numbers]
+
+    def run(self) -> list[Edit]:
+        """Return the edits, in no order."""
+        if type(self.node.value) is not dict:
+            return self._numbers(range(len(self.slots)), 0) if self._same_rotation() else self._rewritten()
+        self._names()
+        self._position()
+        if self.holder.shape.kind == POSE:
+            self._rotation()
+            self.dropped.update({*STALE, "inverse", *self.holder.others} - set(self.holder.flat))
+        self._leave_out()
+        return self.edits
+
+    def _same_rotation(self) -> bool:
+        """Tell whether the rotation is written as it was read, number by number."""
+        shape, target = self.holder.shape, self.target
+        same = [(shape.notation, shape.degrees)] == list(target.notations) if shape.notation else not target.notations
+        return same and shape.whole == target.whole and not self.holder.inverse
+
+    def _numbers(self, slots: Sequence[int], first: int) -> list[Edit]:
+        """Put numbers of the result where the slots are."""
+        for index, slot in enumerate(slots):
+            node = self.slots[slot]
+            if node is not None:
+                out = self.first + first + index
+                self.edits.append(
+                    Edit(node.start + bool(node.quote), node.end - bool(node.quote), (Out(out, out + 1, b""),))
+                )
+        return self.edits
+
+    def _position(self) -> None:
+        """Write the position where it stands, or as a member of its own; a whole matrix takes it in."""
+        key, target = self.holder.key, self.target
+        if self.holder.shape.unit is None:
+            if target.unit is not None:
+                anchor = self.node.value[self.holder.rotation][0] if self.holder.rotation else self._first_key()
+                self._insert_before(anchor, self._member({"xyz": list(SAMPLE[:3])}, 0))
+            return
+        if target.unit is None:
+            self.dropped.update((key,) if key else XYZ)
+        elif None in self.slots[:3]:
+            self._replace(self.node.value[key], self._member({key: list(SAMPLE[:3])}, 0))
+        elif not self._position_stays():
+            self._numbers(range(3), 0)
+
+    def _position_stays(self) -> bool:
+        """Tell whether only the notation of the rotation changes: then the position keeps its text."""
+        request = self.request
+        moves = request.operation.moves or request.way is not None or request.timed is not None
+        return request.operation.changes_nothing and not moves and not self.holder.inverse
+
+    def _rotation(self) -> None:
+        """Write the rotation where it stands, or its members anew."""
+        first = 0 if self.target.unit is None else 3
+        slots = range(0 if self.holder.shape.unit is None else 3, len(self.slots))
+        rotation = self.holder.rotation
+        members = self._members(first)
+        if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
+            self._numbers(slots, first)
+            members = []
+        elif rotation:
+            self._replace(self.node.value[rotation], members.pop(0) if members else ())
+            self.dropped.update(set(self.holder.flat) - {rotation})
+        count = (
+            first + sum(len(form.representation.columns) for form, _ in self.target.notations) + self.target.whole * 7
+        )
+        members += self._extras(count)
+        after = self.node.value[rotation or self.holder.key][1] if (rotation or self.holder.key) else self._last_value()
+        for member in members:
+            self._insert_after(after, member)
+
+    def _members(self, first: int) -> list[tuple[Piece, ...]]:
+        """Return one member for each notation, and the flag of a lock."""
+        members = []
+        for form, degrees in self.target.notations:
+            position = SAMPLE[:3] if self.target.whole else None
+            style = Style("json", (form,), degrees=degrees)
+            entry = Result(Pose(position, SAMPLE)).mapping(style)
+            entry.pop("gimbal_lock", None)
+            entry.pop("xyz", None)
+            members.append(self._member(entry, first))
+            first += len(form.representation.columns)
+        if any(axes_of(form) for form, _ in self.target.notations):
+            members.append(
+                tuple(
+                    IfLocked(piece.text) for piece in self._member({"gimbal_lock": True}, 0) if isinstance(piece, Const)
+                )
+            )
+        return members
+
+    def _extras(self, first: int) -> list[tuple[Piece, ...]]:
+        return [self._member({name: 0.5}, first + index) for index, name in enumerate(self.request.operation.extras)]
+
+    def _names(self) -> None:
+        """Rename the frames as the operation does."""
+        request, holder = self.request, self.holder
+        name, parent = holder.name[0], holder.parent[0]
+        if request.rename is not None:
+            parent, name = request.rename(parent, name)
+        elif request.operation.moves:
+            parent = request.told
+        if self._has_swapped(name, parent):
+            return
+        first = self._first_key()
+        keys = ("name", "parent") if holder.shape.kind == POSE else ("name", "frame")
+        for key, new, (old, path) in zip(keys, (name, parent), (holder.name, holder.parent), strict=True):
+            if new == old:
+                continue
+            if old is None:
+                self._insert_before(first, self._member({key: new}, 0))
+            elif new is None and path[:-1] == holder.path:
+                self.dropped.add(key)
+            else:
+                node = self.root.at(path)
+                self.edits.append(Edit(node.start, node.end, (Const(self._text(new or "").encode()),)))
+
+    def _has_swapped(self, name: str | None, parent: str | None) -> bool:
+        """Call the one frame there is by the other key, where that is all that changes."""
+        old, new = (self.holder.name[0], self.holder.parent[0]), (name, parent)
+        if new != old[::-1] or None not in new or new == old:
+            return False
+        key = "name" if old[1] is None else "parent"
+        if key not in self.node.value:
+            return False
+        node = self.node.value[key][0]
+        self.edits.append(
+            Edit(node.start, node.end, (Const(self._text("parent" if key == "name" else "name").encode()),))
+        )
+        return True
+
+    def _text(self, value: str) -> str:
+        return self._dumped(value).rstrip("\n")
+
+    def _dumped(self, value: Any) -> str:
+        def number(_value: float) -> str:
+            return MARK
+
+        if self.json:
+            from frametool.documents.json_writer import dump
+
+            return dump(value, number) if value is not True else "true"
+        from frametool.documents.yaml_writer import dump as dump_yaml
+
+        return dump_yaml(value, number)
+
+    def _member(self, entry: dict[str, Any], first: int) -> tuple[Piece, ...]:
+        """Write members in the record's style, each number a piece."""
+        if self.json:
+            text = ", ".join(
+                f"{self._text(key)}: {'true' if value is True else self._dumped(value)}" for key, value in entry.items()
+            )
+        elif self.node.flow:
+            text = ", ".join(f"{self._text(key)}: {_flow(value, self._text)}" for key, value in entry.items())
+        else:
+            text = self._dumped(entry).rstrip("\n").replace("\n", "\n" + " " * self._indent())
+        return tuple(_with_numbers(text, self.first + first))
+
+    def _indent(self) -> int:
+        return self._first_key().column
+
+    def _first_key(self) -> Node:
+        key, _ = next(iter(self.node.value.values()))
+        return key  # type: ignore[no-any-return]
+
+    def _last_value(self) -> Node:
+        return list(self.node.value.values())[-1][1]  # type: ignore[no-any-return]
+
+    def _between(self) -> str:
+        return ", " if self.json or self.node.flow else "\n" + " " * self._indent()
+
+    def _insert_before(self, key: Node, pieces: tuple[Piece, ...]) -> None:
+        self.edits.append(Edit(key.start, key.start, (*pieces, Const(self._between().encode()))))
+
+    def _insert_after(self, value: Node, pieces: tuple[Piece, ...]) -> None:
+        conditional = any(isinstance(piece, IfLocked) for piece in pieces)
+        between: Piece = IfLocked(self._between().encode()) if conditional else Const(self._between().encode())
+        self.edits.append(Edit(value.end, value.end, (between, *pieces)))
+
+    def _replace(self, member: tuple[Node, Node], pieces: tuple[Piece, ...]) -> None:
+        self.edits.append(Edit(member[0].start, member[1].end, pieces))
+
+    def _rewritten(self) -> list[Edit]:
+        """Write a bare matrix as a mapping."""
+        members = self._members(0 if self.target.unit is None else 3)
+        if self.target.unit is not None:
+            members.insert(0, self._member({"xyz": list(SAMPLE[:3])}, 0))
+        pieces = [piece for member in members for piece in (Const(b", "), *member)]
+        self.edits.append(Edit(self.node.start, self.node.end, (Const(b"{"), *pieces[1:], Const(b"}"))))
+        return self.edits
+
+    def _leave_out(self) -> None:
+        """Leave members out, with what parts them from their neighbours."""
+        members = list(self.node.value.items())
+        kept = [index for index, (key, _) in enumerate(members) if key not in self.dropped]
+        for index, (key, (key_node, value)) in enumerate(members):
+            if key not in self.dropped:
+                continue
+            before = [each for each in kept if each < index]
+            if before:
+                start = members[index - 1][1][1].end
+                self.edits.append(Edit(start, value.end, ()))
+            else:
+                end = members[index + 1][1][0].start if index + 1 < len(members) else value.end
+                self.edits.append(Edit(key_node.start, end, ()))
+
+
+def _flow(value: Any, text: Any) -> str:
+    """Write a value in brackets."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(each, text)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_flow(each, text) for each in value) + "]"
+    return str(text(value))
+
+
+def _with_numbers(text: str, first: int) -> Iterator[Piece]:
+    """Split a text at the marks of numbers."""
+    parts = text.split(MARK)
+    for index, part in enumerate(parts):
+        if index:
+            yield Out(first + index - 1, first + index, b"")
+        if part:
+            yield Const(part.encode())

@@ -1,0 +1,76 @@
+"""Rows that are moved each at its own time: where their stamps stand, how they are read, who knows the poses then."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import ValueInvalid, did_you_mean
+from frametool.frames.stamps import parse_stamp
+from frametool.grammar.readers import Misfit, kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.types import Components, Rigid
+    from frametool.grammar.readers import Path
+
+NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
+LARGEST = (1 << 63) - 1
+
+
+class Timed(NamedTuple):
+    """Which column or key holds the stamps, and the poses that move from a frame (None: the one SOURCE).
+
+    many: columns of poses at an array of nanoseconds, nan where there is no data; one: a pose, or the reason raised
+    """
+
+    name: str
+    many: Callable[[str | None, Any], Components]
+    one: Callable[[str | None, int], Rigid]
+
+    @property
+    def in_ns(self) -> bool:
+        """Tell whether the name says that stamps are integer nanoseconds."""
+        return self.name.endswith("_ns") or self.name in NANOSECONDS
+
+    def pose(self, frame: str | None, stamp_ns: int) -> Rigid:
+        """Return the pose at one time, to the bit as `many` does; raises FrametoolError where there is none."""
+        tx, ty, tz, x, y, z, w = (float(column[0]) for column in self.many(frame, [stamp_ns]))
+        return (tx, ty, tz, x, y, z, w) if w == w else self.one(frame, stamp_ns)  # noqa: PLR0124 - nan is not itself
+
+
+def read_stamp(text: str, *, in_ns: bool) -> int:
+    """Read a cell as nanoseconds, quotes and blanks around it left out; raises ValueInvalid."""
+    bare = text.strip(" \t\"'")
+    if in_ns and not bare.endswith("ns"):
+        if not bare.lstrip("+-").isdecimal():
+            raise ValueInvalid(f"{bare!r} is not a time in integer nanoseconds")
+        bare += "ns"
+    stamp_ns = parse_stamp(bare)
+    if abs(stamp_ns) > LARGEST:
+        raise ValueInvalid(f"{text.strip()!r} is beyond 64 bits of nanoseconds")
+    return stamp_ns
+
+
+def stamp_path(document: Any, holder: Path, name: str) -> Path:
+    """Find the stamp of a point or pose: its own key, else that of a mapping around it; raises Misfit."""
+    around = [document]
+    for step in holder:
+        around.append(around[-1][step])
+    for depth in range(len(holder), -1, -1):
+        for keys in ((name,), tuple(name.split("."))):
+            if (found := _below(around[depth], keys)) is not None:
+                if type(found[0]) in (dict, list):
+                    raise Misfit(f"expected a time like 12.5, found {kind(found[0])}", (*holder[:depth], *keys))
+                return (*holder[:depth], *keys)
+    known = [key for each in around if type(each) is dict for key in each]
+    raise Misfit(f"no key {name!r}{did_you_mean(name, known)}", holder)
+
+
+def _below(value: Any, keys: Sequence[str]) -> tuple[Any] | None:
+    """Follow keys down; None where one is not there."""
+    for key in keys:
+        if type(value) is not dict or key not in value:
+            return None
+        value = value[key]
+    return (value,)

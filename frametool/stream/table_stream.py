@@ -1,0 +1,114 @@
+"""A table from first byte to last: its head once, then block after block."""
+
+from __future__ import annotations
+
+from itertools import chain
+from typing import TYPE_CHECKING
+
+from frametool.errors import FormatError
+from frametool.stream.blocks import Run, State
+from frametool.stream.faults import Fault
+from frametool.stream.rows import written
+from frametool.stream.run import Outcome, mapped
+from frametool.stream.table import UNCLOSED, open_table, table_block
+from frametool.stream.table_plan import TUM, plan_table
+from frametool.text.cells import is_torn, torn_record, whole_records
+from frametool.text.lines import BLOCK_BYTES, read_blocks
+
+if TYPE_CHECKING:
+    from collections.abc import Generator, Iterator
+
+    from frametool.stream.blocks import Plan
+    from frametool.stream.output_columns import Layout
+    from frametool.stream.request import Request
+    from frametool.stream.table import Table
+    from frametool.text.lines import Source
+
+DELIMITERS = {"csv": b",", "tsv": b"\t", "columns": b"", "tum": b""}
+
+
+def run_table(
+    stream: Source,
+    form: str,
+    request: Request,
+    *,
+    source: str,
+    header: bool = True,
+    jobs: int = 1,
+    size: int = 0,
+) -> Generator[Outcome]:
+    """Yield the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
+    delimiter = DELIMITERS[form]
+    blocks = _blocks(stream, delimiter, size)
+    first = _first_rows(blocks, delimiter)
+    if first is None:
+        raise FormatError("nothing in it", source=source)
+    table, rest = open_table(first, delimiter, header=header, source=source)
+    table = _as_tum(table, form)
+    plan, layout = plan_table(table, request, source)
+    head = table.head + (layout.header(table.header) + table.line_end if table.header else b"")
+    taken = len(first) - len(rest)
+    yield Outcome(head, lines=first.count(b"\n", 0, taken), size=taken)
+    work = Work(table, plan, layout)
+    yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if work.remembers else jobs)
+
+
+def _blocks(stream: Source, delimiter: bytes, size: int) -> Iterator[bytes]:
+    """Return blocks of whole rows; cells in quotes may hold line ends."""
+    size = size or BLOCK_BYTES
+    if not delimiter:
+        return read_blocks(stream, size=size)
+
+    def whole(text: bytes) -> int:
+        end = whole_records(text, delimiter)
+        return -1 if is_torn(text[end:], delimiter) else end
+
+    return read_blocks(stream, size=size, whole=whole)
+
+
+def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
+    """Return the first blocks, up to one that holds more than comments."""
+    text = b""
+    for block in blocks:
+        text += block
+        if delimiter or any(line.strip() and not line.startswith(b"#") for line in block.splitlines()):
+            return text
+    return text or None
+
+
+def _as_tum(table: Table, form: str) -> Table:
+    """Name the columns of a trajectory without a header."""
+    if table.names or table.delimiter or not (form == "tum" or table.width == len(TUM)):
+        return table
+    return table._replace(names=TUM, width=len(TUM))
+
+
+class Work:
+    """What is done to each block of a table; holds what one block leaves for the next."""
+
+    def __init__(self, table: Table, plan: Plan, layout: Layout) -> None:
+        """Begin before the first row."""
+        self.table = table
+        self.plan = plan
+        self.layout = layout
+        self.state = State()
+        self.remembers = plan.unwrap or plan.operation.of == "previous"
+
+    def __call__(self, text: bytes) -> Outcome:
+        """Process one block; a quote that is not closed takes all behind it along."""
+        torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
+        if torn is None:
+            return self._done(text)
+        done = self._done(text[:torn]) if torn else Outcome(b"")
+        fault = Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True)
+        return done._replace(faults=[*done.faults, fault])
+
+    def _done(self, text: bytes) -> Outcome:
+        block = table_block(self.table, self.layout, text)
+        run = Run(self.plan, block, self.state)
+        faults = run.faults()
+        doubted = [(block.line_of(row), angle) for row, angle in run.doubted[:1]]
+        rows = len(block.places) + len(block.broken)
+        return Outcome(
+            written(run.groups(run.first_fault())), faults, rows, text.count(b"\n"), len(run.mended), doubted, len(text)
+        )

@@ -1,0 +1,155 @@
+"""Numbers and angles as people write them: knows text, knows no document.
+
+A number is what YAML 1.2 and JSON call one (`1e-3`, `-.5`, `5.`, `010` is ten); what YAML 1.1 would add (base 60,
+octal, hexadecimal, underscores) is refused with the reason.  An angle may also say its unit or a multiple of pi.
+"""
+
+from __future__ import annotations
+
+import re
+
+from frametool.errors import ValueInvalid
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    Angle: TypeAlias = tuple[float, str | None]  # value; "deg", "rad", or None where the text does not say
+
+# float() reads more than a decimal number (blanks, underscores, nan, other scripts' digits), but nothing else of these
+_DECIMAL_CHARACTERS = "0123456789.-+eE"
+_strip = str.strip
+_INFINITE = float("inf")
+_DECIMAL = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+# patterns are compiled when first needed, not at start-up: most texts are plain numbers
+_WITH_UNIT = rf"([-+]?{_DECIMAL}) ?(deg|rad|°)"
+_MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
+_BARE_STAR = r"[-+]? ?\*"
+_UNITS = {"deg": "deg", "°": "deg", "rad": "rad"}
+_ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
+_LONGEST_SHOWN = 60
+
+
+class NotFinite(ValueInvalid):
+    """Report nan, inf, or a number beyond the range of doubles."""
+
+
+def parse_number(text: str) -> float:
+    """Read a finite decimal number, correctly rounded.
+
+    Raises ValueInvalid with a message that quotes the text and says what is wrong with it.
+    """
+    if not _strip(text, _DECIMAL_CHARACTERS):
+        try:
+            value = float(text)
+        except ValueError:
+            pass
+        else:
+            if -_INFINITE < value < _INFINITE:
+                return value
+    raise _refusal(text, explain_number(text))
+
+
+def parse_angle(text: str) -> Angle:
+    """Read an angle: a number, `90deg`, `90 deg`, `90°`, `1.57rad`, `pi/2`, `-3pi/4`, `2*pi`.
+
+    Returns the value and its unit "deg" or "rad", or None where the text does not say.
+    Multiples of pi come back in degrees: pi/2 is (90.0, "deg"), so that quarter turns stay exact.
+    Raises ValueInvalid.
+    """
+    if not _strip(text, _DECIMAL_CHARACTERS):
+        return parse_number(text), None
+    if match := re.fullmatch(_WITH_UNIT, text):
+        return parse_number(match[1]), _UNITS[match[2]]
+    if (match := re.fullmatch(_MULTIPLE_OF_PI, text)) and not re.match(_BARE_STAR, text):
+        return _degrees_of_pi(text, match[1], match[2], match[3]), "deg"
+    raise _refusal(text, explain_angle(text))
+
+
+def _refusal(text: str, message: str) -> ValueInvalid:
+    """Make the error: what reads as a number and is none that can be used is told from what is no number."""
+    return NotFinite(message) if _reason(text) == _NOT_FINITE else ValueInvalid(message)
+
+
+def _degrees_of_pi(text: str, sign: str, factor: str | None, divisor: str | None) -> float:
+    """Return sign * factor * 180 / divisor, multiplied first: 3pi/4 is 540 / 4, exact."""
+    below = parse_number(divisor or "1")
+    if not below:
+        raise ValueInvalid(f"{shown(text)} divides by zero")
+    degrees = parse_number(factor or "1") * 180.0 / below
+    if degrees == _INFINITE:
+        raise ValueInvalid(f"{shown(text)} is not finite")
+    return -degrees if sign == "-" else degrees
+
+
+def shown(text: str) -> str:
+    """Quote a text for a message: escaped, and cut when it is long."""
+    if len(text) > _LONGEST_SHOWN:
+        return f"{text[:_LONGEST_SHOWN]!r}... ({len(text)} characters)"
+    return repr(text)
+
+
+def explain_number(text: str) -> str:
+    """Say why a text is no number, and what to write instead."""
+    return f"{shown(text)} {_reason(text)}"
+
+
+def explain_angle(text: str) -> str:
+    """Say why a text is no angle, and what to write instead."""
+    reason = _reason(text)
+    if reason in {_UNKNOWN, _UNIT} and re.search("deg|rad|pi|°|π", text, re.IGNORECASE):
+        reason = "is not an angle; write a number, 90deg, 1.57rad or pi/2"
+    elif reason == _UNIT:
+        reason = "is not an angle: the units are deg and rad"
+    return f"{shown(text)} {reason}"
+
+
+_UNKNOWN = "is not a number"
+_UNIT = "has a unit; lengths are in metres (or use xyz_mm)"
+
+
+def _reason(text: str) -> str:
+    """Find the first of the known mistakes in a text that is no number."""
+    if odd := odd_characters(text):
+        return f"has {odd}"
+    return next((reason for pattern, reason in _MISTAKES if re.fullmatch(pattern, text, _LOOSELY)), _UNKNOWN)
+
+
+_NOT_FINITE = "is not finite"
+_NOT_DECIMAL = "is not a decimal number"
+_LOOSELY = re.IGNORECASE | re.DOTALL
+_MISTAKES = (
+    (r"\s*", "is empty where a number is expected"),
+    (r"[-+]?\.?(nan|inf|infinity)", _NOT_FINITE),
+    (rf"[-+]?{_DECIMAL}", _NOT_FINITE),
+    (r".*\$[({].*", "is a xacro expression; expand it with xacro first"),
+    (r"[-+]?[0-9]+,[0-9]+(e[-+]?[0-9]+)?", "has a decimal comma; write a point"),
+    (r"[-+]?0x[0-9a-f_]+|[-+]?0[ob][0-9_]+", f"{_NOT_DECIMAL}; write it in base ten"),
+    (r"[-+]?[0-9]+(:[0-9]+)+(\.[0-9]*)?", f"{_NOT_DECIMAL}; base 60 is not read"),
+    (r"[-+]?[0-9._]*_[0-9._]*(e[-+]?[0-9_]+)?", f"{_NOT_DECIMAL}; leave out the underscores"),
+    (rf"\s+[-+]?{_DECIMAL}\s*|[-+]?{_DECIMAL}\s+", "has blanks around the number"),
+    (rf"[-+]?{_DECIMAL}(\s+[-+]?{_DECIMAL})+", "is several numbers where one is expected"),
+    (r"true|false|yes|no|on|off", "is a truth value where a number is expected"),
+    (r"null|~", "is empty where a number is expected"),
+    (rf"[-+]?{_DECIMAL}e[-+]?", _UNKNOWN),
+    (rf"[-+]?{_DECIMAL}\s*[a-zµ°%\"'].*", _UNIT),
+)
+
+
+def odd_characters(text: str) -> str:
+    """Name the first character that looks like another one: odd minus signs, wide digits, invisible blanks.
+
+    Returns "" where there is none.
+    """
+    odd = next((c for c in text if ord(c) > 126 and (c in _ODD_MINUS or c.isdigit() or not _visible(c))), None)
+    if odd is None:
+        return ""
+    from unicodedata import name
+
+    kind = "a look-alike of '-'" if odd in _ODD_MINUS else "a digit of another script" if odd.isdigit() else "invisible"
+    return f"{name(odd, 'a control character').lower()} (U+{ord(odd):04X}), {kind}"
+
+
+def _visible(character: str) -> bool:
+    """Say whether a person sees something where the character stands."""
+    return character.isprintable() and not character.isspace()

@@ -1,0 +1,68 @@
+"""The arguments of static_transform_publisher: both spellings, both rotations, read as the tool means them."""
+
+from __future__ import annotations
+
+import pytest
+
+from frametool.documents.source import Source
+from frametool.errors import ValueInvalid
+from frametool.geometry.representations import notation
+from frametool.geometry.rotation import Rotation
+from frametool.grammar.pose import Pose
+from frametool.grammar.readers import Reading
+from frametool.grammar.result import Result, Style
+from frametool.ros.publisher import read_call, write_poses
+
+TURN = Rotation.from_rpy([0.2, 0.1, 1.5])
+POSE = Pose((0.1, 0.0, -0.2), TURN.components, "my camera", "base")
+
+
+def read(line: str) -> Pose:
+    return read_call(line, Reading(Source("arguments", "")))
+
+
+@pytest.mark.parametrize("form", ["static1", "static2"])
+@pytest.mark.parametrize("rotation", ["quaternion", "rpy"])
+@pytest.mark.parametrize("before", ["", "ros2 run tf2_ros static_transform_publisher "])
+def test_what_is_written_reads_back(form: str, rotation: str, before: str) -> None:
+    back = read(before + write_poses([Result(POSE)], Style(form, (notation(rotation),))))
+    assert back[:1] + back[2:] == POSE[:1] + POSE[2:]
+    assert Rotation.of(*back.components[3:]).distance(TURN) < 1e-15
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "0.1 0 0.2 1.5 0.1 0.2 base cam",
+        "0.1 0 0.2 1.5 0.1 0.2 base cam 100",
+        "--x 0.1 --z=0.2 --yaw 1.5 --pitch 0.1 --roll 0.2 --frame-id base --child-frame-id cam",
+        "--child-frame-id cam --frame-id base --roll 0.2 --pitch 0.1 --yaw 1.5 --z 0.2 --x 0.1  # camera",
+    ],
+)
+def test_yaw_comes_first_without_flags_and_order_is_free_with_them(line: str) -> None:
+    pose = read(line)
+    assert (pose.parent, pose.name, pose.position) == ("base", "cam", (0.1, 0.0, 0.2))
+    assert Rotation.of(*pose.components[3:]).distance(TURN) < 1e-15
+
+
+def test_what_is_missing_is_zero_or_the_identity() -> None:
+    assert read("--frame-id a --child-frame-id b").components == (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("1 2 3", "found 3 words"),
+        ("1 2 3 0 0 0 1 a", "found 8 words"),
+        ("1.0foo 2 3 0 0 0 a b", "1.0foo"),
+        ("1 2 3 0 0 0 a a", "its own parent"),
+        ("--qz 0.5 --frame-id a --child-frame-id b", "norm 1.11803"),
+        ("--qz 0 --yaw 1 --frame-id a --child-frame-id b", "a quaternion and angles at once"),
+        ("--x 1 --frame-id a", "missing --child-frame-id"),
+        ("--x", "not enough arguments for --x"),
+        ("--w 1", "unknown argument '--w'"),
+    ],
+)
+def test_what_the_tool_would_guess_is_refused(line: str, message: str) -> None:
+    with pytest.raises(ValueInvalid, match=message):
+        read(line)

@@ -1,0 +1,69 @@
+"""Stamps in bulk: what the reader of one stamp says of every cell, to the nanosecond."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from frametool.errors import ValueInvalid
+from frametool.stream.stamp_columns import parse_stamps
+from frametool.stream.stamp_source import read_stamp
+from frametool.text.spans import MARGIN, Spans, framed
+
+NANOSECONDS = st.integers(-(1 << 65), 1 << 65)
+DECIMALS = st.tuples(st.integers(0, 10**11), st.text("0123456789", max_size=18)).map(lambda pair: f"{pair[0]}.{pair[1]}")
+CELLS = st.one_of(
+    DECIMALS, NANOSECONDS.map(str), NANOSECONDS.map("{}ns".format), st.floats().map(repr), st.text("0123456789.-+ens \"'", max_size=30)
+)
+
+
+def spans(cells: list[str]) -> Spans:
+    texts = [cell.encode() for cell in cells]
+    lengths = np.array([len(text) for text in texts], np.int64)
+    ends = np.cumsum(lengths + 1) - 1 + MARGIN
+    return Spans(framed(b",".join(texts)), ends - lengths, ends)
+
+
+def singly(cell: str, *, in_ns: bool) -> int | str:
+    try:
+        return read_stamp(cell, in_ns=in_ns)
+    except ValueInvalid as error:
+        return str(error)
+
+
+@pytest.mark.parametrize("in_ns", [True, False])
+@given(cells=st.lists(CELLS, min_size=1, max_size=40))
+def test_a_column_is_read_as_its_cells_are(cells: list[str], *, in_ns: bool) -> None:
+    stamps, reasons = parse_stamps(spans(cells), in_ns=in_ns)
+    found = [reasons.get(row, stamp) for row, stamp in enumerate(stamps.tolist())]
+    assert found == [singly(cell, in_ns=in_ns) for cell in cells]
+
+
+@pytest.mark.parametrize(
+    ("cell", "stamp_ns"),
+    [
+        ("1700000000.123456789", 1_700_000_000_123_456_789),
+        ("1700000000.1", 1_700_000_000_100_000_000),
+        ("1700000000123456789ns", 1_700_000_000_123_456_789),
+        ("1.7e9", 1_700_000_000_000_000_000),
+        ("0.000000001000", 1),
+        ("-0.5", -500_000_000),
+        (" 12. ", 12_000_000_000),
+        ("9223372036.854775807", (1 << 63) - 1),
+    ],
+)
+def test_no_nanosecond_is_lost(cell: str, stamp_ns: int) -> None:
+    stamps, reasons = parse_stamps(spans([cell, "1"]), in_ns=False)
+    assert (stamps.tolist(), reasons) == ([stamp_ns, 10**9], {})
+
+
+@pytest.mark.parametrize("cell", ["0.0000000001", "9223372036.854775808", "noon", "", "1_0", "0x1", "1.2.3", "nan", "."])
+def test_what_is_no_time_is_named(cell: str) -> None:
+    assert list(parse_stamps(spans(["1.5", cell]), in_ns=False)[1]) == [1]
+
+
+@pytest.mark.parametrize("cell", ["1.5", "1.0", "12s", "-", "9223372036854775808"])
+def test_nanoseconds_are_whole(cell: str) -> None:
+    assert list(parse_stamps(spans([cell, "-7", "1700000000123456789"]), in_ns=True)[1]) == [0]
