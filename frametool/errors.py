@@ -7,7 +7,7 @@
       BadTopology      cycle, two parents, a frame in itself         1
       LookupFailed                                                   4
         UnknownFrame   NotConnected
-        NoDataAt       TooEarly  TooLate  NoSamples
+        NoDataAt       TooEarly  TooLate
       FileProblem      missing, unreadable, exists, full             5
 
 The library raises; only the edge of the command line turns an error into a line on stderr.
@@ -32,20 +32,33 @@ class FrametoolError(Exception):
 
 
 class ValueInvalid(FrametoolError, ValueError):
-    """Report a number, rotation or name that cannot be used."""
+    """Report a number, rotation or name that cannot be used; `rule` is the rule of `check` that it breaks, if any."""
+
+    rule = ""
+
+    def __init__(self, message: str, *, rule: str = "") -> None:
+        """Keep the rule beside the message."""
+        super().__init__(message)
+        self.rule = rule or self.rule
 
 
 class FormatError(FrametoolError, ValueError):
     """Report text that cannot be read; say where: `source:line:column`, both counted from 1."""
 
-    def __init__(self, message: str, *, source: str = "", line: int = 0, column: int = 0, snippet: str = "") -> None:
-        """Keep the place beside the message; `snippet` is the source line with a caret below it."""
+    def __init__(
+        self, message: str, *, source: str = "", line: int = 0, column: int = 0, snippet: str = "", rule: str = "",
+    ) -> None:  # fmt: skip
+        """Keep the place beside the message.
+
+        snippet: the source line with a caret below it.  rule: the rule of `check` that is broken, if any.
+        """
         super().__init__(message)
         self.message = message
         self.source = source
         self.line = line
         self.column = column
         self.snippet = snippet
+        self.rule = rule
 
     def __str__(self) -> str:
         """Return `source:line:column: message`, leaving out what is not known."""
@@ -96,10 +109,6 @@ class TooLate(NoDataAt):
     """Report a request after an edge's last sample."""
 
 
-class NoSamples(NoDataAt):
-    """Report an edge that holds no sample to answer with."""
-
-
 class FileProblem(FrametoolError, OSError):
     """Report a file that is missing, unreadable, in the way or on a full disk."""
 
@@ -114,23 +123,25 @@ class Tf2Warning(FrametoolWarning):
     """Mark what tf2 would have logged, in its words."""
 
 
-_listeners: list[list[str]] = []
+_listeners: list[list[tuple[str, str]]] = []
 
 
-def warn(message: str) -> None:
-    """Tell of something odd that does not stop the work."""
+def warn(message: str, *, rule: str = "") -> None:
+    """Tell of something odd that does not stop the work; `rule` is the rule of `check` that finds it, if any."""
     if _listeners:
-        _listeners[-1].append(message)
+        _listeners[-1].append((rule, message))
     else:
         warnings.warn(message, FrametoolWarning, stacklevel=3)
 
 
-def overheard(call: Callable[..., Result], *arguments: object, **options: object) -> tuple[Result, list[str]]:
-    """Call a function; give its result and what it would have warned of, for a reader to add the place."""
-    messages: list[str] = []
-    _listeners.append(messages)
+def overheard(
+    call: Callable[..., Result], *arguments: object, **options: object
+) -> tuple[Result, list[tuple[str, str]]]:
+    """Return what a function returns, and its warnings as (rule, message), for a reader to add the place."""
+    warned: list[tuple[str, str]] = []
+    _listeners.append(warned)
     try:
-        return call(*arguments, **options), messages
+        return call(*arguments, **options), warned
     finally:
         _listeners.pop()
 

@@ -10,6 +10,7 @@ from frametool.errors import FormatError, warn
 from frametool.formats.assembly import Assembly, Rules
 from frametool.formats.tree_reader import read_edges
 from frametool.grammar.readers import Misfit, Reading
+from frametool.ros.message_parts import slash_note
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from frametool.formats.tree_reader import Edge
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
-    from frametool.grammar.readers import Path
+    from frametool.grammar.readers import Note, Path
 
 
 class Found(NamedTuple):
@@ -132,7 +133,7 @@ class Spot(NamedTuple):
 
 def edges_of(source: Source, *, raw: bool = False) -> Iterator[Found]:
     """Read the edges of one text, then tell what was odd about it; raw: messages as tf2 receives them."""
-    notes = []
+    notes: list[Note] = []
     count = 0
     for document in parse_documents(source.text, source.name):
         reading = Reading(source, raw=raw)
@@ -141,8 +142,8 @@ def edges_of(source: Source, *, raw: bool = False) -> Iterator[Found]:
                 count += 1
                 yield Found(edge if raw else without_slashes(edge, reading), source, document.index)
         except Misfit as misfit:
-            raise format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key) from None
-        notes += [((document.index, *path), message) for path, message in reading.notes]
+            raise misfit.placed(source, document.index) from None
+        notes += [note._replace(path=(document.index, *note.path)) for note in reading.notes]
     if not count:
         raise FormatError("no frames in it", source=source.name)
     tell(source, notes)
@@ -155,15 +156,15 @@ def without_slashes(edge: Edge, reading: Reading) -> Edge:
     for name in (edge.child, edge.parent):
         if name is not None and name.startswith("/") and len(name) > 1:
             reading.here = edge.path
-            reading.note(f"frame {name!r}: the leading / is no part of a name and was left out")
+            reading.note(slash_note(name), rule="slash")
     parent = edge.parent and (edge.parent.removeprefix("/") or edge.parent)
     return edge._replace(child=edge.child.removeprefix("/") or edge.child, parent=parent)
 
 
-def tell(source: Source, notes: list[tuple[Path, str]], most: int = 10) -> None:
+def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     """Warn of what was noted while reading, each with its place; only count what exceeds `most`."""
-    places = locate_many(source.text, [path for path, _ in notes[:most]])
-    for (line, column), (_, message) in zip(places, notes[:most], strict=True):
-        warn(f"{source.name}:{line}:{column}: {message}")
+    places = locate_many(source.text, [note.path for note in notes[:most]])
+    for (line, column), note in zip(places, notes[:most], strict=True):
+        warn(f"{source.name}:{line}:{column}: {note.message}")
     if len(notes) > most:
         warn(f"{source.name}: {len(notes) - most} more like these")

@@ -79,8 +79,8 @@ class Recording:
             yield from _samples(self, report or _raise)
         finally:
             self.close()
-        for line, sentence in self.tally.told() if tell else ():
-            warn(f"{self.name}:{line}: {sentence}")
+        for told in self.tally.told() if tell else ():
+            warn(f"{self.name}:{told.line}: {told.message}")
 
 
 def samples_of(recording: Recording, report: Report | None = None) -> Iterator[Sample]:
@@ -179,9 +179,10 @@ def _calls(piece: Piece, recording: Recording, report: Report) -> Iterator[Sampl
         try:
             pose = read_call(line, reading)
         except ValueInvalid as error:
-            report(FormatError(str(error), source=recording.name, line=number))
+            report(FormatError(str(error), source=recording.name, line=number, rule=error.rule))
             continue
-        recording.tally.notes.update((note, number) for _, note in reading.notes)
+        for note in reading.notes:
+            recording.tally.note(note, number)
         yield Sample(pose.parent or "", pose.name or "", pose.components, None, number)
 
 
@@ -216,11 +217,8 @@ def _read(
 
         return read_transform(transform)
     parent, child, position, rotation, stamp_ns = messages.read_transform(transform, reading)
-    for _, note in reading.notes:
-        if "normalised" in note:
-            recording.tally.rough.append(line)
-        else:
-            recording.tally.notes.setdefault(note, line)
+    for note in reading.notes:
+        recording.tally.note(note, line)
     return parent, child, (*position, *rotation), stamp_ns
 
 

@@ -74,5 +74,5 @@ def read_one_pose(value: Any, reading: Reading) -> Pose:
         return Pose(position, rotation, child or None, parent or None)
     pose = read_pose(value, reading)
     if pose.position is None and pose.rotation is None:
-        reading.note("neither position nor rotation: taken as the identity")
+        reading.note("neither position nor rotation: taken as the identity", rule="identity")
     return pose

@@ -151,7 +151,7 @@ def _edges(
     if entry is not None and "samples" in entry:
         return read_samples(entry, pose, parent, child, path, reading)
     if parent is not None and pose.position is None and pose.rotation is None:
-        reading.note(f"frame {child!r} has neither position nor rotation: taken as the identity")
+        reading.note(f"frame {child!r} has neither position nor rotation: taken as the identity", rule="identity")
     return [Edge(parent, child, pose, path, stamp_of(entry or {}))]
 
 

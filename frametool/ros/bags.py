@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FileProblem, FormatError, FrametoolError
+from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, quaternion
 from frametool.ros.echo_blocks import unit_components
@@ -65,15 +65,16 @@ def _sample(message: Any, number: int, path: str, tally: Tally) -> Sample:
     parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(message.child_frame_id)
     components = unit_components(tally, number, *numbers)
     if components is None or not parent or not child:
-        raise FormatError(f"message {number}: {_complaint(parent, child, numbers)}", source=path)
+        problem = _complaint(parent, child, numbers)
+        raise FormatError(f"message {number}: {parent!r} -> {child!r}: {problem}", source=path, rule=problem.rule)
     stamp = message.header.stamp
     return Sample(parent, child, components, stamp.sec * BILLION + stamp.nanosec, number)
 
 
-def _complaint(parent: str, child: str, numbers: tuple[float, ...]) -> str:
+def _complaint(parent: str, child: str, numbers: tuple[float, ...]) -> ValueInvalid:
     """Say what is wrong with a transform that was refused."""
     if not parent or not child:
-        return f"{parent!r} -> {child!r}: an empty frame name"
+        return ValueInvalid("an empty frame name")
     x, y, z, w = numbers[3:]
     problem = quaternion.complaint(x, y, z, w, floats.length(x, y, z, w), normalize=False)
-    return f"{parent} -> {child}: {problem or 'its position is not finite'}"
+    return problem or ValueInvalid("its position is not finite", rule="not-finite")

@@ -43,7 +43,7 @@ def frame_of(
     if type(name) is not str or not name:
         raise Misfit(f"{key} must name a frame, found {kind(name or None)}", here)
     if name.startswith("/") and len(name) > 1:
-        reading.note(slash_note(name), *here)
+        reading.note(slash_note(name), *here, rule="slash")
         return name[1:]
     return name
 

@@ -153,5 +153,5 @@ def _pose(
     if not parent or not child:
         raise ValueInvalid(f"an empty frame name; {CALL} takes {_FORMS}")
     if parent == child:
-        raise ValueInvalid(f"frame {child!r} is its own parent")
+        raise ValueInvalid(f"frame {child!r} is its own parent", rule="self")
     return Pose((x, y, z), turned, child, parent)

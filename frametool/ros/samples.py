@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import TypeAlias
 
+    from frametool.grammar.readers import Note
+
     Components: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
@@ -52,6 +54,14 @@ class Names(dict[str, str]):
         return name[1:]
 
 
+class Told(NamedTuple):
+    """One sentence about a recording: the first line it is about, in words, and the rule of `check` that finds it."""
+
+    line: int
+    message: str
+    rule: str
+
+
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
@@ -63,20 +73,27 @@ class Tally:
         self.noise: list[tuple[int, str]] = []
         self.rough: list[int] = []
         self.others: dict[str, int] = {}
-        self.notes: dict[str, int] = {}
+        self.notes: dict[str, Told] = {}
 
-    def told(self) -> Iterator[tuple[int, str]]:
-        """Yield one sentence for each kind of oddity, and the first line it is about."""
+    def note(self, note: Note, line: int) -> None:
+        """Keep what was noted while reading; of rotations that had to be normalised only the lines."""
+        if note.rule == "rounded":
+            self.rough.append(line)
+        else:
+            self.notes.setdefault(note.message, Told(line, note.message, note.rule))
+
+    def told(self) -> Iterator[Told]:
+        """Yield one sentence for each kind of oddity."""
         if self.rough:
             count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
-            yield self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised"
+            yield Told(self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised", "rounded")
         if self.noise:
             line, text = self.noise[0]
             count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
-            yield line, f"{count} printed between messages skipped: {text!r}"
+            yield Told(line, f"{count} printed between messages skipped: {text!r}", "noise")
         if self.others:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
-            yield 1, f"messages without transforms were left out: {kinds}"
+            yield Told(1, f"messages without transforms were left out: {kinds}", "odd")
         for name in self.names.slashed:
-            self.notes.setdefault(slash_note(name), 1)
-        yield from ((line, note) for note, line in self.notes.items())
+            self.notes.setdefault(slash_note(name), Told(1, slash_note(name), "slash"))
+        yield from self.notes.values()
