@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import re
 import sys
+from bisect import bisect_right
 
 from frametool.errors import FileProblem, FormatError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from os import PathLike
 
 MOST_CHARACTERS = 3 << 24
@@ -100,30 +102,24 @@ def check_text(source: Source) -> None:
         raise error_at(source, error.start, f"not UTF-8: half a character (U+{odd:04X})") from None
 
 
-def place_of(text: str, offset: int) -> tuple[int, int]:
-    """Return line and column of an offset into the text."""
-    line, begin = 1, 0
-    for end in re.finditer(_LINE_END, text[:offset]):
-        line, begin = line + 1, end.end()
-    return line, offset - begin + 1
+def places_of(text: str, offsets: Sequence[int]) -> list[tuple[int, int]]:
+    """Return line and column of each offset, in one pass over the text.
+
+    Behind the last character, where parsers find that something is missing, all offsets are one place.
+    """
+    last = len(text.rstrip(" \t\r\n"))
+    begins = [0, *(end.end() for end in re.finditer(_LINE_END, text[: max(offsets, default=0)]))]
+    places = []
+    for offset in offsets:
+        at = min(offset, last)
+        line = bisect_right(begins, at)
+        places.append((line, at - begins[line - 1] + 1))
+    return places
 
 
-def within(text: str, line: int, column: int) -> tuple[int, int]:
-    """Draw a place beyond the last character, where parsers find that something is missing, back to just after it."""
-    return min((line, column), place_of(text, len(text.rstrip(" \t\r\n"))))
-
-
-def error_at(source: Source, offset: int, message: str) -> FormatError:
-    """Make the error for an offset into the source's text."""
-    line, column = place_of(source.text, offset)
-    return placed_error(source, line, column, message)
-
-
-def placed_error(
-    source: Source, line: int, column: int, message: str, error: type[FormatError] = FormatError
-) -> FormatError:
-    """Make the error for a place, with the source line and a caret below it."""
-    line, column = within(source.text, line, column)
+def error_at(source: Source, offset: int, message: str, error: type[FormatError] = FormatError) -> FormatError:
+    """Make the error for an offset into the source's text, with the source line and a caret below it."""
+    ((line, column),) = places_of(source.text, [offset])
     snippet = pointer(line_of(source.text, line), column)
     return error(message, source=source.name, line=line, column=column, snippet=snippet)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.collector import paused_collector
-from frametool.documents.document import Source, format_error, locate_many, parse_documents, read_text
+from frametool.documents.document import format_error, locate_many, parse_documents
+from frametool.documents.source import Source, read_text
 from frametool.errors import FormatError, warn
 from frametool.formats.assembly import Assembly, Rules
 from frametool.formats.tree_reader import read_edges
