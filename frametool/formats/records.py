@@ -39,7 +39,7 @@ def read_all(source: Source, read: Callable[[Any, Reading], Any], *, degrees: bo
             place = (document.index, *misfit.path)
             raise format_error(source, place, str(misfit), key=misfit.key) from misfit
         if reading.notes:
-            from frametool.formats.load import tell
+            from frametool.formats.tree_reader import tell
 
             tell(source, reading.notes)
     if not records:

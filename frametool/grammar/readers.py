@@ -76,6 +76,18 @@ class Reading:
         """Keep something worth telling about a place below `here`."""
         self.notes.append(Note(rule, message, (*self.here, *path)))
 
+    def bare(self, name: str, *path: str | int) -> str:
+        """Take one leading `/` off a frame's name, as tf2 does, and note it."""
+        if not name.startswith("/") or len(name) == 1:
+            return name
+        self.note(slash_note(name), *path, rule="slash")
+        return name[1:]
+
+
+def slash_note(name: str) -> str:
+    """Say that a name lost its leading `/`."""
+    return f"frame {name!r}: the leading / is no part of a name and was left out"
+
 
 def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     """Call a reader for something further down; its misfits then name the whole path."""

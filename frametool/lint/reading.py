@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.documents.source import Source
 from frametool.errors import FormatError
-from frametool.formats.load import without_slashes
-from frametool.formats.tree_reader import read_edges
+from frametool.formats.tree_reader import read_edges, without_slashes
 from frametool.grammar.readers import Misfit, Note, Reading
 from frametool.lint.findings import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from frametool.documents.source import Source
     from frametool.formats.recordings import Recording
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path
@@ -46,17 +45,17 @@ def read_all(recording: Recording, find: Find) -> Iterator[Seen]:
     if recording.holds_samples:
         yield from _read_recording(recording, find)
     else:
-        yield from _read_tree(Source(recording.name, recording.text()), find)
+        yield from _read_tree(recording.source, find)
 
 
 def _read_recording(recording: Recording, find: Find) -> Iterator[Seen]:
     def report(error: FormatError) -> None:
         find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
 
-    for sample in recording.samples(report, tell=False):
+    for sample in recording.edges(report, tell=False):
         w_first = looks_w_first(sample.components)
         column = 1 if sample.line else 0
-        yield Seen(*sample[:4], recording.name, sample.line, column, w_first)
+        yield Seen(sample.parent or "", *sample[1:4], recording.name, sample.line, column, w_first)
     for told in recording.tally.told():
         find(Finding(told.rule, told.message, recording.name, told.line, 1))
 
@@ -95,7 +94,7 @@ def _read_tree(source: Source, find: Find) -> Iterator[Seen]:
     for (rule, message, _), (line, column) in zip(said, places, strict=False):
         find(Finding(rule, message, source.name, line, column))
     for (edge, _, w_first), (line, column) in zip(edges, places[len(said) :], strict=True):
-        yield Seen(edge.parent, edge.child, edge.pose.components, edge.stamp_ns, source.name, line, column, w_first)
+        yield Seen(edge.parent, edge.child, edge.components, edge.stamp_ns, source.name, line, column, w_first)
 
 
 def _read_entry(
@@ -120,7 +119,7 @@ def _written_w_first(entry: _Entry, edge: Any) -> bool:
     value = entry.value
     for step in edge.path:
         value = value[step]
-    return looks_w_first(edge.pose.components) and type(value) is dict and not WRITTEN_XYZW.isdisjoint(value)
+    return looks_w_first(edge.components) and type(value) is dict and not WRITTEN_XYZW.isdisjoint(value)
 
 
 def _entries(value: Any) -> Iterator[_Entry]:

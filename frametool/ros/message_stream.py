@@ -1,6 +1,6 @@
 """Every message of a recording in text, one after the other, whatever form it is in: bounded memory, any length.
 
-Forms are those of `frametool.formats.detect`. A message is plain values, as the document reader gives them.
+Forms are those of `frametool.formats.FORMATS`. A message is plain values, as the document reader gives them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import BinaryIO
 
-    from frametool.ros.samples import Tally
+    from frametool.grammar.edges import Tally
 
 _SEPARATOR = re.compile(r"^.*---[ \t]*$\n?", re.MULTILINE)
 _ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^\ufeff])", re.MULTILINE)  # no key that ROS prints begins so

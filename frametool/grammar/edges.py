@@ -1,41 +1,52 @@
-"""One record of a recording: where a frame was seen from its parent, at one time."""
+"""What a file of frames comes down to: edges, and what is worth telling of how they were written."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from frametool.ros.message_parts import slash_note
+from frametool.grammar.readers import slash_note
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from typing import TypeAlias
+    from collections.abc import Callable, Iterator
 
-    from frametool.grammar.readers import Note
+    from frametool.errors import FormatError
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.readers import Note, Path
 
-    Components: TypeAlias = tuple[float, float, float, float, float, float, float]
+    Report = Callable[[FormatError], None]
 
 
-class Sample(NamedTuple):
-    """The pose of `child` in `parent` as tx, ty, tz (metres), x, y, z, w (unit).
+class Edge(NamedTuple):
+    """The pose of `child` in `parent`: parent_from_child, for good or at one time.
 
-    stamp_ns is None where the source says that the edge stands still; line is that of the record, 0 if there is none;
-    received_ns says when the recorder got it, if that is known.
+    parent: None for a root
+    components: tx, ty, tz (metres), x, y, z, w (unit)
+    stamp_ns: None where it stands still
+    line: on which it was written, 0 if that says nothing
+    received_ns: when the recorder got it, if that is known
+    path: in a document, the way to it from the top of the text
     """
 
-    parent: str
+    parent: str | None
     child: str
-    components: Components
-    stamp_ns: int | None
+    components: Rigid
+    stamp_ns: int | None = None
     line: int = 0
     received_ns: int | None = None
+    path: Path = ()
+
+
+def stop(error: FormatError) -> None:
+    """Raise an error: what a reader does with one unless it is told otherwise."""
+    raise error
 
 
 class Names(dict[str, str]):
     """Frame names by the text they stand in: quotes off, one leading `/` off; each is worked out once."""
 
     def __init__(self) -> None:
-        """Begin with no name known; `slashed` collects those that began with `/`."""
+        """Create an empty table; `slashed` collects the names that began with `/`."""
         super().__init__()
         self.slashed: list[str] = []
 
@@ -68,7 +79,7 @@ class Tally:
     __slots__ = ("names", "noise", "notes", "others", "rough")
 
     def __init__(self) -> None:
-        """Begin with nothing to tell; `rough` and `noise` hold line numbers, `others` and `notes` count."""
+        """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic."""
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
         self.rough: list[int] = []
@@ -97,3 +108,16 @@ class Tally:
         for name in self.names.slashed:
             self.notes.setdefault(slash_note(name), Told(1, slash_note(name), "slash"))
         yield from self.notes.values()
+
+
+class Options(NamedTuple):
+    """How a file of frames is read.
+
+    tally: takes what is worth telling at the end
+    report: takes the errors, and reading goes on behind them
+    raw: messages are taken as tf2 receives them, unchecked
+    """
+
+    tally: Tally
+    report: Report = stop
+    raw: bool = False
