@@ -11,7 +11,7 @@ from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, announce, frame_name, load_tree
+from frametool.cli.trees import FRAME, announced, frame_name, load_tree
 from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.points import Point, read_moveables
 from frametool.geometry import quaternion, rigid
@@ -110,7 +110,7 @@ def command(
     elif rest in ((), ("-",)) and (recording := _messages(stream)) is not None:
         from frametool.cli.messages import move_messages
 
-        announce(recording)
+        announced(recording)
         return move_messages(recording, kind, way, output, stream.policy(recording.name), normalize=normalize)
     if rest in ((), ("-",)):
         wishes = _wishes(way, frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)

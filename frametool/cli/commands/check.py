@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.command import FILE, Command
-from frametool.cli.recordings import opened
-from frametool.cli.trees import verbose_option
+from frametool.cli.trees import opened, verbose_option
 from frametool.lint.findings import RULES, WRITERS, Finding
 from frametool.lint.reading import read_all
 from frametool.lint.rules import lint

@@ -8,8 +8,7 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, result_options
 from frametool.cli.output import Output
-from frametool.cli.recordings import opened
-from frametool.cli.trees import verbose_option
+from frametool.cli.trees import opened, verbose_option
 from frametool.errors import FormatError
 from frametool.frames.edge_log import EdgeLog, chain
 from frametool.lint.monitor_report import chain_entry, edge_entry
