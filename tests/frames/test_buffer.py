@@ -16,7 +16,7 @@ from frametool.errors import (
     UnknownFrame,
     ValueInvalid,
 )
-from frametool.frames.tf2 import Refused
+from frametool.frames.policy import Refused
 
 EPOCH = 1_700_000_000_123_456_789  # a float of this size has steps of 256
 SECOND = 10**9

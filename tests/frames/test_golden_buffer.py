@@ -13,7 +13,7 @@ import pytest
 
 from frametool import Transform, TransformBuffer
 from frametool.errors import LookupFailed, NoDataAt, NotConnected, UnknownFrame
-from frametool.frames.tf2 import Refused
+from frametool.frames.policy import Refused
 from frametool.grammar.result import Style
 from frametool.ros.tf2_listing import write_tree
 
