@@ -65,7 +65,7 @@ class Assembly:
     """What has been read so far, and where the first word on each frame stood."""
 
     def __init__(self, name: str, rules: Rules | None = None) -> None:
-        """Begin with no frames; `name` says in messages where they come from."""
+        """Create an empty assembly; `name` says in messages where they come from."""
         self.name = name
         self.rules = rules or Rules()
         self.tree = FrameTree(name)
@@ -197,7 +197,7 @@ class Assembly:
 
 
 def tell_rejected(lines: list[str]) -> None:
-    """Tell what tf2 would have logged of a transform it drops."""
+    """Warn in the words that tf2 logs when it drops a transform."""
     import warnings
 
     from frametool.errors import Tf2Warning

@@ -30,7 +30,7 @@ class TransformBuffer(Frames):
     """
 
     def __init__(self, *, keep_ns: int | None = None, policy: str = "frametool", name: str = "") -> None:
-        """Begin an empty buffer.
+        """Create an empty buffer.
 
         keep_ns: keep only so much before each frame's newest sample; None keeps everything.
         policy: "ros1" and "ros2" accept, refuse and complain as tf2 does, and keep 10 s unless told.
@@ -151,13 +151,13 @@ class TransformBuffer(Frames):
         self._put(StandingTrack(frame, moved.parent, moved.components))
 
     def __repr__(self) -> str:
-        """Say how many frames and samples."""
+        """Return how many frames and samples there are."""
         samples = sum(track.count for track in self._tracks.values())
         return f"TransformBuffer({len(self._frames)} frames, {samples} samples)"
 
 
 def _holds(track: Track, at_ns: int | None) -> bool:
-    """Tell whether an edge under its newest parent has data at a time; None asks for standing ones."""
+    """Return whether an edge under its newest parent has data at a time; None asks for standing ones."""
     if track.standing:
         return True
     return at_ns is not None and track.covers(at_ns) and track.parent_at(at_ns) == track.parent

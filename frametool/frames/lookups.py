@@ -32,7 +32,7 @@ class Frames:
     """
 
     def __init__(self, name: str, policy: BufferPolicy) -> None:
-        """Begin without frames; `name` says in error messages where they come from."""
+        """Create an empty set of frames; `name` says in error messages where they come from."""
         self.name = name
         self.policy = policy
         self._tracks: dict[str, Track] = {}
@@ -59,7 +59,7 @@ class Frames:
 
     @property
     def moves(self) -> bool:
-        """Tell whether any frame moves."""
+        """Return whether any frame moves."""
         return any(not track.standing for track in self._tracks.values())
 
     def parent(self, frame: str, at_ns: int | None = None) -> str | None:
@@ -238,7 +238,7 @@ class Frames:
         return Query([tracks[child] for child in down], [tracks[child] for child in reversed(up)])
 
     def _changes_above(self, frame: str) -> bool:
-        """Tell whether a frame or an ancestor of it ever changes its parent."""
+        """Return whether a frame or an ancestor of it ever changes its parent."""
         if self._loops:
             return True
         return any(frame in self._tracks and self._tracks[frame].varies for frame in to_root(frame, self.parent))
@@ -274,7 +274,7 @@ class Frames:
             raise self.policy.unknown(frame, role, self)
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
-        """Tell two trees from one whose changing parent is not known at a time."""
+        """Make the error for two frames without a way: of two trees, or of one whose changing parent is not known then."""
         if at_ns is not None and self._varies:
             try:
                 down, up = edges_between(target, source, lambda frame: self._parent_near(frame, at_ns))

@@ -9,6 +9,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.frames.edge_log import EdgeLog
     from frametool.frames.track import MovingTrack, Track
 
 OTHER_CLOCK = 10**8 * BILLION  # three years: beyond, one clock counts from 1970 and the other from its start
@@ -39,7 +40,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
 
 
 def left_out(track: MovingTrack, at_ns: int) -> str:
-    """Say why an edge is left out of the tree at a time."""
+    """Return the sentence that says why an edge is left out of the tree at a time."""
     return (
         f"{track.parent} -> {track.child} is left out: no data at {format_stamp(at_ns)}, "
         f"samples cover {format_stamp(track.first_ns)} .. {format_stamp(track.last_ns)} "
@@ -72,8 +73,8 @@ def _way(target: str, source: str, path: Sequence[Track]) -> str:
     return f"on the path {' <- '.join(frames)}"
 
 
-def frames_on(target: str, source: str, path: Sequence[Track]) -> list[str]:
-    """List the frames on a path from target to source, both included."""
+def frames_on(target: str, source: str, path: Sequence[Track | EdgeLog]) -> list[str]:
+    """List the frames on a path of edges from target to source, both included."""
     frames = [target]
     for track in path:
         frames.append(track.parent if track.child == frames[-1] else track.child)
@@ -81,7 +82,7 @@ def frames_on(target: str, source: str, path: Sequence[Track]) -> list[str]:
 
 
 def _whole(moving: Sequence[MovingTrack], begin: int, end: int) -> str:
-    """Say when all edges have data, or which two never do."""
+    """Return the clause that says when all edges have data, or which two never do."""
     if len(moving) == 1:
         return ""
     if begin <= end:

@@ -60,7 +60,7 @@ class BufferPolicy:
         return parent, child, components
 
     def settle_kind(self, track: Track, *, standing: bool) -> bool:
-        """Say whether a further sample counts as standing."""
+        """Return whether a further sample counts as standing."""
         if track.standing != standing:
             raise BadTopology(f"frame {track.child!r} both stands still and moves", rule="static-and-moving")
         return standing
@@ -96,7 +96,7 @@ class BufferPolicy:
         return UnknownFrame(name, known=buffer.frames, where=buffer.name)
 
     def is_bad_name(self, name: str) -> bool:  # noqa: ARG002
-        """Say whether a name cannot be asked for at all."""
+        """Return whether a name cannot be asked for at all."""
         return False
 
     def unconnected(

@@ -14,7 +14,7 @@ SHORTEST = 0.0001  # seconds: tf2 divides by no less
 
 
 def motion(track: MovingTrack) -> str:
-    """Say in a few words how a frame moves: `41 samples  10 Hz  0.000000000 .. 4.000000000`."""
+    """Return in a few words how a frame moves: `41 samples  10 Hz  0.000000000 .. 4.000000000`."""
     first, last = track.span
     if first == last:
         return f"1 sample  {format_stamp(first)}" if track.count == 1 else f"{track.count} samples at once"

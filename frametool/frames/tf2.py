@@ -94,7 +94,7 @@ class Ros1(BufferPolicy):
         raise Refused("Warning:", f"TF_REPEATED_DATA ignoring data with redundant timestamp {what}")
 
     def is_bad_name(self, name: str) -> bool:
-        """Say whether a name cannot be asked for at all."""
+        """Return whether a name cannot be asked for at all."""
         return not name or name.startswith("/")
 
     def unknown(self, name: str, role: str, buffer: Frames) -> LookupFailed:

@@ -82,7 +82,7 @@ class MovingTrack:
     standing: Literal[False] = False
 
     def __init__(self, child: str, stamp_ns: int, parent: str, components: Rigid) -> None:
-        """Begin with one sample."""
+        """Create a track with one sample."""
         self.child = child
         self.authority = DEFAULT_AUTHORITY
         self.varies = False
@@ -207,7 +207,7 @@ class MovingTrack:
         self.varies = self.varies and any(True for _ in self.changes())
 
     def covers(self, at_ns: int) -> bool:
-        """Tell whether a time lies within the samples."""
+        """Return whether a time lies within the samples."""
         return self.begins[0] <= at_ns <= self.last_ns
 
     def parent_at(self, at_ns: int) -> str | None:

@@ -26,7 +26,7 @@ class FrameTree(Frames):
     """
 
     def __init__(self, name: str = "") -> None:
-        """Begin an empty tree; `name` says in error messages where the frames come from."""
+        """Create an empty tree; `name` says in error messages where the frames come from."""
         super().__init__(name, FRAMETOOL)
         self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
 
@@ -66,5 +66,5 @@ class FrameTree(Frames):
         return frame
 
     def __repr__(self) -> str:
-        """Say how many frames and which roots."""
+        """Return how many frames there are and which roots."""
         return f"FrameTree({len(self._frames)} frames, roots: {', '.join(self.roots) or 'none'})"

@@ -44,7 +44,7 @@ def command(
     limit: int | None, moving: bool, cache: int | None, tf2: str | None,
     format_name: str | None, output: str | None, **options: Any,
 ) -> int:  # fmt: skip
-    """Tell where SOURCE is seen from TARGET, time after time, as tf2_echo does on a running robot.
+    """Print the pose of SOURCE in TARGET, time after time, as tf2_echo does on a running robot.
 
     \b
       frametool echo drive.yaml map base_link
@@ -78,7 +78,7 @@ class Failures:
     """Times without data: the first error stands for all."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Create an empty count."""
         self.first: NoDataAt | None = None
         self.count = 0
 
@@ -88,7 +88,7 @@ class Failures:
         self.count += 1
 
     def told(self) -> int:
-        """Tell of them; returns the exit status."""
+        """Report them on stderr; returns the exit status."""
         if self.first is not None:
             tell(f"frametool: {self.first}")
         if self.count > 1:
