@@ -124,7 +124,7 @@ class TrackTable:
 
     def __init__(self, track: MovingTrack) -> None:
         """Prepare every way; the last sample leads nowhere, and neither does one before a change of parent."""
-        stamps, parents, samples = track.columns()
+        stamps, parents, samples = zip(*track.walk(), strict=True)
         self.stamps = np.array(stamps, dtype=np.int64)
         here: Any = np.array(samples).T
         following = np.append(np.arange(1, self.stamps.size), self.stamps.size - 1)

@@ -113,7 +113,7 @@ class Frames:
 
     def lookup_components(self, target: str, source: str, at_ns: int | None = None) -> Rigid:
         """Return tx, ty, tz, x, y, z, w of target_from_source; otherwise as `lookup`."""
-        query = self._queries.get((target, source)) or self._query(target, source, at_ns)
+        query = self.query(target, source, at_ns)
         if query.fixed is not None:
             return query.fixed
         if at_ns is None:  # the time comes first: at it the parents may be others than the newest
@@ -187,7 +187,9 @@ class Frames:
 
     def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
         """List the edges between two frames, from the target to the source, at a time or by the newest parents."""
-        down, up = self.between(target, source, at_ns)
+        return self._along(*self.between(target, source, at_ns))
+
+    def _along(self, down: Sequence[str], up: Sequence[str]) -> list[Track]:
         return [self._tracks[child] for child in (*reversed(down), *reversed(up))]
 
     def span(self, target: str, source: str) -> tuple[int, int] | None:
@@ -220,11 +222,9 @@ class Frames:
         return sorted(stamps)
 
     def query(self, target: str, source: str, at_ns: int | None) -> Query:
-        """Return the way between two frames as it is at a time, or by the newest parents."""
-        return self._queries.get((target, source)) or self._query(target, source, at_ns)
-
-    def _query(self, target: str, source: str, at_ns: int | None) -> Query:
-        """Find the way; keep it if no parent on it ever changes."""
+        """Return the way between two frames at a time, or by the newest parents; keep it if no parent on it changes."""
+        if kept := self._queries.get((target, source)):
+            return kept
         query = self.query_of(*self.between(target, source, at_ns))
         if not self._varies or not (self._changes_above(target) or self._changes_above(source)):
             if len(self._queries) >= MOST_KEPT:
@@ -274,17 +274,17 @@ class Frames:
             raise self.policy.unknown(frame, role, self)
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
-        """Make the error for two frames without a way: of two trees, or of one whose changing parent is not known then."""
+        """Make the error for two frames without a way: two trees, or a changing parent that is not known then."""
+
+        def parent_near(frame: str) -> str | None:
+            track = self._tracks.get(frame)
+            return None if track is None or at_ns is None else track.parent_near(at_ns)
+
         if at_ns is not None and self._varies:
             try:
-                down, up = edges_between(target, source, lambda frame: self._parent_near(frame, at_ns))
+                way = self._along(*edges_between(target, source, parent_near))
             except NotConnected:
                 pass
             else:
-                way = [self._tracks[child] for child in (*reversed(down), *reversed(up))]
                 return self.policy.missing(self, target, source, at_ns, way)
         return self.policy.unconnected(self, error, target, source, at_ns)
-
-    def _parent_near(self, frame: str, at_ns: int) -> str | None:
-        track = self._tracks.get(frame)
-        return None if track is None else track.parent_near(at_ns)

@@ -6,7 +6,7 @@ Knows stamps in integer nanoseconds and components; knows no other frames.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from itertools import chain, pairwise
+from itertools import pairwise
 
 from frametool.geometry import floats, segment
 
@@ -121,15 +121,6 @@ class MovingTrack:
         """Yield every sample as (stamp, parent, components), oldest first."""
         for page in self.pages:
             yield from zip(page.stamps, page.parents, page.samples, strict=True)
-
-    def columns(self) -> tuple[list[int], list[str], list[Rigid]]:
-        """Return the stamps, the parents and the poses of all samples."""
-        chained = chain.from_iterable
-        pages = self.pages
-        return (
-            list(chained(page.stamps for page in pages)), list(chained(page.parents for page in pages)),
-            list(chained(page.samples for page in pages)),
-        )  # fmt: skip
 
     def changes(self) -> Iterator[int]:
         """Yield the stamps from which another parent holds."""
