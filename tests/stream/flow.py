@@ -16,7 +16,7 @@ from frametool.stream.stream_form import RECORDS
 from frametool.stream.table_stream import run_table
 
 QUARTER = (1.0, 2.0, 3.0, 0.0, 0.0, 0.7071067811865476, 0.7071067811865476)
-MOVE = Request(Operation(left=QUARTER, moves=True), way=lambda _own: QUARTER)
+MOVE = Request(Operation(left=QUARTER, moves=True), way=lambda _own: QUARTER, rename=lambda _parent, name: (None, name))
 INVERT = Request(Operation(inverse=True))
 
 
