@@ -176,7 +176,7 @@ class Work:
                 if self.request.on_error == NULL:
                     odd += [(int(cut.starts[row, 0]), _null_row(cut, row, text)) for row in run.reasons]
                 found += [
-                    (int(cut.starts[row, 0]), Fault(run.block.line_of(row), *reason))
+                    (int(cut.starts[row, 0]), Fault.of(run.block.line_of(row), *reason))
                     for row, reason in run.reasons.items()
                 ]
                 doubted += [(run.block.line_of(row), angle) for row, angle in run.doubted[:1]]

@@ -247,10 +247,10 @@ def attempt(
         return use(record)
     except FormatError as error:
         column = getattr(error, "column_name", "") or (str(error.column) if error.column else "")
-        return Fault(max(error.line, 1) - 1, column, error.message)
+        return Fault(max(error.line, 1) - 1, column, error.message, kind=error.kind)
     except FrametoolError as error:
         below = record.line if record else 0
-        return Fault(line + below, getattr(error, "column_name", ""), str(error))
+        return Fault.of(line + below, getattr(error, "column_name", ""), error)
 
 
 def _decoded(text: bytes, source: str, line: int) -> str:
