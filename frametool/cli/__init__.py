@@ -30,7 +30,7 @@ COMMANDS = {
     "check": ("frametool.cli.commands.check", "what is wrong or odd in trees and recordings"),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
-INTERRUPTED = 130
+IN_OUT, INTERRUPTED = 5, 130  # exit codes
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -53,9 +53,10 @@ def run(arguments: list[str]) -> int:
 
     if sys.stdout is None:
         say("standard output is closed")
-        return 5
+        return IN_OUT
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.encoding.lower() != "utf-8":
         sys.stdout.reconfigure(encoding="utf-8")  # the same bytes in every locale
+    status = 0
     try:
         with heard_by(say_warning):
             status = _run(arguments)
@@ -67,10 +68,10 @@ def run(arguments: list[str]) -> int:
     except Terminated as error:
         status = die_of(error.number)
     except OSError as error:
-        say((error.strerror or str(error)).lower())
-        status = 5
-    if status == 5:
+        if status != IN_OUT:  # else it was told, and what is still in the buffer fails again
+            say((error.strerror or str(error)).lower())
         discard(sys.stdout)
+        status = IN_OUT
     return status
 
 

@@ -13,6 +13,7 @@ import click
 from frametool.cli.command import TEXT, Number
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
+from frametool.errors import FileProblem
 from frametool.frames.stamps import BILLION
 from frametool.sim.progress import Progress
 from frametool.sim.simulate import simulate
@@ -208,8 +209,10 @@ def check_files(plot: str | None, output: str | None, *, force: bool) -> None:
         raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {plot!r}")
     if plot and output and os.path.realpath(plot) == os.path.realpath(output) and not is_special(plot):
         raise click.UsageError(f"--output and --plot are the same file: {plot}")
-    for path in (plot, output):
+    for path in filter(None, (plot, output)):
         refuse_existing(path, force=force)
+        if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
+            raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     if plot and suffix_of(plot) == ".png":
         from frametool.view.plot_png import require_matplotlib
 

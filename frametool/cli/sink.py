@@ -46,14 +46,9 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
 
 
 def refuse_existing(path: str | None, *, force: bool) -> None:
-    """Raise FileProblem for a file that `writing` would refuse to replace, or that has no directory to stand in."""
-    if path is None or path == "-" or is_special(path):
-        return
-    if os.path.exists(path) and not force:
+    """Raise FileProblem for a file that `writing` would refuse to replace."""
+    if path is not None and path != "-" and not force and os.path.exists(path) and not is_special(path):
         raise FileProblem(f"{printable(path)}: exists; give --force to replace it")
-    folder = os.path.dirname(os.path.realpath(path))
-    if not os.path.isdir(folder):
-        raise FileProblem(f"{printable(path)}: no directory {printable(folder)}")
 
 
 def is_special(path: str) -> bool:

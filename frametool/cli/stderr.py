@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning
@@ -45,4 +46,5 @@ def say_error(error: FrametoolError, *, in_json: bool) -> None:
 
 def discard(stream: TextIO) -> None:
     """Let what is still buffered vanish, so that it does not raise again when the process ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
