@@ -36,10 +36,9 @@ IN_OUT, INTERRUPTED = 5, 130  # exit codes
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line as a program of its own and exit with its status."""
     try:
-        from frametool.cli.signals import catch_signals
+        from frametool.cli.signals import with_signals
 
-        catch_signals()
-        status = run(sys.argv[1:] if arguments is None else list(arguments))
+        status = with_signals(run, sys.argv[1:] if arguments is None else list(arguments))
     except KeyboardInterrupt:
         status = INTERRUPTED
     sys.exit(status)
@@ -47,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
-    from frametool.cli.signals import Terminated, die_of
+    from frametool.cli.signals import die_of
     from frametool.cli.stderr import discard, say, say_warning
     from frametool.errors import heard_by
 
@@ -65,8 +64,6 @@ def run(arguments: list[str]) -> int:
         from signal import SIGPIPE
 
         status = die_of(SIGPIPE)  # as `cat` does when its reader is gone
-    except Terminated as error:
-        status = die_of(error.number)
     except OSError as error:
         if status != IN_OUT:  # else it was told, and what is still in the buffer fails again
             say((error.strerror or str(error)).lower())

@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from types import FrameType
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Terminated(BaseException):
@@ -30,7 +32,7 @@ class _Signals:
     def end(self, number: int, _frame: FrameType | None) -> None:
         """Raise what ends the run; the first Ctrl-C waits until the line that is being written is out."""
         if number != signal.SIGINT:
-            for each in (signal.SIGTERM, signal.SIGHUP):
+            for each in ENDING:
                 signal.signal(each, signal.SIG_IGN)  # `timeout` sends it twice: nothing cuts the cleaning short
             raise Terminated(number)
         if self.interrupted or not self.writing:
@@ -41,11 +43,18 @@ class _Signals:
 _signals = _Signals()
 
 
-def catch_signals() -> None:
-    """Take over Ctrl-C, SIGTERM and SIGHUP; one that is ignored, as under nohup, stays ignored."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) not in (signal.SIG_IGN, None):
+def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
+    """Run the program with its signals taken over; one that is ignored, as SIGHUP under nohup, stays ignored."""
+    caught = [each for each in ENDING if signal.getsignal(each) not in (signal.SIG_IGN, None)]
+    try:
+        for number in caught:
             signal.signal(number, _signals.end)
+        return run(arguments)
+    except Terminated as error:
+        return die_of(error.number)
+    finally:
+        for number in caught:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def leave_signals() -> None:
