@@ -10,6 +10,7 @@ import click
 
 from frametool.cli.command import VERBOSE, Text, be_verbose
 from frametool.cli.poses import is_inline, source_of
+from frametool.cli.stderr import say
 from frametool.errors import warn
 from frametool.formats.load import load_sources, open_source
 
@@ -46,7 +47,7 @@ def announce(source: Source | Recording) -> None:
     context = click.get_current_context(silent=True)
     if context is not None and context.meta.get(VERBOSE):
         described = getattr(source, "described", f"{source.name}: a tree in YAML or JSON")
-        click.echo(f"frametool: {described}", err=True)
+        say(described)
 
 
 verbose_option = click.option(

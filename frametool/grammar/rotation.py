@@ -82,7 +82,7 @@ def _checked(form: Notation, numbers: Sequence[float], reading: Reading, *, degr
         )
     except ValueInvalid as error:
         raise NotARotation(str(error)) from None
-    for message in odd:
+    for _, message in odd:
         reading.note(message)
     return rotation
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid
+from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, rigid
 from frametool.stream.faults import NULL, STOP, Fault
 from frametool.stream.row_layout import IDENTITY, POSE, TURN, pose_of
@@ -82,7 +82,7 @@ class Run:
         """Do all of it."""
         self.plan = plan
         self.block = block
-        self.reasons: dict[int, tuple[str, str]] = {}
+        self.reasons: dict[int, tuple[str, str | FrametoolError]] = {}
         self.mended: list[int] = []
         self.doubted: list[tuple[int, str]] = []
         self.count = len(block.places)
@@ -97,7 +97,7 @@ class Run:
         if plan.unwrap and len(self.rows):
             _unwrap(self.results, plan.targets[0].angle_columns(), state)
 
-    def _blame(self, row: int, column: str, reason: str) -> None:
+    def _blame(self, row: int, column: str, reason: str | FrametoolError) -> None:
         """Keep the first reason why a row is bad."""
         self.reasons.setdefault(row, (column, reason))
 
@@ -244,7 +244,7 @@ class Run:
 
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""
-        found = [Fault(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
+        found = [Fault.of(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
         return sorted(found + [Fault(each.line, each.column, each.reason) for each in self.block.broken])
 
 

@@ -14,7 +14,7 @@ from frametool.stream.blocks import Plan, Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault
 from frametool.stream.record_stream import attempt, null_of
 from frametool.stream.rows import Block, texts_as_rows, written
-from frametool.stream.run import RowNote, Outcome
+from frametool.stream.run import Outcome, RowNote
 from frametool.stream.splitter import ARRAY, DOCUMENTS, LINES
 from frametool.stream.text_parts import In
 from frametool.text.cells import without_quotes
@@ -184,9 +184,10 @@ class RecordBlocks:
             run = Run(self._plan(cut.template), self._block(cut, data, text), self.state)
             runs.append(run)
             bad = [(int(run.block.places[row]), row) for row in run.reasons]
-            faults += [(place, Fault(run.block.line_of(row), *run.reasons[row])) for place, row in bad]
+            faults += [(place, Fault.of(run.block.line_of(row), *run.reasons[row])) for place, row in bad]
             odd += [] if skips else [(place, _null_row(cut, row, text)) for place, row in bad]
             notes += [RowNote.of_degrees(run.block.line_of(row), angle) for row, angle in run.doubted[:1]]
+            notes += [RowNote.of_rounding(run.block.line_of(row)) for row in sorted(run.mended)[:1]]
             if cut.template.unnamed and len(cut.starts):
                 notes.append(RowNote.of_lost_name(run.block.line_of(0), cut.template.unnamed))
         end = min((place for place, _ in faults), default=None) if stops else None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import FormatError, FrametoolError
 from frametool.ros.noise import NOISE
 from frametool.stream.faults import SKIP, STOP, Fault
-from frametool.stream.run import RowNote, Outcome, mapped
+from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.scalar import result_of
 from frametool.stream.splitter import ARRAY, Splitter
 from frametool.stream.template import learn, nulled
@@ -133,8 +133,9 @@ def _rendered(template: Template, request: Request, line: int) -> tuple[bytes, b
     try:
         text, mended, doubt = result_of(template, request)
     except FrametoolError as error:
-        return Fault(line, getattr(error, "column_name", ""), str(error))
+        return Fault.of(line, getattr(error, "column_name", ""), error)
     notes = [RowNote.of_degrees(line, doubt)] if doubt else []
+    notes += [RowNote.of_rounding(line)] * mended
     if template.unnamed:
         notes.append(RowNote.of_lost_name(line, template.unnamed))
     return text.encode(), mended, notes
@@ -163,9 +164,9 @@ def attempt(text: bytes, part: Part, form: str, request: Request, source: str) -
         return learn(decoded, request, json=form == "json", source=source, line=line + 1) or record
     except FormatError as error:
         column = getattr(error, "column_name", "") or (str(error.column) if error.column else "")
-        return Fault(max(error.line, 1) - 1, column, error.message)
+        return Fault(max(error.line, 1) - 1, column, error.message, kind=error.kind)
     except FrametoolError as error:
-        return Fault(line, getattr(error, "column_name", ""), str(error))
+        return Fault.of(line, getattr(error, "column_name", ""), error)
 
 
 def without_noise(text: str) -> str:

@@ -1,4 +1,4 @@
-"""A whole stream: blocks in, outcomes out in order, faults told after the good rows before them are out."""
+"""A whole stream: blocks in, outcomes out in order, faults reported after the good rows before them are out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from frametool.errors import warn
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.stream.faults import Fault, Policy
+    from frametool.stream.faults import BadRows, Fault
 
 MOST_WAITING = 2  # blocks a process may have ahead: memory stays flat
 
@@ -26,6 +26,11 @@ class RowNote(NamedTuple):
         """Wonder about an angle beyond a full turn."""
         remedy = "degrees? give --deg, or name the columns _deg"
         return cls(line, "degrees", f"{angle} is more than a full turn in radians; {remedy}")
+
+    @classmethod
+    def of_rounding(cls, line: int) -> RowNote:
+        """Tell that a rotation had to be normalised."""
+        return cls(line, "rounded", "the rotation is off by more than 1e-6 and was normalised")
 
     @classmethod
     def of_lost_name(cls, line: int, name: str) -> RowNote:
@@ -57,11 +62,11 @@ class Outcome(NamedTuple):
 
 
 def run(
-    outcomes: Iterable[Outcome], write: Callable[[bytes], None], policy: Policy, advance: Callable[[int, int], None]
+    outcomes: Iterable[Outcome], write: Callable[[bytes], None], bad: BadRows, advance: Callable[[int, int], None]
 ) -> int:
-    """Write what becomes of each block, tell of its faults, and give the exit status.
+    """Write what becomes of each block, report its faults, and return the exit status.
 
-    advance: is told rows and bytes done after each block.  Raises Stopped at the first fault if that is the rule.
+    advance: is told rows and bytes done after each block.  Raises BadRow at the first fault if that is the rule.
     """
     line, rows, mended = 1, 0, 0
     told: set[str] = set()
@@ -69,15 +74,19 @@ def run(
         if outcome.text:
             write(outcome.text)
         advance(outcome.rows, outcome.size)
-        for note in outcome.notes:
-            if note.about not in told:
-                told.add(note.about)
-                warn(f"{policy.source}:{line + note.line}: {note.sentence}")
-        policy.take(fault._replace(line=fault.line + line) for fault in outcome.faults)
+        faults = [fault._replace(line=fault.line + line) for fault in outcome.faults]
+        for note in outcome.notes:  # in the order of the lines
+            if note.about in told:
+                continue
+            told.add(note.about)
+            bad.take(fault for fault in faults if fault.line < line + note.line)
+            faults = [fault for fault in faults if fault.line >= line + note.line]
+            warn(f"{bad.source}:{line + note.line}: {note.sentence}")
+        bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
-    if mended:
-        warn(f"{policy.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
-    return policy.finish(rows)
+    if mended > 1:
+        warn(f"{bad.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
+    return bad.finish(rows)
 
 
 def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:

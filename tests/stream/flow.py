@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from frametool.errors import FrametoolError
 from frametool.geometry.representations import notation
-from frametool.stream.faults import Policy
+from frametool.stream.faults import BadRows
 from frametool.stream.operation import Operation
 from frametool.stream.record_stream import run_records
 from frametool.stream.request import Request
@@ -35,13 +35,13 @@ def flow(
 ) -> Flow:
     out = io.BytesIO()
     told: list[str] = []
-    policy = Policy("in", request.on_error, tell=told.append)
+    bad = BadRows("in", request.on_error, tell=lambda error: told.append(str(error)))
     try:
         if form in RECORDS:
             outcomes = run_records(io.BytesIO(text), form, request, source="in", size=size, jobs=jobs)
         else:
             outcomes = run_table(io.BytesIO(text), form, request, source="in", header=header, size=size, jobs=jobs)
-        status = run(outcomes, lambda block: [out.write(block)].clear(), policy, lambda _rows, _size: None)
+        status = run(outcomes, lambda block: [out.write(block)].clear(), bad, lambda _rows, _size: None)
     except FrametoolError as error:
         told.append(str(error))
         status = error.exit_code
