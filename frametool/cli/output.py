@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid
-from frametool.formats import FORMATS, writers
+from frametool.formats import FORMATS, by_suffix, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, is_locked, sample_results
@@ -44,7 +43,7 @@ class Output:
         """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
-        self.told = format_name or _form_by_suffix(output, what)
+        self.told = format_name or by_suffix(output, writers(what))
         self.notations = notations or ()
         form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
@@ -104,7 +103,7 @@ class Output:
         return FORMATS[self.style.form].writes if self.style.form in FORMATS else ()
 
     def _module(self, text_module: str) -> Any:
-        return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)
+        return import_module(FORMATS[self.style.form].writer if self.style.form in FORMATS else text_module)
 
     def message(self, message: Message, moved: Sequence[Stamped]) -> str:
         """Return the text of a message in which some moved: as it was spelled unless the command was told otherwise."""
@@ -126,7 +125,7 @@ class Output:
         if form == "csv":
             raise ValueInvalid("a message is nested and has no place in csv; write json, yaml, ros1 or ros2")
         style = self.style.in_form(form)
-        text: str = import_module(FORMATS[form].module).write_points([message.mapping()], style)
+        text: str = import_module(FORMATS[form].writer).write_points([message.mapping()], style)
         return f"{text}---\n" if form == "yaml" else text
 
     def pieces(self, pieces: Iterable[str]) -> None:
@@ -140,7 +139,3 @@ class Output:
         self.pieces([text])
 
 
-def _form_by_suffix(path: str | None, what: str) -> str | None:
-    """Name the form that a file's suffix stands for, if it can hold this kind of result."""
-    suffix = os.path.splitext(path)[1].lower() if path else ""
-    return next((name for name in writers(what) if suffix and suffix in FORMATS[name].suffixes), None)

@@ -12,11 +12,11 @@ import click
 
 from frametool.cli.command import TEXT, Notations, be_verbose
 from frametool.cli.stderr import say, say_error
-from frametool.documents.source import Source, decode
+from frametool.documents.source import HEAD, Source, decode
 from frametool.errors import FileProblem
-from frametool.formats.detect import HEAD
+from frametool.formats import FORMATS, readers
+from frametool.formats.detect import detect
 from frametool.stream.faults import MOST, ON_ERROR, STOP, BadRows
-from frametool.stream.stream_form import RECORDS, STREAMS, form_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
+STREAMED = ("records", "rows")
+RECORDS = readers("records")
 NAMES = (
     "input_path",
     "input_form",
@@ -63,7 +65,7 @@ def _number(least: int, default: int, summary: str) -> dict[str, Any]:
     return {"type": kind, "default": default, "show_default": True, "metavar": "N", "help": summary}
 
 
-FORM = {"type": click.Choice(tuple(STREAMS)), "help": "form of the stream  [default: by suffix or first line]"}
+FORM = {"type": click.Choice(readers(*STREAMED)), "help": "form of the stream  [default: by suffix or first line]"}
 GIVEN = {"type": Notations(), "metavar": "REP", "help": "what the rotations of VALUES or of a stream's columns are"}
 HEADER = {"is_flag": True, "flag_value": False, "default": True, "help": "a table without names; columns are numbered"}
 ON_BAD_ROWS = {"type": click.Choice(ON_ERROR), "default": STOP, "show_default": True, "help": "what bad rows do"}
@@ -118,9 +120,11 @@ class Stream:
         name = self.path or "stdin"
         with self.opened() as stream:
             begin = stream.peek()
-            form, known_by = form_of(begin, self.path or "", told=self.options["input_form"] or _table_form(output))
+            form, known_by = self.options["input_form"], ""
+            if form is None:
+                form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if self.options["verbose"] and known_by:
-                say(f"{name}: read as {form} ({STREAMS[form]}), known by {known_by}")
+                say(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             if form in RECORDS and not as_spelled and (output.told or form) != form:
@@ -175,11 +179,6 @@ class Stream:
         from frametool.stream.table_stream import run_table
 
         return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
-
-
-def _table_form(output: Output) -> str:
-    """Return the form of a table if --format names one: a table is written as it is read."""
-    return output.told if output.told in STREAMS and output.told not in RECORDS else ""
 
 
 def _opened(path: str | None) -> BufferedReader:

@@ -111,5 +111,11 @@ class Work:
         notes += [RowNote.of_rounding(block.line_of(row)) for row in sorted(run.mended)[:1]]
         rows = len(block.places) + len(block.broken)
         return Outcome(
-            written(run.groups(run.first_fault())), faults, rows, text.count(b"\n"), len(run.mended), sorted(notes), len(text)
+            written(run.groups(run.first_fault())),
+            faults,
+            rows,
+            text.count(b"\n"),
+            len(run.mended),
+            sorted(notes),
+            len(text),
         )

@@ -9,7 +9,7 @@ from flow import MOVE, flow
 from hypothesis import given
 from hypothesis import strategies as st
 
-from frametool.stream.record_stream import Splitter
+from frametool.stream.splitter import Splitter
 
 GOOD, TEXT, HUGE = '{"id": "a,]", "x": 1, "y": 2, "z": 3}', '{"x": "a", "y": 2, "z": 3}', '{"x": 1e999, "y": 2, "z": 3}'
 LAYOUTS = [
