@@ -9,7 +9,7 @@ import click
 
 from frametool.cli.command import FILE, Command, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.stderr import tell
+from frametool.cli.stderr import say
 from frametool.cli.times import Time, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
 from frametool.errors import NoDataAt
@@ -90,9 +90,9 @@ class Failures:
     def told(self) -> int:
         """Report them on stderr; returns the exit status."""
         if self.first is not None:
-            tell(f"frametool: {self.first}")
+            say(str(self.first))
         if self.count > 1:
-            tell(f"frametool: {self.count} times without data")
+            say(f"{self.count} times without data")
         return SKIPPED if self.count else 0
 
 
