@@ -303,7 +303,7 @@ def _with_flat_rotation(
     value: dict[str, Any], columns: Columns, record: Record, reading: Reading, request: Request
 ) -> Record:
     """Add a rotation whose numbers are members of the record itself."""
-    form, names, texts = columns.form, columns.names, [value[name] for name in columns.names]
+    form, names, texts = columns.notation, columns.names, [value[name] for name in columns.names]
     if form is None or request.poses != 1:
         raise Misfit("a record holds one pose; two in a row are for tables")
     places = [(name,) for name in names]
@@ -342,7 +342,8 @@ def _with_position(record: Record, value: Any, below: Path, metre: float, *, par
 def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
     """Add the rotation's numbers."""
     form, texts, places = shape_of(key, value)
-    whole = len(texts) == 16
+    joined = form.representation.whole
+    whole = joined is not None and len(texts) == len(joined.columns)
     if whole and record.shape.unit is not None:
         raise Misfit("a 4x4 matrix is the whole pose; leave xyz out, or write the 3x3 rotation", below)
     if request.poses != 1:
