@@ -28,6 +28,11 @@ class RowNote(NamedTuple):
         return cls(line, "degrees", f"{angle} is more than a full turn in radians; {remedy}")
 
     @classmethod
+    def of_lost_name(cls, line: int, name: str) -> RowNote:
+        """Tell that a frame is not named any more."""
+        return cls(line, "unnamed", f"frame {name!r} is left out: the frames of the result are not known")
+
+    @classmethod
     def of_rounding(cls, line: int) -> RowNote:
         """Tell that a rotation had to be normalised."""
         return cls(line, "rounded", "the rotation is off by more than 1e-6 and was normalised")
