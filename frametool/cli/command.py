@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from frametool.cli.help import WithHelp
+from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid
 from frametool.formats import writers
 from frametool.geometry.euler import AXES
@@ -108,17 +109,26 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
         return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
 
 
+TEXT = Text()
+FILE = File()
 VERBOSE = "frametool.verbose"  # where a command's context keeps that -v was given
 
 
-def be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> bool:
-    """Remember that -v was given, for whatever opens files."""
+def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:
     context.meta[VERBOSE] = chosen
-    return chosen
 
 
-TEXT = Text()
-FILE = File()
+verbose_option = click.option(
+    "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
+    help="say on stderr what each input was taken for",
+)  # fmt: skip
+
+
+def say_if_verbose(text: str) -> None:
+    """Write a line on stderr if the command was called with -v."""
+    context = click.get_current_context(silent=True)
+    if context is not None and context.meta.get(VERBOSE):
+        say(text)
 
 
 def result_options(what: str) -> Callable[[Function], Function]:

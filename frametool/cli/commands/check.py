@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Command
+from frametool.cli.command import FILE, Command, verbose_option
 from frametool.cli.recordings import opened
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import verbose_option
 from frametool.lint.findings import RULES, WRITERS, Finding
 from frametool.lint.reading import read_all
 from frametool.lint.rules import lint

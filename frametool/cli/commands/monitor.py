@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, Command, result_options
+from frametool.cli.command import FILE, TEXT, Command, result_options, verbose_option
 from frametool.cli.output import Output
 from frametool.cli.recordings import opened
-from frametool.cli.trees import verbose_option
 from frametool.errors import FormatError
 from frametool.formats.recordings import samples_of
 from frametool.frames.edge_log import EdgeLog, chain
