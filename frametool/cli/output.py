@@ -1,4 +1,4 @@
-"""Results on their way out: which form, and to where."""
+"""Results: in which form they are written, and where to."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Output:
         deg: bool = False,
         keep_sign: bool = False,
     ) -> None:
-        """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+        """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
         self.told = format_name or _form_by_suffix(output, what)
@@ -82,7 +82,7 @@ class Output:
             self.text(write_tree(tree, self.style))
 
     def tell_of_lock(self, poses: Sequence[Pose]) -> None:
-        """Say of a single result that its Euler angles are not unique."""
+        """Report that the Euler angles of a single result are not unique."""
         if len(poses) == 1 and any(is_locked(poses[0], form) for form in self.style.notations):
             say("note: gimbal lock: the angles are not unique; the third was set to 0")
 
