@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
+MOST_JOBS = 256
 OPTIONS = {
     "input_path": click.option(
         "-i", "--input", "input_path", type=TEXT, metavar="FILE", help="stream from this file instead of standard input"
@@ -60,7 +61,7 @@ OPTIONS = {
         help="report at most N bad rows; all are counted",
     ),
     "jobs": click.option(
-        "--jobs", type=click.IntRange(1), default=1, show_default=True, metavar="N",
+        "--jobs", type=click.IntRange(1, MOST_JOBS), default=1, show_default=True, metavar="N",
         help="processes for a large stream",
     ),
     "quiet": click.option("--quiet", is_flag=True, help="no progress on stderr"),
