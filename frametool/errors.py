@@ -216,8 +216,10 @@ def listing(names: Iterable[str], most: int = 20) -> str:
 
 
 def printable(name: str) -> str:
-    """Return a name as a terminal may show it: control characters as escapes, so that none can steer it."""
-    return name if name.isprintable() else repr(name)[1:-1]
+    """Return text on one line as a terminal may show it: control characters as escapes, so that none can steer it."""
+    if name.isprintable():
+        return name
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in name)
 
 
 def quoted(value: object) -> str:

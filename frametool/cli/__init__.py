@@ -5,6 +5,7 @@ Nothing is imported here that takes time: from the first moment on Ctrl-C ends t
 
 from __future__ import annotations
 
+import os
 import sys
 from io import TextIOWrapper
 from typing import TYPE_CHECKING
@@ -35,6 +36,7 @@ IN_OUT, INTERRUPTED = 5, 130  # exit codes
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line as a program of its own and exit with its status."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads that nothing here uses cost memory
     try:
         from frametool.cli.signals import with_signals
 
@@ -64,6 +66,12 @@ def run(arguments: list[str]) -> int:
         from signal import SIGPIPE
 
         status = die_of(SIGPIPE)  # as `cat` does when its reader is gone
+    except MemoryError:
+        say("out of memory")
+        status = IN_OUT
+    except ImportError as error:  # numpy's tells of missing memory and files in many lines, the cause in the last one
+        say(f"a library cannot be loaded: {str(error).strip().splitlines()[-1]}")
+        status = IN_OUT
     except OSError as error:
         if status != IN_OUT:  # else it was told, and what is still in the buffer fails again
             say((error.strerror or str(error)).lower())

@@ -9,7 +9,7 @@ import click
 
 from frametool.cli.help import WithHelp
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, quoted
 from frametool.formats import writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import REPRESENTATIONS, notation
@@ -47,19 +47,23 @@ class Command(WithHelp):
 
 
 class Text(click.ParamType[str]):
-    """A text argument, without the blank that shields negative numbers."""
+    """A text argument in UTF-8, without the blank that shields negative numbers."""
 
     name = "text"
+    any_bytes = False
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
-        """Take the shield off."""
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Remove the blank; refuse bytes that are no text."""
+        if isinstance(value, str) and not self.any_bytes and any("\ud800" <= each <= "\udfff" for each in value):
+            self.fail(f"{quoted(value)} is not UTF-8 text", param, ctx)
         return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
 
 
 class File(Text):
-    """A file's name, which the shell completes."""
+    """A file's name, whatever bytes the system takes for one; the shell completes it."""
 
     name = "file"
+    any_bytes = True
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
         """Leave it to the shell."""

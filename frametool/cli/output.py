@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, printable
 from frametool.formats import FORMATS, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
@@ -133,7 +133,7 @@ class Output:
         """Write text as it comes; into a file, whole or not at all."""
         with writing(self.path, force=self.force) as write:
             for piece in pieces:
-                write(piece)
+                write("\n".join(map(printable, piece.split("\n"))) if self.style.form == "text" else piece)
 
     def text(self, text: str) -> None:
         """Write text."""

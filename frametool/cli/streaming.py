@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Notations, decorated, say_if_verbose, verbose_option
+from frametool.cli.command import FILE, TEXT, Notations, decorated, say_if_verbose, verbose_option
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import Source, decode
 from frametool.errors import FileProblem
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 MOST_JOBS = 256
 OPTIONS = {
     "input_path": click.option(
-        "-i", "--input", "input_path", type=TEXT, metavar="FILE", help="stream from this file instead of standard input"
+        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream from this file instead of standard input"
     ),
     "input_form": click.option(
         "--in", "input_form", type=click.Choice(tuple(STREAMS)),
