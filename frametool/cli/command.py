@@ -47,23 +47,29 @@ class Command(WithHelp):
 
 
 class Text(click.ParamType[str]):
-    """A text argument in UTF-8, without the blank that shields negative numbers."""
+    """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes."""
 
     name = "text"
-    any_bytes = False
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Remove the blank; refuse bytes that are no text."""
-        if isinstance(value, str) and not self.any_bytes and any("\ud800" <= each <= "\udfff" for each in value):
-            self.fail(f"{quoted(value)} is not UTF-8 text", param, ctx)
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+        """Remove the blank."""
         return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
 
 
+class Utf8(Text):
+    """Text that will be part of a result."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse bytes that are no text."""
+        if any("\ud800" <= each <= "\udfff" for each in str(value)):
+            self.fail(f"{quoted(value)} is not UTF-8 text", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 class File(Text):
-    """A file's name, whatever bytes the system takes for one; the shell completes it."""
+    """A file's name, which the shell completes."""
 
     name = "file"
-    any_bytes = True
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
         """Leave it to the shell."""
@@ -114,6 +120,7 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
 
 
 TEXT = Text()
+UTF8 = Utf8()
 FILE = File()
 VERBOSE = "frametool.verbose"  # where a command's context keeps that -v was given
 

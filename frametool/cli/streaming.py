@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, Notations, decorated, say_if_verbose, verbose_option
+from frametool.cli.command import FILE, TEXT, UTF8, Notations, decorated, say_if_verbose, verbose_option
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import Source, decode
 from frametool.errors import FileProblem
@@ -47,7 +47,7 @@ OPTIONS = {
     ),
     "keep": click.option("--keep", is_flag=True, help="add the result's columns instead of replacing ours"),
     "prefix": click.option(
-        "--prefix", type=TEXT, default="", metavar="TEXT", help="put this before the names of the result's columns"
+        "--prefix", type=UTF8, default="", metavar="TEXT", help="put this before the names of the result's columns"
     ),
     "header": click.option(
         "--no-header", "header", is_flag=True, flag_value=False, default=True,
