@@ -100,17 +100,21 @@ def _run(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except click.ClickException as error:
-        problem = Misused(_usage(error))
+        problem = Misused(_usage(error, arguments))
     except FrametoolError as error:
         problem = error
     say_error(problem, in_json=wants_json(arguments))
     return problem.exit_code
 
 
-def _usage(error: click.ClickException) -> str:
-    """Put a usage error on one line, with how the command is called."""
+def _usage(error: click.ClickException, arguments: list[str]) -> str:
+    """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
+    from frametool.errors import SHOWN, quoted
+
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
+    for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
+        message = message.replace(repr(text), quoted(text)).replace(text, quoted(text)[1:-1])
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
     if ctx is None or ctx.parent is None:

@@ -97,7 +97,8 @@ def test_a_terminal_is_as_before(number: int, arguments: list[str]) -> None:
     before = termios.tcgetattr(theirs)
     environment = ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "80", "LINES": "24"}
     with subprocess.Popen(
-        [*TOOL, "sim", *arguments], stdin=theirs, stdout=theirs, stderr=theirs, env=environment, preexec_fn=_by_default
+        [*TOOL, "sim", *arguments], stdin=theirs, stdout=theirs, stderr=theirs, env=environment,
+        preexec_fn=_by_default,  # noqa: PLW1509 - no thread is running yet
     ) as tool:
         drawn = b""
         while b"\x1b[?25l" not in drawn or drawn.count(b"turtle2") < 2:  # it is drawing, without a cursor
