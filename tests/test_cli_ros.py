@@ -223,14 +223,14 @@ def test_each_message_moves_at_its_own_stamp(run: Run) -> None:
 @pytest.mark.parametrize("form", ["ros1", "ros2"])
 def test_messages_come_out_as_they_went_in(run: Run, form: str) -> None:
     twist = {"linear": {"x": 2.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": -0.25}}
-    pose = {"position": {"x": 1.0, "y": 0.0, "z": 1e-05}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}}
-    for message in (twist, POINTS[0], stamped(5, pose=pose), {"transforms": [transform("map", "on", EPOCH + 1)]}):
+    pose = {"position": {"x": 1.0, "y": 0.0, "z": 0.125}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}}
+    for message in (twist, POINTS[0], stamped(5, pose=pose), {"transforms": [transform("cam", "on", EPOCH + 1)]}):
         text = message_text(message, Style(form))
-        assert run("apply", "--transform", "{}", stdin=text).out == text
+        assert run("apply", "--transform", "{name: cam, parent: cam, xyz: [0, 0, 0]}", stdin=text).out == text
 
 
 def test_a_message_is_written_in_the_spelling_asked_for(run: Run) -> None:
-    out = run("apply", "--transform", "{}", "-f", "ros1", stdin=json.dumps(POINTS[0])).out
+    out = run("apply", "--transform", "{name: cam, parent: cam}", "-f", "ros1", stdin=json.dumps(POINTS[0])).out
     assert out.startswith('header: \n  seq: 0\n  stamp: \n    secs: 1700000000\n    nsecs:         1\n  frame_id: "cam"\n')
 
 
@@ -323,6 +323,38 @@ def test_check_and_lookup_report_a_cycle_alike(run: Run, turn: int) -> None:
     error = json.loads(run("lookup", "-", "a", "c", "-f", "json", stdin=text).err)
     assert error["line"] == cycle["line"]
     assert error["message"].endswith(cycle["message"])
+
+
+NEAR_ROTATION = "[[1, 0.00001, 0], [0, 1, 0], [0, 0, 1]]"
+
+
+@pytest.mark.parametrize(
+    ("entry", "rule"),
+    [
+        (f"{{name: a, parent: map, matrix: {NEAR_ROTATION}}}", "rounded"),
+        ("{name: a, parent: map, matrix: [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}", "denormalized"),
+        ("{name: a, parent: map, matrix: [[1, 0, 0], [1, 0, 0], [0, 0, 1]]}", "denormalized"),
+        ("{name: a, parent: map, axis_angle: {axis: [0, 0, 0], angle: 1}}", "denormalized"),
+        ("{name: a, parent: map, rotvec: [.inf, 0, 0]}", "not-finite"),
+        ("{name: a, parent: map, rpy: [1e999, 0, 0]}", "not-finite"),
+        ("{name: a, parent: map, xyz: [mirrored, 0, 0]}", "syntax"),
+        ("{name: a, parent: map, xyz: ['not finite', 0, 0]}", "syntax"),
+        ("{name: a, parent: map, rpy: ['degrees?', 0, 0]}", "syntax"),
+        ("{name: 'normalised', parent: map, xyz: [1, 0, 0], its own parent: 1}", "syntax"),
+        ("{name: mirrored, parent: map}", "identity"),
+        ("{name: /normalised, parent: map, xyz: [1, 0, 0]}", "slash"),
+    ],
+)
+def test_the_rule_of_a_finding_never_comes_from_words_that_the_file_holds(run: Run, entry: str, rule: str) -> None:
+    (found,) = findings(run, entry)
+    assert (found["rule"], found["level"]) == (rule, RULES[rule][0])
+
+
+def test_a_call_of_static_transform_publisher_has_the_rules_of_its_numbers(run: Run) -> None:
+    text = "rosrun tf static_transform_publisher 0 0 0 0 0 0 {} normalised b\n".replace("rosrun tf ", "")
+    assert [each["rule"] for each in findings(run, text.format("1.0001"))] == ["rounded"]
+    assert [each["rule"] for each in findings(run, text.format("1.1"))] == ["denormalized"]
+    assert [each["rule"] for each in findings(run, text.format("1 0 0 0"))] == ["syntax"]
 
 
 def test_one_bad_entry_does_not_hide_the_others(run: Run) -> None:

@@ -12,11 +12,11 @@ import click
 
 from frametool.cli.command import FILE, TEXT, UTF8, Notations, decorated, say_if_verbose, verbose_option
 from frametool.cli.stderr import say, say_error
-from frametool.documents.source import Source, decode
+from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
-from frametool.formats.detect import HEAD
-from frametool.stream.faults import MOST, ON_ERROR, STOP, BadRows
-from frametool.stream.stream_form import RECORDS, STREAMS, form_of
+from frametool.formats import FORMATS, readers
+from frametool.formats.detect import detect
+from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -29,12 +29,14 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 MOST_JOBS = 256
+STREAMED = ("records", "rows")
+RECORDS = readers("records")
 OPTIONS = {
     "input_path": click.option(
         "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream from this file instead of standard input"
     ),
     "input_form": click.option(
-        "--in", "input_form", type=click.Choice(tuple(STREAMS)),
+        "--in", "input_form", type=click.Choice(readers(*STREAMED)),
         help="form of the stream  [default: by suffix or first line]",
     ),
     "given": click.option(
@@ -92,6 +94,10 @@ class Stream:
             self._opened = _opened(self.path)
         return self._opened
 
+    def has_input(self) -> bool:
+        """Tell whether something is piped in."""
+        return sys.stdin is not None and not sys.stdin.isatty() and bool(self.opened().peek(1))
+
     def is_wanted(self, argument: object) -> bool:
         """Tell whether standard input or -i FILE is to be read in this argument's place."""
         if self.path is not None and argument not in (None, "-"):
@@ -99,28 +105,35 @@ class Stream:
         return self.path is not None or argument in (None, "-")
 
     def run(
-        self, request: Request, output: Output, *, tables_only: bool = False, as_spelled: bool = False
-    ) -> int | Source:
-        """Run the stream and return its exit status, or the text of a few records that are to be shown otherwise.
-
-        as_spelled: records cannot be shown otherwise than they are spelled.
-        """
+        self, request: Request, output: Output, *, tables_only: bool = False
+    ) -> int:
+        """Run the stream and return its exit status."""
         name = self.path or "stdin"
         with self.opened() as stream:
             begin = stream.peek()
-            form, known_by = form_of(begin, self.path or "", told=self.options["input_form"] or _table_form(output))
+            form, known_by = self.options["input_form"], ""
+            if form is None:
+                form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
-                say_if_verbose(f"{name}: read as {form} ({STREAMS[form]}), known by {known_by}")
+                say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
-            if form in RECORDS and not as_spelled and (output.told or form) != form:
-                return Source(name, decode(stream.read(), name))
-            stays = as_spelled or form not in RECORDS
-            if stays and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
+            request = self._completed(request, output, form)
+            if form in RECORDS and (output.told or form) != form:
+                return self._run_as_values(stream, form, request, output)
+            if form not in RECORDS and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
                 raise click.UsageError(
                     f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
                 )
-            return self._run(stream, form, self._completed(request, output, form), output)
+            return self._run(stream, form, request, output)
+
+    def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        """Write the results of records in another form than theirs."""
+        from frametool.stream.record_values import stream_results
+
+        bad = self.policy(self.path or "stdin")
+        output.values(stream_results(stream, form, request, output.style, bad))
+        return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str) -> BadRows:
         """Return what reports and counts the bad rows of a source."""
@@ -165,11 +178,6 @@ class Stream:
         from frametool.stream.table_stream import run_table
 
         return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
-
-
-def _table_form(output: Output) -> str:
-    """Return the form of a table if --format names one: a table is written as it is read."""
-    return output.told if output.told in STREAMS and output.told not in RECORDS else ""
 
 
 def _opened(path: str | None) -> BufferedReader:

@@ -49,7 +49,8 @@ def check(
         ValueInvalid: not finite, or the axis is zero.
     """
     if not all(map(isfinite, (ax, ay, az, angle))):
-        raise ValueInvalid(f"axis {ax:g} {ay:g} {az:g}, angle {angle:g} is not finite; give finite numbers")
+        shown = f"axis {ax:g} {ay:g} {az:g}, angle {angle:g}"
+        raise ValueInvalid(f"{shown} is not finite; give finite numbers", rule="not-finite")
     if not (ax or ay or az):
-        raise ValueInvalid("axis 0 0 0 has no direction; give a non-zero one")
+        raise ValueInvalid("axis 0 0 0 has no direction; give a non-zero one", rule="denormalized")
     return ax, ay, az, angle

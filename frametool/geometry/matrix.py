@@ -104,26 +104,28 @@ def check(*values: float, normalize: bool = False) -> Matrix:
     off = defect(*entries, floats)
     problem = complaint(entries, off, normalize=normalize)
     if problem:
-        raise ValueInvalid(problem)
+        raise problem
     if off <= ORTHONORMAL:
         return entries
     if off > SILENT and not normalize:
-        warn(f"matrix is orthonormal only to {off:.2g} and was replaced by the nearest rotation")
+        warn(f"matrix is orthonormal only to {off:.2g} and was replaced by the nearest rotation", rule="rounded")
     return nearest(*scaled(*entries, floats), floats)
 
 
-def complaint(entries: Matrix, off: float, *, normalize: bool) -> str:
-    """Say why a matrix that far from orthonormal is refused, or nothing."""
+def complaint(entries: Matrix, off: float, *, normalize: bool) -> ValueInvalid | None:
+    """Make the error for a matrix that far from orthonormal; None if it is not refused."""
     if not all(abs(value) < float("inf") for value in entries):
-        return f"matrix {_shown(entries)} is not finite; give nine finite numbers"
+        return ValueInvalid(f"matrix {_shown(entries)} is not finite; give nine finite numbers", rule="not-finite")
     if not normalize and not off <= TOLERATED and not (off < 1.0 and determinant(*entries) < 0.0):
-        return f"matrix is not a rotation: its rows are orthonormal only to {off:.2g} (normalize it with --normalize)"
+        off_by = f"its rows are orthonormal only to {off:.2g} (normalize it with --normalize)"
+        return ValueInvalid(f"matrix is not a rotation: {off_by}", rule="denormalized")
     volume = relative_volume(*entries, floats)
     if volume < -SINGULAR:
-        return f"matrix has determinant {determinant(*entries):.6g}: it is left-handed (mirrored); a rotation has 1"
+        found = f"matrix has determinant {determinant(*entries):.6g}"
+        return ValueInvalid(f"{found}: it is left-handed (mirrored); a rotation has 1", rule="mirrored")
     if volume <= SINGULAR:
-        return f"matrix {_shown(entries)} is singular; no rotation is nearest to it"
-    return ""
+        return ValueInvalid(f"matrix {_shown(entries)} is singular; no rotation is nearest to it", rule="denormalized")
+    return None
 
 
 def scaled(

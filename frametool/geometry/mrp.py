@@ -37,5 +37,6 @@ def check(
         ValueInvalid: not finite, or so long that its square overflows.
     """
     if not all(abs(value) <= LIMIT for value in (px, py, pz)):
-        raise ValueInvalid(f"mrp {px:g} {py:g} {pz:g} is not finite or too long; give numbers below {LIMIT:g}")
+        shown = f"mrp {px:g} {py:g} {pz:g}"
+        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below {LIMIT:g}", rule="not-finite")
     return px, py, pz

@@ -192,9 +192,9 @@ def check(x: float, y: float, z: float, w: float, *, normalize: bool = False) ->
     norm = floats.length(x, y, z, w)
     problem = complaint(x, y, z, w, norm, normalize=normalize)
     if problem:
-        raise ValueInvalid(problem)
+        raise problem
     if abs(norm - 1.0) > SILENT and not normalize:
-        warn(f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown(norm)} and was normalised")
+        warn(f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown(norm)} and was normalised", rule="rounded")
     return normalized(x, y, z, w, floats)
 
 
@@ -203,16 +203,17 @@ def _shown(norm: float) -> str:
     return f"{norm:.6g}" if f"{norm:.6g}" != "1" else f"{norm:.9g}"
 
 
-def complaint(x: float, y: float, z: float, w: float, norm: float, *, normalize: bool) -> str:
-    """Say why a quaternion of this norm is refused, or nothing."""
+def complaint(x: float, y: float, z: float, w: float, norm: float, *, normalize: bool) -> ValueInvalid | None:
+    """Make the error for a quaternion of this norm that is refused; None if it is not."""
     shown = f"quaternion {x:g} {y:g} {z:g} {w:g}"
     if norm == 0.0:
-        return f"{shown} has no direction; give a non-zero one"
+        return ValueInvalid(f"{shown} has no direction; give a non-zero one", rule="denormalized")
     if not all(abs(value) < float("inf") for value in (x, y, z, w)):
-        return f"{shown} is not finite; give four finite numbers"
+        return ValueInvalid(f"{shown} is not finite; give four finite numbers", rule="not-finite")
     if normalize or abs(norm - 1.0) <= TOLERATED:
-        return ""
-    return f"{shown} has norm {_shown(norm)}; a rotation needs norm 1 (normalize it with --normalize)"
+        return None
+    message = f"{shown} has norm {_shown(norm)}; a rotation needs norm 1 (normalize it with --normalize)"
+    return ValueInvalid(message, rule="denormalized")
 
 
 def between(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:

@@ -49,5 +49,5 @@ def check(
     """
     if not all(abs(value) <= LIMIT for value in (rx, ry, rz)):
         shown = f"rotation vector {rx:g} {ry:g} {rz:g}"
-        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below {LIMIT:g}")
+        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below {LIMIT:g}", rule="not-finite")
     return rx, ry, rz

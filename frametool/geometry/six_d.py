@@ -53,10 +53,10 @@ def check(
     """
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
     if not all(map(isfinite, (ax, ay, az, bx, by, bz))):
-        raise ValueInvalid(f"{shown} are not finite; give six finite numbers")
+        raise ValueInvalid(f"{shown} are not finite; give six finite numbers", rule="not-finite")
     if not (ax or ay or az) or not (bx or by or bz):
-        raise ValueInvalid(f"{shown} span no plane: one is zero")
+        raise ValueInvalid(f"{shown} span no plane: one is zero", rule="denormalized")
     first, second = unit_vector(ax, ay, az, floats), unit_vector(bx, by, bz, floats)
     if floats.length(*cross(*first, *second)) <= PARALLEL:
-        raise ValueInvalid(f"{shown} span no plane: they are parallel")
+        raise ValueInvalid(f"{shown} span no plane: they are parallel", rule="denormalized")
     return ax, ay, az, bx, by, bz

@@ -4,34 +4,49 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.geometry import quaternion, rigid
-from frametool.stream.row_layout import VECTOR
+from frametool.geometry import quaternion, rigid, spatial
+from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Components, Namespace, Rigid
+    from frametool.geometry.types import Components, Namespace, Number, Rigid
+    from frametool.stream.row_layout import Shape
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 
 
-class Operation(NamedTuple):
-    """Products with fixed poses before and after each row, after it was turned around if asked for.
+def _turn(_x: Number, _y: Number, _z: Number, *numbers: Number) -> Components:
+    return quaternion.rotate(*numbers)
 
-    left, right: applied as left @ row @ right
+
+MOVERS: dict[str, Callable[..., Components]] = {
+    POINT: rigid.apply,
+    VECTOR: _turn,
+    TWIST: spatial.move_twist,
+    WRENCH: spatial.move_wrench,
+}  # a pose is composed: `Operation.pose`
+
+
+class Operation(NamedTuple):
+    """What is done to each row: turned around if asked for, then multiplied with fixed poses, then compared.
+
+    left, right: applied as left @ row @ right[0] @ right[1] ..
     inverse: the row itself is inverted first
-    of: "" for nothing more; else relative: "first" inverse(fixed) row, "second" inverse(row) fixed, "pair" the two
-        poses of a row, "previous" the row before and this one
+    of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
+        "pair" the two poses of a row, "previous" the row before and this one
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
+    turns: only the rotation changes; the position, if there is one, stays as it is
     """
 
     left: Rigid | None = None
-    right: Rigid | None = None
+    right: tuple[Rigid, ...] = ()
     inverse: bool = False
     of: str = ""
     fixed: Rigid | None = None
     moves: bool = False
+    turns: bool = False
 
     @property
     def extras(self) -> tuple[str, ...]:
@@ -41,15 +56,39 @@ class Operation(NamedTuple):
     @property
     def changes_nothing(self) -> bool:
         """Tell whether rows only change their notation."""
-        return self.left is self.right is None and not self.inverse and not self.of
+        return self._is_bare and not self.inverse
 
-    def point(self, kind: str, position: Components, edge: Rigid | None) -> Components:
-        """Move a point or a vector by `edge`, else by `left`."""
+    @property
+    def keeps_position(self) -> bool:
+        """Tell whether positions stay as they are written."""
+        return self.changes_nothing or self.turns
+
+    @property
+    def only_inverts(self) -> bool:
+        """Tell whether rows are turned around and nothing else."""
+        return self._is_bare and self.inverse
+
+    @property
+    def _is_bare(self) -> bool:
+        return not (self.left or self.right or self.of or self.moves)
+
+    def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
+        """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
         mover = edge or self.left
         if mover is None:
-            return position
-        x, y, z = position
-        return quaternion.rotate(*mover[3:], x, y, z) if kind == VECTOR else rigid.apply(*mover, x, y, z)
+            return numbers
+        own = shape.own_size
+        moved: Components = MOVERS[shape.kind](*mover, *numbers[:own])
+        return (*moved, *self.covariance(shape, numbers[own:], mover))
+
+    def covariance(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
+        """Move the covariance of a pose or a twist by `edge`, else by `left`; nothing where there is none."""
+        mover = edge or self.left
+        if not shape.covariance or mover is None:
+            return numbers
+        if shape.kind == POSE:
+            return tuple(spatial.rotate_covariance(*mover[3:], numbers))
+        return tuple(spatial.move_twist_covariance(*mover, numbers))
 
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
         """Return the resulting pose, and what else is known about it."""
@@ -57,8 +96,8 @@ class Operation(NamedTuple):
         left = edge or self.left
         if left is not None:
             result = rigid.compose(*left, *result)
-        if self.right is not None:
-            result = rigid.compose(*result, *self.right)
+        for right in self.right:
+            result = rigid.compose(*result, *right)
         return self._relative([result, *poses[1:]], xp) if self.of else result
 
     def _relative(self, poses: Sequence[Rigid], xp: Namespace) -> Components:

@@ -8,7 +8,7 @@ import numpy as np
 
 from frametool.errors import FrametoolError
 from frametool.stream.row_layout import IDENTITY
-from frametool.stream.stamp_columns import parse_stamps
+from frametool.stream.stamp_columns import parse_header_stamps, parse_stamps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -46,14 +46,17 @@ def _edge(edge_of: Callable[[str], Rigid], name: str) -> tuple[Rigid, FrametoolE
         return NOWHERE, error
 
 
-def by_time(timed: Timed, stamps: Spans, frames: Sequence[str | None], blame: Blame, column: str = "") -> Rigid:
+def by_time(
+    timed: Timed, stamps: tuple[Spans, ...], frames: Sequence[str | None], blame: Blame, column: str = ""
+) -> Rigid:
     """Return the pose of each row at its stamp; a row without a stamp or without data then is bad.
 
-    frames: one a row, or one for all (None: the one SOURCE); column: the one that names them.
+    stamps: one for each row, or its seconds and nanoseconds
+    frames: one a row, or one for all (None: the one SOURCE); column: the one that names them
     """
-    times, reasons = parse_stamps(stamps, in_ns=timed.in_ns)
+    times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=timed.in_ns)
     for row, reason in reasons.items():
-        blame(row, timed.name, reason)
+        blame(row, timed.column, reason)
     poses = np.full((7, len(times)), np.nan)
     for frame, rows in _by_frame(frames, np.delete(np.arange(len(times)), list(reasons))):
         _fill(poses, timed, frame, rows, times, blame, column)
@@ -78,7 +81,7 @@ def _fill(poses: Floats, timed: Timed, frame: str | None, rows: Ints, times: Int
             blame(row, column, error)
     else:
         for row in rows[np.isnan(poses[6, rows])].tolist():
-            blame(row, timed.name, _reason(timed, frame, int(times[row])))
+            blame(row, timed.column, _reason(timed, frame, int(times[row])))
 
 
 def _reason(timed: Timed, frame: str | None, stamp_ns: int) -> str | FrametoolError:

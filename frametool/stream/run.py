@@ -12,13 +12,35 @@ if TYPE_CHECKING:
     from frametool.stream.faults import BadRows, Fault
 
 
+class RowNote(NamedTuple):
+    """Something worth telling about a row: its line from 0, what it is about, and the sentence."""
+
+    line: int
+    about: str
+    sentence: str
+
+    @classmethod
+    def of_degrees(cls, line: int, angle: str) -> RowNote:
+        """Wonder about an angle beyond a full turn."""
+        remedy = "degrees? give --deg, or name the columns _deg"
+        return cls(line, "degrees", f"{angle} is more than a full turn in radians; {remedy}")
+
+    @classmethod
+    def of_rounding(cls, line: int) -> RowNote:
+        """Tell that a rotation had to be normalised."""
+        return cls(line, "rounded", "the rotation is off by more than 1e-6 and was normalised")
+
+
 class Outcome(NamedTuple):
     """What became of a block.
 
-    faults: by line, counted from 0 in the block
+    text: what is written
+    faults: the bad rows, by line from 0
     rows, lines, size: how many rows, lines and bytes the block had
-    mended: rotations that were normalised
-    doubted: lines with an angle that looks like degrees, and that angle
+    mended: how many rotations were off and normalised
+    notes: what is worth telling
+    kept: how many rows are in the text
+    is_open: whether an array goes on behind the block; None for what is no array
     """
 
     text: bytes
@@ -26,8 +48,10 @@ class Outcome(NamedTuple):
     rows: int = 0
     lines: int = 0
     mended: int = 0
-    doubted: Sequence[tuple[int, str]] = ()
+    notes: Sequence[RowNote] = ()
     size: int = 0
+    kept: int = 0
+    is_open: bool | None = None
 
 
 def run(
@@ -37,27 +61,25 @@ def run(
 
     advance: is told rows and bytes done after each block.  Raises BadRow at the first fault if that is the rule.
     """
-    line, rows, mended, doubted = 1, 0, 0, False
+    line, rows, mended = 1, 0, 0
+    told: set[str] = set()
     for outcome in outcomes:
         if outcome.text:
             write(outcome.text)
         advance(outcome.rows, outcome.size)
         faults = [fault._replace(line=fault.line + line) for fault in outcome.faults]
-        if outcome.doubted and not doubted:
-            doubted = True
-            at, angle = outcome.doubted[0]
-            bad.take(fault for fault in faults if fault.line < line + at)
-            _suspect_degrees(f"{bad.source}:{line + at}", angle)
-            faults = [fault for fault in faults if fault.line >= line + at]
+        for note in outcome.notes:  # in the order of the lines
+            if note.about in told:
+                continue
+            told.add(note.about)
+            bad.take(fault for fault in faults if fault.line < line + note.line)
+            faults = [fault for fault in faults if fault.line >= line + note.line]
+            warn(f"{bad.source}:{line + note.line}: {note.sentence}")
         bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
-    if mended:
+    if mended > 1:
         warn(f"{bad.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
     return bad.finish(rows)
-
-
-def _suspect_degrees(place: str, angle: str) -> None:
-    warn(f"{place}: {angle} is more than a full turn in radians; degrees? give --deg, or name the columns _deg")
 
 
 def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import signal
 from collections import deque
-from contextlib import closing, suppress
+from contextlib import closing
 from multiprocessing import get_context
 from queue import SimpleQueue
 from threading import Thread
@@ -152,10 +152,12 @@ def _work(process: Process, connection: Connection, others: list[Connection]) ->
         except (EOFError, OSError):
             os._exit(0)
 
-    Thread(target=receive, daemon=True).start()
-    with suppress(OSError):
+    try:
+        Thread(target=receive, daemon=True).start()
         while True:
             connection.send(_answer(process, blocks.get()))
+    finally:
+        os._exit(1)  # the parent is gone, or there is no memory: it notices, and nobody else has to be told
 
 
 def _answer(process: Process, block: bytes) -> Answer:
