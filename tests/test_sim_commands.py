@@ -214,7 +214,7 @@ def test_a_closed_pipe_ends_an_endless_run_quietly() -> None:
     with tool:
         assert tool.stdout.readline().startswith("t,turtle")
         tool.stdout.close()
-        assert (tool.wait(20), tool.stderr.read()) == (-signal.SIGPIPE, "")
+        assert (tool.wait(), tool.stderr.read()) == (-signal.SIGPIPE, "")
 
 
 def test_an_interrupt_prints_the_summary_and_exits_130() -> None:
@@ -227,7 +227,7 @@ def test_an_interrupt_prints_the_summary_and_exits_130() -> None:
         for _ in range(3):
             tool.stdout.readline()
         tool.send_signal(signal.SIGINT)
-        _, err = tool.communicate(timeout=20)
+        _, err = tool.communicate()
     assert tool.returncode == 130
     assert "final distance to turtle1" in err
     assert "Traceback" not in err
@@ -249,7 +249,7 @@ def test_in_real_time_one_key_is_enough_and_an_open_stdin_does_not_hold_the_end_
         assert tool.stderr is not None
         tool.stdin.write("up\n")
         tool.stdin.flush()
-        assert tool.wait(20) == 0
+        assert tool.wait() == 0
         assert tool.stdout.read().count(",turtle1,") == 25
         assert tool.stderr.read().endswith("0.4 s simulated; wall hits: 0\n")
 
@@ -264,7 +264,7 @@ def test_an_interrupt_ends_a_run_that_waits_for_keys(more: tuple[str, ...]) -> N
         tool.stdin.flush()
         tool.stdout.readline()
         tool.send_signal(signal.SIGINT)
-        assert tool.wait(20) == 130
+        assert tool.wait() == 130
         assert "simulated; wall hits: 0\n" in tool.stderr.read()
 
 
@@ -284,7 +284,7 @@ def test_keys_drive_the_turtle_in_a_terminal_and_commands_go_to_stdout() -> None
         drawn = b""
         while chunk := _read(ours):
             drawn += chunk
-        assert tool.wait(20) == 0
+        assert tool.wait() == 0
     os.close(ours)
     assert first["turtle"] == "turtle2"
     assert any(each["turtle"] == "turtle1" and each["linear"]["x"] == 2.0 for each in lines)
