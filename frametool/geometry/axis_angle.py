@@ -5,34 +5,30 @@ from __future__ import annotations
 from math import isfinite
 
 from frametool.errors import ValueInvalid
-from frametool.geometry.quaternion import canonical, unit_vector
+from frametool.geometry.quaternion import canonical, direction, unit_vector
+from frametool.geometry.trig import RADIAN, half_sincos, half_sincos_deg, incline
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Namespace, Number, Quaternion
+    from frametool.geometry.types import Four, Functions, N
 
 
-def to_quaternion(
-    ax: Number, ay: Number, az: Number, angle: Number, xp: Namespace, *, degrees: bool = False
-) -> Quaternion:
+def to_quaternion(ax: N, ay: N, az: N, angle: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
     """Return the quaternion x, y, z, w of a turn about a non-zero axis of any length, in radians or degrees."""
     ux, uy, uz = unit_vector(ax, ay, az, xp)
-    sine, cosine = xp.half_sincos_deg(angle) if degrees else xp.half_sincos(angle)
+    sine, cosine = half_sincos_deg(angle, xp) if degrees else half_sincos(angle, xp)
     return ux * sine, uy * sine, uz * sine, cosine
 
 
-def from_quaternion(
-    x: Number, y: Number, z: Number, w: Number, xp: Namespace, *, degrees: bool = False
-) -> tuple[Number, Number, Number, Number]:
+def from_quaternion(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False) -> tuple[N, N, N, N]:
     """Return unit axis and angle in [0, pi] (or 180 degrees); the identity has the axis x.
 
     At half a turn, where both directions are right, the first non-zero component of the axis is positive.
     """
     x, y, z, w = canonical(x, y, z, w, xp)
-    angle = 2.0 * xp.incline(xp.length(x, y, z), abs(w))
-    still = (x == 0.0) & (y == 0.0) & (z == 0.0)
-    ux, uy, uz = unit_vector(xp.where(still, 1.0, x), y, z, xp)
-    return ux, uy, uz, xp.degrees(angle) if degrees else angle
+    ux, uy, uz, sine = direction(x, y, z, xp)
+    angle = 2.0 * incline(sine, abs(w), xp)
+    return ux, uy, uz, angle * RADIAN if degrees else angle
 
 
 def check(
@@ -43,7 +39,7 @@ def check(
     *,
     normalize: bool = False,  # noqa: ARG001 - any length is an axis
 ) -> tuple[float, float, float, float]:
-    """Check one axis and angle at the door.
+    """Return one axis and angle back.
 
     Raises:
         ValueInvalid: not finite, or the axis is zero.

@@ -6,7 +6,7 @@ kernels this calls, nowhere else. Knows no syntax of any file.
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 
 from frametool.errors import ValueInvalid, alternatives, did_you_mean
 from frametool.geometry import axis_angle, euler, matrix, mrp, quaternion, rotvec, six_d
@@ -16,19 +16,39 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.geometry.types import Components, Namespace, Quaternion
+    from frametool.geometry.types import Components, Kernel, Namespace, Quaternion
 
     Check = Callable[..., Components]
+
+
+class BatchRule:
+    """How many rows of a notation are checked at once, for notations that refuse or mend more than infinities.
+
+    what: what the rows are, in the plural
+    deviation: kernel (components, xp) of how far each row is from a rotation; inf where nothing can be made of it
+    repair: kernel (components, xp) that makes rotations of rows
+    exact: the deviation up to which a row keeps its bits
+    """
+
+    __slots__ = ("deviation", "exact", "repair", "what")
+
+    def __init__(self, what: str, deviation: Callable[..., Any], repair: Kernel, exact: float) -> None:
+        """Bind the kernels."""
+        self.what = what
+        self.deviation = deviation
+        self.repair = repair
+        self.exact = exact
 
 
 class Representation:
     """One notation: its name, bare column names, which columns are angles, and a line of help."""
 
-    __slots__ = ("_backward", "_check", "_forward", "angles", "columns", "name", "summary")
+    __slots__ = ("_backward", "_check", "_forward", "angles", "batch", "columns", "name", "summary")
 
     def __init__(
         self, columns: str, angles: tuple[int, ...], summary: str, *,
         forward: Callable[..., Any], backward: Callable[..., Any], check: Check | None = None,
+        batch: BatchRule | None = None,
     ) -> None:  # fmt: skip
         """Describe a notation; `forward` and `backward` take (components, xp, degrees, axes)."""
         self.name = ""
@@ -38,6 +58,7 @@ class Representation:
         self._forward = forward
         self._backward = backward
         self._check = check
+        self.batch = batch
 
     def __repr__(self) -> str:
         """Show the name."""
@@ -112,21 +133,35 @@ def _as_wxyz(x: Any, y: Any, z: Any, w: Any, xp: Namespace) -> Components:
     return w, x, y, z
 
 
+def _wxyz_deviation(w: Any, x: Any, y: Any, z: Any, xp: Any) -> Any:
+    return quaternion.deviation(x, y, z, w, xp)
+
+
+def _wxyz_repaired(w: Any, x: Any, y: Any, z: Any, xp: Any) -> Quaternion:
+    x, y, z, w = quaternion.repaired(x, y, z, w, xp)
+    return w, x, y, z
+
+
 def _check_wxyz(w: float, x: float, y: float, z: float, *, normalize: bool = False) -> Components:
     x, y, z, w = quaternion.check(x, y, z, w, normalize=normalize)
     return w, x, y, z
 
 
-QUATERNION = {
-    "forward": _arithmetic(_same), "backward": _plain(quaternion.from_quaternion), "check": quaternion.check,
-}  # fmt: skip
+def _xyzw(summary: str) -> Representation:
+    return Representation(
+        "qx qy qz qw", (), summary,
+        forward=_arithmetic(_same), backward=_plain(quaternion.from_quaternion), check=quaternion.check,
+        batch=BatchRule("quaternions", quaternion.deviation, quaternion.repaired, quaternion.UNIT),
+    )  # fmt: skip
+
 
 REPRESENTATIONS: dict[str, Representation] = {
-    "quaternion": Representation("qx qy qz qw", (), "unit quaternion, named x y z w", **QUATERNION),
-    "xyzw": Representation("qx qy qz qw", (), "unit quaternion, scalar last", **QUATERNION),
+    "quaternion": _xyzw("unit quaternion, named x y z w"),
+    "xyzw": _xyzw("unit quaternion, scalar last"),
     "wxyz": Representation(
         "qw qx qy qz", (), "unit quaternion, scalar first",
         forward=_arithmetic(_from_wxyz), backward=_plain(_as_wxyz), check=_check_wxyz,
+        batch=BatchRule("quaternions", _wxyz_deviation, _wxyz_repaired, quaternion.UNIT),
     ),
     "rpy": Representation(
         "roll pitch yaw", (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
@@ -147,7 +182,8 @@ REPRESENTATIONS: dict[str, Representation] = {
     ),
     "matrix": Representation(
         "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "rotation matrix, row by row",
-        forward=_plain(matrix.to_quaternion), backward=_arithmetic(matrix.from_quaternion), check=matrix.check,
+        forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
+        batch=BatchRule("matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL),
     ),
     "mrp": Representation(
         "mrp_x mrp_y mrp_z", (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
@@ -156,6 +192,7 @@ REPRESENTATIONS: dict[str, Representation] = {
     "six_d": Representation(
         "r11 r21 r31 r12 r22 r32", (), "first two columns of the matrix (Zhou's continuous 6D)",
         forward=_plain(six_d.to_quaternion), backward=_arithmetic(six_d.from_quaternion), check=six_d.check,
+        batch=BatchRule("pairs of columns", six_d.deviation, six_d.repaired, inf),
     ),
 }  # fmt: skip
 for _name, _row in REPRESENTATIONS.items():

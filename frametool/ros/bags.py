@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FileProblem, FormatError, FrametoolError
 from frametool.frames.stamps import BILLION
-from frametool.geometry import floats, quaternion
+from frametool.geometry import quaternion
 from frametool.ros.echo_blocks import unit_components
 from frametool.ros.samples import Sample
 
@@ -74,6 +74,5 @@ def _complaint(parent: str, child: str, numbers: tuple[float, ...]) -> str:
     """Say what is wrong with a transform that was refused."""
     if not parent or not child:
         return f"{parent!r} -> {child!r}: an empty frame name"
-    x, y, z, w = numbers[3:]
-    problem = quaternion.complaint(x, y, z, w, floats.length(x, y, z, w), normalize=False)
+    problem = quaternion.complaint(*numbers[3:])
     return f"{parent} -> {child}: {problem or 'its position is not finite'}"

@@ -12,7 +12,7 @@ from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose
 from frametool.cli.streaming import Stream, stream_options
 from frametool.errors import ValueInvalid
-from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry import floats, rigid
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 
@@ -89,7 +89,6 @@ def _relative(a: Pose, b: Pose) -> Result:
     if a.parent is not None and b.parent is not None and a.parent != b.parent:
         raise ValueInvalid(f"A is given in {a.parent!r} and B in {b.parent!r}; give both in one frame")
     components = rigid.relative(*a.components, *b.components)
-    distance = floats.length(*components[:3])
-    angle = quaternion.angle(*components[3:], floats)
+    distance, angle = rigid.extent(*components, floats)
     extras = {"distance": distance, "angle": angle, "angle_deg": math.degrees(angle)}
     return Result(Pose.of(components, b.name, a.name), extras)
