@@ -61,12 +61,12 @@ def run_with_xp(kernel: Kernel, count: int, given: Components) -> Components:
 
 
 def number(kernel: Callable[..., Any], given: Components) -> Any:
-    """Run a kernel that gives one number."""
+    """Run a kernel that returns one number."""
     return run_with_xp(lambda *parts: (kernel(*parts),), 1, given)[0]
 
 
 def rows(kernel: Kernel, count: int, given: Components, *args: object) -> Array:
-    """Run a kernel that needs functions; give its components as rows (..., count)."""
+    """Run a kernel that needs functions; return its components as rows (..., count)."""
     if single(given):
         return stacked(kernel(*given, *args, floats))
     from frametool.geometry import arrays
@@ -74,8 +74,8 @@ def rows(kernel: Kernel, count: int, given: Components, *args: object) -> Array:
     return arrays.rows(kernel, count, given, *args, arrays)
 
 
-def moved(kernel: Kernel, mover: Components, flatten: Kernel, given: Components, name: str) -> Array:
-    """Move vectors: each by its own mover, or all by the matrix of one."""
+def moved(kernel: Kernel, mover: Components, given: Components, name: str, *, flatten: Kernel | None = None) -> Array:
+    """Move vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster."""
     import numpy as np
 
     if single(given) and single(mover):
@@ -83,9 +83,9 @@ def moved(kernel: Kernel, mover: Components, flatten: Kernel, given: Components,
     from frametool.geometry import arrays
 
     parts = (*mover, *given)
-    if single(mover):
+    if flatten and single(mover):
         kernel, parts = _matrix_kernel(flatten(*mover)), given
-    return arrays.rows(arrays.guarded(kernel, complain_of(given, name)), 3, parts)
+    return arrays.rows(arrays.guarded(kernel, complain_of(given, name)), len(given), parts)
 
 
 def _matrix_kernel(entries: Components) -> Kernel:

@@ -84,7 +84,7 @@ class Representation:
         return result
 
     def checked(self, components: Sequence[float], *, normalize: bool = False) -> Components:
-        """Check the floats of one rotation, and give them as near to a rotation as they must be.
+        """Return the floats of one rotation, as near to a rotation as they must be.
 
         Raises:
             ValueInvalid: wrong count, not finite, or no rotation.
@@ -233,7 +233,7 @@ class Notation:
     def checked_quaternion(
         self, components: Sequence[float], xp: Namespace, *, degrees: bool = False, normalize: bool = False
     ) -> Quaternion:
-        """Check the floats of one rotation and give its quaternion.
+        """Return the quaternion of the floats of one rotation.
 
         Raises:
             ValueInvalid: wrong count, not finite, or no rotation.

@@ -208,7 +208,7 @@ class Rotation(Batched):
     def apply(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
         given = validation.columns(vectors, 3, "vectors")
-        return dispatch.moved(quaternion.rotate, self._components, quaternion.to_matrix, given, "vectors")
+        return dispatch.moved(quaternion.rotate, self._components, given, "vectors", flatten=quaternion.to_matrix)
 
     def angle(self) -> Any:
         """Return the angle of rotation in [0, pi] radians."""

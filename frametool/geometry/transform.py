@@ -6,7 +6,7 @@ Knows no names and no time. `a_from_b` takes points seen in b to the same points
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import dispatch, rigid, validation
+from frametool.geometry import dispatch, rigid, spatial, validation
 from frametool.geometry.batched import Batched
 from frametool.geometry.rotation import NEAR, Rotation, require
 
@@ -143,11 +143,21 @@ class Transform(Batched):
     def apply(self, points: Numbers) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
         given = validation.columns(points, 3, "points")
-        return dispatch.moved(rigid.apply, self._components, rigid.to_matrix, given, "points")
+        return dispatch.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix)
 
     def apply_vector(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
         return self.rotation.apply(vectors)
+
+    def apply_twist(self, twists: Numbers) -> Array:
+        """Move velocities (vx, vy, vz, wx, wy, wz), shape (..., 6): that of the same body at this side's origin."""
+        given = validation.columns(twists, 6, "twists")
+        return dispatch.moved(spatial.move_twist, self._components, given, "twists")
+
+    def apply_wrench(self, wrenches: Numbers) -> Array:
+        """Move wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to this side's origin."""
+        given = validation.columns(wrenches, 6, "wrenches")
+        return dispatch.moved(spatial.move_wrench, self._components, given, "wrenches")
 
     def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
         """Interpolate: translation along the line, rotation by slerp; fractions 0 and 1 give the ends to the bit.

@@ -213,6 +213,8 @@ WAYS_OF_VALUES: dict[str, Callable[[Any, Any], Any]] = {
     "relative": lambda a, b: a.relative(b).xyz,
     "apply": lambda a, b: a.apply(b.xyz),
     "interpolate": lambda a, b: a.interpolate(b, 0.7).xyzw,
+    "apply twist": lambda a, b: a.apply_twist(b.log()),
+    "apply wrench": lambda a, b: a.apply_wrench(b.log()),
 }
 
 

@@ -6,11 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numbers_at_hand import HOSTILE, random_bits
 
-from frametool.text.fixed import format_fixed
+from frametool.text.fixed import fixed_spans
+from frametool.text.spans import join
 
 
 def lines(values: list[float], precision: int) -> list[str]:
-    return format_fixed(np.array(values, np.float64).reshape(-1, 1), precision, b"\n").decode().splitlines()
+    return join([fixed_spans(np.array(values, np.float64).reshape(-1, 1), precision, b"\n")]).decode().splitlines()
 
 
 def by_percent(values: list[float], precision: int) -> list[str]:
@@ -40,16 +41,16 @@ def test_decimal_halves_go_where_their_float_lies(digits: int, precision: int) -
 
 
 def test_rows_are_written_with_the_separator_of_each_column() -> None:
-    assert format_fixed(np.array([[1.0, -0.0], [1e20, -2.5]]), 1, b",\n") == b"1.0,-0.0\n100000000000000000000.0,-2.5\n"
+    assert join([fixed_spans(np.array([[1.0, -0.0], [1e20, -2.5]]), 1, b",\n")]) == b"1.0,-0.0\n100000000000000000000.0,-2.5\n"
 
 
 def test_no_rows_are_no_text() -> None:
-    assert format_fixed(np.empty((0, 2)), 6, b",\n") == b""
+    assert join([fixed_spans(np.empty((0, 2)), 6, b",\n")]) == b""
 
 
 def test_a_separator_for_each_column_is_demanded() -> None:
     with pytest.raises(ValueError, match="1 columns, but 2 separators"):
-        format_fixed(np.empty((4, 1)), 6, b",\n")
+        join([fixed_spans(np.empty((4, 1)), 6, b",\n")])
 
 
 @pytest.mark.large
