@@ -10,7 +10,7 @@ from frametool.geometry.trig import RADIAN, half_sincos, half_sincos_deg, inclin
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Four, Functions, N
+    from frametool.geometry.types import Components, Four, Functions, N
 
 
 def to_quaternion(ax: N, ay: N, az: N, angle: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
@@ -31,21 +31,15 @@ def from_quaternion(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool =
     return ux, uy, uz, angle * RADIAN if degrees else angle
 
 
-def check(
-    ax: float,
-    ay: float,
-    az: float,
-    angle: float,
-    *,
-    normalize: bool = False,  # noqa: ARG001 - any length is an axis
-) -> tuple[float, float, float, float]:
+def check(*axis_and_angle: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any length is an axis
     """Return one axis and angle back.
 
     Raises:
         ValueInvalid: not finite, or the axis is zero.
     """
-    if not all(map(isfinite, (ax, ay, az, angle))):
+    ax, ay, az, angle = axis_and_angle
+    if not all(map(isfinite, axis_and_angle)):
         raise ValueInvalid(f"axis {ax:g} {ay:g} {az:g}, angle {angle:g} is not finite; give finite numbers")
     if not (ax or ay or az):
         raise ValueInvalid("axis 0 0 0 has no direction; give a non-zero one")
-    return ax, ay, az, angle
+    return axis_and_angle

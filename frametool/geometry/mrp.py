@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from math import inf
-
-from frametool.errors import ValueInvalid
-
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.geometry.types import Four, Functions, N, Three
@@ -22,20 +18,3 @@ def from_quaternion(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Three[N]:
     """Return modified Rodrigues parameters of length 0 to 1: those of the shorter turn."""
     divisor = xp.copysign(1.0 + abs(w), xp.first_nonzero(w, x, y, z))
     return x / divisor, y / divisor, z / divisor
-
-
-def check(
-    px: float,
-    py: float,
-    pz: float,
-    *,
-    normalize: bool = False,  # noqa: ARG001 - every length is one
-) -> tuple[float, float, float]:
-    """Return one back.
-
-    Raises:
-        ValueInvalid: not finite, or so long that its square overflows.
-    """
-    if not px * px + py * py + pz * pz < inf:
-        raise ValueInvalid(f"mrp {px:g} {py:g} {pz:g} is not finite or too long; give numbers below 1e+150")
-    return px, py, pz

@@ -147,6 +147,10 @@ def _check_wxyz(w: float, x: float, y: float, z: float, *, normalize: bool = Fal
     return w, x, y, z
 
 
+def _check_mrp(*parameters: float, normalize: bool = False) -> Components:
+    return rotvec.check(*parameters, normalize=normalize, what="mrp")
+
+
 def _xyzw(summary: str) -> Representation:
     return Representation(
         "qx qy qz qw", (), summary,
@@ -187,7 +191,7 @@ REPRESENTATIONS: dict[str, Representation] = {
     ),
     "mrp": Representation(
         "mrp_x mrp_y mrp_z", (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
-        forward=_arithmetic(mrp.to_quaternion), backward=_plain(mrp.from_quaternion), check=mrp.check,
+        forward=_arithmetic(mrp.to_quaternion), backward=_plain(mrp.from_quaternion), check=_check_mrp,
     ),
     "six_d": Representation(
         "r11 r21 r31 r12 r22 r32", (), "first two columns of the matrix (Zhou's continuous 6D)",

@@ -10,7 +10,7 @@ from frametool.geometry.trig import RADIAN, half_sincos, half_sincos_deg, inclin
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Four, Functions, N, Three
+    from frametool.geometry.types import Components, Four, Functions, N, Three
 
 
 def to_quaternion(rx: N, ry: N, rz: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
@@ -36,19 +36,13 @@ def from_quaternion(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool =
     return x / sine * angle, y / sine * angle, z / sine * angle
 
 
-def check(
-    rx: float,
-    ry: float,
-    rz: float,
-    *,
-    normalize: bool = False,  # noqa: ARG001 - every length is one
-) -> tuple[float, float, float]:
+def check(*vector: float, what: str = "rotation vector", normalize: bool = False) -> Components:  # noqa: ARG001
     """Return one back.
 
     Raises:
         ValueInvalid: not finite, or so long that its square overflows.
     """
-    if not rx * rx + ry * ry + rz * rz < inf:
-        shown = f"rotation vector {rx:g} {ry:g} {rz:g}"
-        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below 1e+150")
-    return rx, ry, rz
+    x, y, z = vector
+    if not x * x + y * y + z * z < inf:
+        raise ValueInvalid(f"{what} {x:g} {y:g} {z:g} is not finite or too long; give numbers below 1e+150")
+    return vector

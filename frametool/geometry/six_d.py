@@ -12,7 +12,7 @@ PARALLEL = 1e-12  # sine between the columns: below, rounding decides the plane 
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Four, Functions, N, Six
+    from frametool.geometry.types import Components, Four, Functions, N, Six
 
 
 def to_quaternion(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[N]:
@@ -47,26 +47,18 @@ def repaired(ax: N, ay: N, az: N, bx: N, by: N, bz: N, _xp: Functions[N]) -> Six
     return ax, ay, az, bx, by, bz
 
 
-def check(
-    ax: float,
-    ay: float,
-    az: float,
-    bx: float,
-    by: float,
-    bz: float,
-    *,
-    normalize: bool = False,  # noqa: ARG001 - any two that span a plane will do
-) -> Six[float]:
+def check(*columns: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any two that span a plane
     """Return one pair of columns back.
 
     Raises:
         ValueInvalid: not finite, zero or parallel.
     """
+    ax, ay, az, bx, by, bz = columns
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
-    if not all(map(isfinite, (ax, ay, az, bx, by, bz))):
+    if not all(map(isfinite, columns)):
         raise ValueInvalid(f"{shown} are not finite; give six finite numbers")
     if not (ax or ay or az) or not (bx or by or bz):
         raise ValueInvalid(f"{shown} span no plane: one is zero")
     if deviation(ax, ay, az, bx, by, bz, floats):
         raise ValueInvalid(f"{shown} span no plane: they are parallel")
-    return ax, ay, az, bx, by, bz
+    return columns
