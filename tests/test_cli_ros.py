@@ -325,6 +325,38 @@ def test_check_and_lookup_report_a_cycle_alike(run: Run, turn: int) -> None:
     assert error["message"].endswith(cycle["message"])
 
 
+NEAR_ROTATION = "[[1, 0.00001, 0], [0, 1, 0], [0, 0, 1]]"
+
+
+@pytest.mark.parametrize(
+    ("entry", "rule"),
+    [
+        (f"{{name: a, parent: map, matrix: {NEAR_ROTATION}}}", "rounded"),
+        ("{name: a, parent: map, matrix: [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}", "denormalized"),
+        ("{name: a, parent: map, matrix: [[1, 0, 0], [1, 0, 0], [0, 0, 1]]}", "denormalized"),
+        ("{name: a, parent: map, axis_angle: {axis: [0, 0, 0], angle: 1}}", "denormalized"),
+        ("{name: a, parent: map, rotvec: [.inf, 0, 0]}", "not-finite"),
+        ("{name: a, parent: map, rpy: [1e999, 0, 0]}", "not-finite"),
+        ("{name: a, parent: map, xyz: [mirrored, 0, 0]}", "syntax"),
+        ("{name: a, parent: map, xyz: ['not finite', 0, 0]}", "syntax"),
+        ("{name: a, parent: map, rpy: ['degrees?', 0, 0]}", "syntax"),
+        ("{name: 'normalised', parent: map, xyz: [1, 0, 0], its own parent: 1}", "syntax"),
+        ("{name: mirrored, parent: map}", "identity"),
+        ("{name: /normalised, parent: map, xyz: [1, 0, 0]}", "slash"),
+    ],
+)
+def test_the_rule_of_a_finding_never_comes_from_words_that_the_file_holds(run: Run, entry: str, rule: str) -> None:
+    (found,) = findings(run, entry)
+    assert (found["rule"], found["level"]) == (rule, RULES[rule][0])
+
+
+def test_a_call_of_static_transform_publisher_has_the_rules_of_its_numbers(run: Run) -> None:
+    text = "rosrun tf static_transform_publisher 0 0 0 0 0 0 {} normalised b\n".replace("rosrun tf ", "")
+    assert [each["rule"] for each in findings(run, text.format("1.0001"))] == ["rounded"]
+    assert [each["rule"] for each in findings(run, text.format("1.1"))] == ["denormalized"]
+    assert [each["rule"] for each in findings(run, text.format("1 0 0 0"))] == ["syntax"]
+
+
 def test_one_bad_entry_does_not_hide_the_others(run: Run) -> None:
     text = f"frames:\n- {TREES['degrees']}\n- {TREES['mirrored']}\n- {TREES['not-finite']}\n"
     assert [(each["line"], each["rule"]) for each in findings(run, text)] == [

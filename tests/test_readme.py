@@ -73,6 +73,14 @@ def test_the_readme_mentions_every_command_representation_and_format(name: str) 
     assert f"`{name}" in README or f"### {name}" in README or f"{name}`" in README or f", {name}" in README
 
 
+def test_the_readme_lists_the_forms_as_the_table_has_them() -> None:
+    rows = [
+        f"| `{name}` | {row.summary} | {', '.join(row.reads)} | {', '.join(row.writes)} | {' '.join(row.suffixes)} |"
+        for name, row in FORMATS.items()
+    ]
+    assert "\n".join(rows) in README
+
+
 def test_the_python_example_of_the_readme_runs() -> None:
     code = "\n".join(re.findall(r"```python\n(.*?)```", README, re.DOTALL))
     done = subprocess.run([sys.executable, "-c", code], cwd=console.ROOT, capture_output=True, text=True, check=False)

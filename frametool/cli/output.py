@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from frametool.cli.stderr import tell
-from frametool.errors import FileProblem, ValueInvalid
-from frametool.formats import FORMATS, writers
+from frametool.cli.sink import writing
+from frametool.cli.stderr import say
+from frametool.errors import ValueInvalid
+from frametool.formats import FORMATS, by_suffix, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, is_locked, sample_results
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
     from frametool.ros.message_stream import Message
     from frametool.ros.stamped import Stamped
-
-
-PIECE = 1 << 14  # characters
 
 
 class Output:
@@ -46,7 +43,7 @@ class Output:
         """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
-        self.told = format_name or _form_by_suffix(output, what)
+        self.told = format_name or by_suffix(output, writers(what))
         self.notations = notations or ()
         form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
@@ -86,7 +83,7 @@ class Output:
     def tell_of_lock(self, poses: Sequence[Pose]) -> None:
         """Say of a single result that its Euler angles are not unique."""
         if len(poses) == 1 and any(is_locked(poses[0], form) for form in self.style.notations):
-            tell("frametool: note: gimbal lock: the angles are not unique; the third was set to 0")
+            say("note: gimbal lock: the angles are not unique; the third was set to 0")
 
     def points(self, records: Iterable[dict[str, Any]]) -> None:
         """Write points."""
@@ -106,7 +103,7 @@ class Output:
         return FORMATS[self.style.form].writes if self.style.form in FORMATS else ()
 
     def _module(self, text_module: str) -> Any:
-        return import_module(FORMATS[self.style.form].module if self.style.form in FORMATS else text_module)
+        return import_module(FORMATS[self.style.form].writer if self.style.form in FORMATS else text_module)
 
     def message(self, message: Message, moved: Sequence[Stamped]) -> str:
         """Return the text of a message in which some moved: as it was spelled unless the command was told otherwise."""
@@ -128,65 +125,17 @@ class Output:
         if form == "csv":
             raise ValueInvalid("a message is nested and has no place in csv; write json, yaml, ros1 or ros2")
         style = self.style.in_form(form)
-        text: str = import_module(FORMATS[form].module).write_points([message.mapping()], style)
+        text: str = import_module(FORMATS[form].writer).write_points([message.mapping()], style)
         return f"{text}---\n" if form == "yaml" else text
 
     def pieces(self, pieces: Iterable[str]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
-        if self.path is None or self.path == "-":
+        with writing(self.path, force=self.force) as write:
             for piece in pieces:
-                _to_stdout(piece)
-        else:
-            write_whole(self.path, "".join(pieces), force=self.force)
+                write(piece)
 
     def text(self, text: str) -> None:
-        """Write text to stdout, or to the file whole or not at all."""
-        if self.path is None or self.path == "-":
-            _to_stdout(text)
-        else:
-            write_whole(self.path, text, force=self.force)
+        """Write text."""
+        self.pieces([text])
 
 
-def _to_stdout(text: str) -> None:
-    """Write to stdout in pieces: where it has no buffer, Python passes over what a closed pipe took only in part."""
-    for start in range(0, len(text), PIECE):
-        sys.stdout.write(text[start : start + PIECE])
-
-
-def _form_by_suffix(path: str | None, what: str) -> str | None:
-    """Name the form that a file's suffix stands for, if it can hold this kind of result."""
-    suffix = os.path.splitext(path)[1].lower() if path else ""
-    return next((name for name in writers(what) if suffix and suffix in FORMATS[name].suffixes), None)
-
-
-def write_whole(path: str, text: str, *, force: bool = False) -> None:
-    """Write a file by way of a temporary one beside it, so that nobody ever sees half of it.
-
-    What is no regular file (a terminal, a pipe, /dev/null) is written to as it is; a link is followed; an old file's
-    mode is kept.  Raises FileProblem when it exists and `force` is not given, or cannot be written.
-    """
-    name, path = path, os.path.realpath(path)
-    temporary = f"{path}.{os.getpid()}.part"
-    try:
-        if os.path.exists(path) and not os.path.isfile(path):
-            with open(path, "w", encoding="utf-8", newline="") as stream:
-                stream.write(text)
-            return
-        mode = os.stat(path).st_mode & 0o7777 if os.path.lexists(path) else None
-        if mode is not None and not force:
-            _refuse_to_replace(name)
-        with open(temporary, "x", encoding="utf-8", newline="") as stream:
-            stream.write(text)
-        if mode is not None:
-            os.chmod(temporary, mode)
-        os.replace(temporary, path)
-    except FileProblem:
-        raise
-    except OSError as error:
-        if os.path.lexists(temporary):
-            os.unlink(temporary)
-        raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
-
-
-def _refuse_to_replace(path: str) -> None:
-    raise FileProblem(f"{path}: exists; give --force to replace it")

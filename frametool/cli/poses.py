@@ -102,8 +102,8 @@ def pose_from_numbers(
         raise
     except ValueInvalid as error:
         raise click.UsageError(str(error)) from None
-    for _, message in reading.notes:
-        warn(message)
+    for note in reading.notes:
+        warn(note.message)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from io import BufferedReader, FileIO
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, Notations, be_verbose
-from frametool.cli.stderr import tell
-from frametool.documents.source import Source, decode
+from frametool.cli.stderr import say, say_error
+from frametool.documents.source import HEAD, Source, decode
 from frametool.errors import FileProblem
-from frametool.formats.detect import HEAD
-from frametool.stream.faults import MOST, ON_ERROR, STOP, Policy
-from frametool.stream.stream_form import RECORDS, STREAMS, form_of
+from frametool.formats import FORMATS, readers
+from frametool.formats.detect import detect
+from frametool.stream.faults import MOST, ON_ERROR, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
+STREAMED = ("records", "rows")
+RECORDS = readers("records")
 NAMES = (
     "input_path",
     "input_form",
@@ -62,7 +65,7 @@ def _number(least: int, default: int, summary: str) -> dict[str, Any]:
     return {"type": kind, "default": default, "show_default": True, "metavar": "N", "help": summary}
 
 
-FORM = {"type": click.Choice(tuple(STREAMS)), "help": "form of the stream  [default: by suffix or first line]"}
+FORM = {"type": click.Choice(readers(*STREAMED)), "help": "form of the stream  [default: by suffix or first line]"}
 GIVEN = {"type": Notations(), "metavar": "REP", "help": "what the rotations of VALUES or of a stream's columns are"}
 HEADER = {"is_flag": True, "flag_value": False, "default": True, "help": "a table without names; columns are numbered"}
 ON_BAD_ROWS = {"type": click.Choice(ON_ERROR), "default": STOP, "show_default": True, "help": "what bad rows do"}
@@ -89,6 +92,7 @@ class Stream:
         """Take the stream's options out of a command's."""
         self.options = {name: options.pop(name) for name in NAMES}
         self.given = one_notation(options.pop("given", None))
+        self._tell = partial(say_error, in_json=options.get("format_name") == "json")
         self.path: str | None = self.options["input_path"]
         if self.path == "-":
             self.path = None
@@ -116,9 +120,11 @@ class Stream:
         name = self.path or "stdin"
         with self.opened() as stream:
             begin = stream.peek()
-            form, known_by = form_of(begin, self.path or "", told=self.options["input_form"] or _table_form(output))
+            form, known_by = self.options["input_form"], ""
+            if form is None:
+                form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if self.options["verbose"] and known_by:
-                tell(f"frametool: {name}: read as {form} ({STREAMS[form]}), known by {known_by}")
+                say(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             if form in RECORDS and not as_spelled and (output.told or form) != form:
@@ -130,10 +136,9 @@ class Stream:
                 )
             return self._run(stream, form, self._completed(request, output, form), output)
 
-    def policy(self, name: str) -> Policy:
-        """Say what bad rows do."""
-        most = self.options["max_errors"]
-        return Policy(name, self.options["on_error"], most=most, tell=lambda text: tell(f"frametool: {text}"))
+    def policy(self, name: str) -> BadRows:
+        """Return what reports and counts the bad rows of a source."""
+        return BadRows(name, self.options["on_error"], most=self.options["max_errors"], tell=self._tell)
 
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
@@ -152,24 +157,19 @@ class Stream:
         )
 
     def _run(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        from contextlib import closing
+
+        from frametool.cli.sink import writing
         from frametool.stream.run import run
-        from frametool.stream.sink import Sink, die_of_closed_pipe
-        from frametool.view.progress import Progress
+        from frametool.view.progress import ProgressBar
 
         name = self.path or "stdin"
-        policy = self.policy(name)
-        progress = Progress(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"])
-        outcomes = self._outcomes(stream, form, request, name)
-        try:
-            with Sink(None if output.path == "-" else output.path, force=output.force) as sink:
-                return run(outcomes, sink.write, policy, progress.advance)
-        except BrokenPipeError:
-            outcomes.close()  # ends the processes of --jobs
-            die_of_closed_pipe()
-            raise
-        finally:
-            progress.stop()
-            outcomes.close()
+        with (
+            writing(output.path, force=output.force) as write,
+            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
+            closing(self._outcomes(stream, form, request, name)) as outcomes,  # ends the processes of --jobs
+        ):
+            return run(outcomes, write, self.policy(name), progress.advance)
 
     def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
         if form in RECORDS:
@@ -181,18 +181,13 @@ class Stream:
         return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
 
 
-def _table_form(output: Output) -> str:
-    """Return the form of a table if --format names one: a table is written as it is read."""
-    return output.told if output.told in STREAMS and output.told not in RECORDS else ""
-
-
 def _opened(path: str | None) -> BufferedReader:
     """Open the input; raises FileProblem."""
     if path is None:
         if sys.stdin is None:
             raise FileProblem("standard input is closed")
         if sys.stdin.isatty():
-            tell("frametool: reading from the terminal; end with Ctrl-D")
+            say("reading from the terminal; end with Ctrl-D")
         stream = sys.stdin.buffer
         return stream if isinstance(stream, BufferedReader) else BufferedReader(stream)  # type: ignore[arg-type]
     try:

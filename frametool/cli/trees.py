@@ -10,8 +10,10 @@ import click
 
 from frametool.cli.command import VERBOSE, Text, be_verbose
 from frametool.cli.poses import is_inline, source_of
+from frametool.cli.stderr import say
 from frametool.errors import warn
-from frametool.formats.load import load_sources, open_source
+from frametool.formats.load import load_sources
+from frametool.formats.recordings import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.formats.assembly import Rules
-    from frametool.formats.recordings import Recording
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
@@ -36,17 +37,16 @@ def _input(argument: str) -> Source | Recording:
     """Take an inline tree as it stands, or open what the argument names."""
     if is_inline(argument) or (argument == "-" and sys.stdin.isatty()):
         return source_of(argument)
-    source = open_source(argument)
-    announce(source)
-    return source
+    file = Recording(argument)
+    announce(file)
+    return file
 
 
-def announce(source: Source | Recording) -> None:
+def announce(file: Recording) -> None:
     """Say what a file was taken for, if the command was asked to."""
     context = click.get_current_context(silent=True)
     if context is not None and context.meta.get(VERBOSE):
-        described = getattr(source, "described", f"{source.name}: a tree in YAML or JSON")
-        click.echo(f"frametool: {described}", err=True)
+        say(file.described)
 
 
 verbose_option = click.option(

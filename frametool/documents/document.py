@@ -9,30 +9,18 @@ from __future__ import annotations
 
 import re
 
-from frametool.documents.json_reader import json_marks, looks_like_json, parse_json
-from frametool.documents.marks import longest_found
-from frametool.documents.source import Source, check_text, decode, placed_error, read_text, within
+from frametool.documents.json_reader import json_events, looks_like_json, parse_json
+from frametool.documents.marks import find_marks, mark_of
+from frametool.documents.source import Source, check_text, error_at, places_of
 from frametool.errors import FormatError
 from frametool.text.numbers import odd_characters
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterator, Sequence
     from typing import Any
 
-    from frametool.documents.marks import Path
-
-__all__ = [
-    "Document",
-    "Source",
-    "decode",
-    "explain_scalar",
-    "format_error",
-    "locate",
-    "locate_many",
-    "parse_documents",
-    "read_text",
-]
+    from frametool.documents.marks import Event, Path
 
 _BYTE_ORDER_MARK = "\ufeff"
 _TIGHT_COLON = r"([\w./-]+):(?=[^\s:/])"
@@ -51,10 +39,10 @@ class Document:
         self.source = source
 
 
-def parse_documents(text: str, name: str, *, allowed_tags: Iterable[str] = ()) -> list[Document]:
+def parse_documents(text: str, name: str) -> list[Document]:
     """Read every document of a YAML or JSON text; empty ones are left out.
 
-    name: what messages call the text.  allowed_tags: YAML tags to read over, e.g. `!Rpy`; others are errors.
+    name: what messages call the text.
     Values are dict, list, str or None (an empty value, `~`, `null`); keys are text, each once.
     Raises FormatError with line and column.
     """
@@ -64,8 +52,17 @@ def parse_documents(text: str, name: str, *, allowed_tags: Iterable[str] = ()) -
     if values is None:
         from frametool.documents.yaml_events import parse_yaml
 
-        values = parse_yaml(source, frozenset(allowed_tags))
+        values = parse_yaml(source)
     return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
+
+
+def events_of(text: str) -> Iterator[Event]:
+    """Yield the values of a text that parse_documents has read, in order, with their places."""
+    if looks_like_json(text) and parse_json(Source("", text)) is not None:
+        return json_events(text)
+    from frametool.documents.yaml_events import yaml_events
+
+    return yaml_events(text)
 
 
 def locate(text: str, path: Path, *, key: bool = False) -> tuple[int, int]:
@@ -78,25 +75,13 @@ def locate(text: str, path: Path, *, key: bool = False) -> tuple[int, int]:
 
 def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[tuple[int, int]]:
     """Find the places of several paths in one pass over a text that parse_documents has read."""
-    source = Source("", text.removeprefix(_BYTE_ORDER_MARK))
-    if not paths:
-        return []
-    if looks_like_json(source.text) and parse_json(source) is not None:
-        found = json_marks(source, paths)
-    else:
-        from frametool.documents.yaml_events import yaml_marks
-
-        found = yaml_marks(source, paths)
-    return [within(source.text, *_place(path, found, key=key)) for path in paths]
+    text = text.removeprefix(_BYTE_ORDER_MARK)
+    return places_of(text, _offsets(text, paths, key=key))
 
 
-def _place(path: Path, found: dict[Path, tuple[tuple[int, int], tuple[int, int]]], *, key: bool) -> tuple[int, int]:
-    """Pick the mark of the key or of the value; without the very path there is no key of its own."""
-    nearest = longest_found(path, found)
-    if not nearest:
-        return 1, 1
-    of_key, of_value = found[nearest]
-    return of_key if key and nearest == path else of_value
+def _offsets(text: str, paths: Sequence[Path], *, key: bool) -> list[int]:
+    found = find_marks(events_of(text), paths) if paths else {}
+    return [mark_of(path, found, key=key) for path in paths]
 
 
 def format_error(
@@ -104,8 +89,8 @@ def format_error(
 ) -> FormatError:
     """Make the error for a value, or its key, at a path: placed, with the source line and a caret."""
     bare = Source(source.name, source.text.removeprefix(_BYTE_ORDER_MARK))
-    line, column = locate(bare.text, path, key=key)
-    return placed_error(bare, line, column, message, error)
+    (offset,) = _offsets(bare.text, [path], key=key)
+    return error_at(bare, offset, message, error)
 
 
 def explain_scalar(text: str) -> str:

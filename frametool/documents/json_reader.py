@@ -7,23 +7,24 @@ a scan of their own when an error needs them.
 from __future__ import annotations
 
 import re
+import sys
 
 from frametool.documents.limits import DEEPEST, MOST_CONTAINERS, too_much
-from frametool.documents.marks import END, LEAF, LIST, MAP, find_marks
-from frametool.documents.source import Source, error_at, place_of
+from frametool.documents.marks import END, LEAF, LIST, MAP
+from frametool.documents.source import Source, error_at, places_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from typing import Any
 
-    from frametool.documents.marks import Path, PlaceEvent
+    from frametool.documents.marks import Event
     from frametool.errors import FormatError
 
 _BLANKS = re.compile(r"[ \t\n\r]*")
-_PIECE = r'("[^"\\]*+(?:\\.[^"\\]*+)*+")|[{}\[\]]|[^\s{}\[\],:"]+'
+_WORD = r'"[^"\\]*+(?:\\.[^"\\]*+)*+"|[{}\[\]]|[^\s{}\[\],:"]+'
 _ESCAPE = r"(?s)\\(?:u([0-9a-fA-F]{4})|.)"
-_OPENING = {"{": MAP, "[": LIST}
+_BRACKETS = {"{": MAP, "[": LIST, "]": END, "}": END}
 
 
 class _RepeatedKey(Exception):
@@ -44,11 +45,9 @@ def parse_json(source: Source) -> list[Any] | None:
     if source.text.count("[") + source.text.count("{") > MOST_CONTAINERS:
         raise error_at(source, 0, too_much(0))
     try:
-        values = _decoded(source.text)
+        values = _deeply_decoded(source)
     except _RepeatedKey:
         raise _repeated(source) from None
-    except RecursionError:
-        raise _too_deep(source) from None
     except ValueError:
         return None
     if "\\u" in source.text:
@@ -56,6 +55,21 @@ def parse_json(source: Source) -> list[Any] | None:
     if not _settle(values):
         raise _too_deep(source)
     return values
+
+
+def _deeply_decoded(source: Source) -> list[Any]:
+    """Decode a text; one that is as deep as allowed gets the stack that json needs for it."""
+    try:
+        return _decoded(source.text)
+    except RecursionError:
+        if any(depth > DEEPEST for depth, _ in _depths(source.text)):
+            raise _too_deep(source) from None
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(limit + 4 * DEEPEST)
+    try:
+        return _decoded(source.text)
+    finally:
+        sys.setrecursionlimit(limit)
 
 
 def strict_json(source: Source) -> list[Any]:
@@ -69,13 +83,6 @@ def strict_json(source: Source) -> list[Any]:
         problem = getattr(error, "msg", str(error))
         raise error_at(source, getattr(error, "pos", 0), f"not JSON: {problem[:1].lower()}{problem[1:]}") from None
     return []
-
-
-def json_marks(source: Source, paths: Sequence[Path]) -> dict[Path, tuple[tuple[int, int], tuple[int, int]]]:
-    """Find the places (line, column) of keys and values in a text that parse_json reads."""
-    found = find_marks(_place_events(source.text), paths)
-    places = {mark: place_of(source.text, mark) for marks in found.values() for mark in marks}
-    return {path: (places[key], places[value]) for path, (key, value) in found.items()}
 
 
 def _decoded(text: str) -> list[Any]:
@@ -124,34 +131,34 @@ def _inner(outer: Any) -> list[Any]:
     return [value for value in (outer.values() if type(outer) is dict else outer) if type(value) in {dict, list}]
 
 
-def _place_events(text: str) -> Iterator[PlaceEvent[int]]:
-    """Reduce JSON's tokens to what finding places needs; the marks are offsets."""
+def json_events(text: str) -> Iterator[Event]:
+    """Yield the values of a text that parse_json reads, in order, with their places."""
     from json import loads
 
-    for token in re.finditer(_PIECE, text):
+    for token in re.finditer(_WORD, text):
         word = token[0]
-        if word in {"]", "}"}:
-            yield END, "", token.start()
-        elif word in _OPENING:
-            yield _OPENING[word], "", token.start()
+        if word in _BRACKETS:
+            yield _BRACKETS[word], "", token.start(), token.end(), word, 0
+        elif word[0] == '"':
+            yield LEAF, loads(word, strict=False), token.start(), token.end(), '"', 0
         else:
-            yield LEAF, loads(word, strict=False) if token[1] else word, token.start()
+            yield LEAF, word, token.start(), token.end(), "", 0
 
 
 def _repeated(source: Source) -> FormatError:
     """Find the first key that its object holds twice, or that is empty."""
     open_keys: list[dict[str, int] | None] = []
     value_next = True
-    for kind, text, mark in _place_events(source.text):
+    for kind, text, start, *_ in json_events(source.text):
         if kind == END:
             open_keys.pop()
         elif kind == LEAF and open_keys and (keys := open_keys[-1]) is not None and not value_next:
             if not text:
-                return error_at(source, mark, "an empty key")
+                return error_at(source, start, "an empty key")
             if text in keys:
-                line, column = place_of(source.text, keys[text])
-                return error_at(source, mark, f"key {text!r} stands twice; first at {line}:{column}")
-            keys[text] = mark
+                ((line, column),) = places_of(source.text, [keys[text]])
+                return error_at(source, start, f"key {text!r} stands twice; first at {line}:{column}")
+            keys[text] = start
             value_next = True
             continue
         elif kind != LEAF:
@@ -160,14 +167,19 @@ def _repeated(source: Source) -> FormatError:
     return error_at(source, 0, "a key stands twice")
 
 
+def _depths(text: str) -> Iterator[tuple[int, int]]:
+    """Yield the depth and the offset of each list and map."""
+    depth = 0
+    for kind, _, start, *_ in json_events(text):
+        if kind != LEAF:
+            depth += -1 if kind == END else 1
+            yield depth, start
+
+
 def _too_deep(source: Source) -> FormatError:
     """Find the bracket that is one too many."""
-    depth = 0
-    for kind, _, mark in _place_events(source.text):
-        depth += (kind in {LIST, MAP}) - (kind == END)
-        if depth > DEEPEST:
-            return error_at(source, mark, too_much(DEEPEST))
-    return error_at(source, 0, too_much(DEEPEST))
+    at = next((start for depth, start in _depths(source.text) if depth > DEEPEST), 0)
+    return error_at(source, at, too_much(DEEPEST))
 
 
 def _check_escapes(source: Source) -> None:

@@ -5,38 +5,38 @@ from __future__ import annotations
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
-    from typing import TypeAlias, TypeVar
+    from typing import TypeAlias
 
     Path: TypeAlias = tuple[str | int, ...]
-    Mark = TypeVar("Mark")
-    PlaceEvent: TypeAlias = tuple[int, str, Mark]  # kind, text of a scalar, mark
+    # kind, text of a scalar, start, end, quote of a scalar or bracket of a container ("" for a block), column
+    Event: TypeAlias = tuple[int, str, int, int, str, int]
 
 LEAF, LIST, MAP, END = range(4)
 
 
-def find_marks(events: Iterable[PlaceEvent[Mark]], paths: Sequence[Path]) -> dict[Path, tuple[Mark, Mark]]:
-    """Walk the events of a text and keep the marks of keys and values on the way to the paths.
+def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tuple[int, int]]:
+    """Walk the events of a text and keep the offsets of keys and values on the way to the paths.
 
-    A path is (document, key or index, ...).  Returns (mark of the key, mark of the value) for each path and each
+    A path is (document, key or index, ...).  Returns (offset of the key, offset of the value) for each path and each
     of its beginnings that the text holds; in a list both are the value's.  Of equal keys the first counts.
     """
     wanted = {path[:length] for path in paths for length in range(1, len(path) + 1)}
-    found: dict[Path, tuple[Mark, Mark]] = {}
+    found: dict[Path, tuple[int, int]] = {}
     walk = iter(events)
     outer: list[tuple[Path, str | int | None]] = []
     path: Path = ()
     step: str | int | None = 0  # the index or key that comes next; None where a key is awaited
-    for kind, text, mark in walk:
+    key_start = 0
+    for kind, text, start, *_ in walk:
         if kind == END:
             path, step = outer.pop()
             continue
         if step is None:
-            step, key_mark = text, mark
+            step, key_start = text, start
             continue
         here = (*path, step)
-        in_list = type(step) is int
         if here in wanted and here not in found:
-            found[here] = (mark if in_list else key_mark, mark)
+            found[here] = (start if type(step) is int else key_start, start)
             if len(found) == len(wanted):
                 break
         step = step + 1 if isinstance(step, int) else None
@@ -49,18 +49,19 @@ def find_marks(events: Iterable[PlaceEvent[Mark]], paths: Sequence[Path]) -> dic
     return found
 
 
-def _skip(walk: Iterator[PlaceEvent[Mark]]) -> None:
+def _skip(walk: Iterator[Event]) -> None:
     """Pass over the rest of a list or map that has just begun."""
     depth = 1
-    for kind, _, _ in walk:
-        if kind == END:
-            depth -= 1
+    for kind, *_ in walk:
+        if kind != LEAF:
+            depth += -1 if kind == END else 1
             if not depth:
                 return
-        elif kind != LEAF:
-            depth += 1
 
 
-def longest_found(path: Path, found: dict[Path, tuple[Mark, Mark]]) -> Path:
-    """Return the longest beginning of the path that was found: where something missing should have been."""
-    return next((path[:length] for length in range(len(path), 0, -1) if path[:length] in found), ())
+def mark_of(path: Path, found: dict[Path, tuple[int, int]], *, key: bool) -> int:
+    """Return the offset of the key or value at a path; of what is missing, that of the nearest value around it."""
+    for length in range(len(path), 0, -1):
+        if path[:length] in found:
+            return found[path[:length]][not (key and length == len(path))]
+    return 0

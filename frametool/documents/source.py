@@ -8,12 +8,21 @@ from __future__ import annotations
 
 import re
 import sys
+from bisect import bisect_right
+from io import BufferedReader
 
 from frametool.errors import FileProblem, FormatError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from os import PathLike
+    from typing import BinaryIO
+
+HEAD = 1 << 16
+"""How many bytes of a file are looked at before it is read."""
+
+UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 MOST_CHARACTERS = 3 << 24
 """Longest text read as one file of documents, also in bytes: 400 000 frames in 0.7 GB, at worst 1.4 GB."""
@@ -33,29 +42,39 @@ class Source:
         self.text = text
 
 
-def read_text(path: str | PathLike[str]) -> str:
-    """Read a file, or standard input for `-`, as text.
+def opened(path: str | PathLike[str]) -> BinaryIO:
+    """Open a file, or standard input for `-`, with a buffer that can be looked into.
 
-    Raises FileProblem when it cannot be read, FormatError when it is no text or too long.
+    Raises FileProblem.
     """
     name = str(path)
+    if name == "-":
+        if sys.stdin is None:
+            raise FileProblem("standard input is closed")
+        stdin = sys.stdin.buffer
+        return stdin if hasattr(stdin, "peek") else BufferedReader(stdin)  # type: ignore[type-var]
     try:
-        if name == "-":
-            if sys.stdin is None:
-                raise FileProblem("standard input is closed")
-            return _decode_whole(sys.stdin.buffer.read(MOST_CHARACTERS + 1), "stdin")
-        with open(path, "rb") as stream:
-            return _decode_whole(stream.read(MOST_CHARACTERS + 1), name)
+        return open(path, "rb", buffering=HEAD)
     except OSError as error:
         raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:
-        if isinstance(error, FormatError):
-            raise
         raise FileProblem(f"{name!r} is no file name: {error}") from None
 
 
-def _decode_whole(data: bytes, name: str) -> str:
-    """Decode what was read unless there is more of it than may be."""
+def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
+    """Read a file, or standard input for `-`, as text; `stream` is what was opened already.
+
+    Raises FileProblem when it cannot be read, FormatError when it is no text or too long.
+    """
+    name = "stdin" if str(path) == "-" else str(path)
+    stream = stream or opened(path)
+    try:
+        data = stream.read(MOST_CHARACTERS + 1)
+    except OSError as error:
+        raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
+    finally:
+        if name != "stdin":
+            stream.close()
     if len(data) > MOST_CHARACTERS:
         raise FormatError(f"longer than {MOST_CHARACTERS} bytes, the most in one file; split it", source=name)
     return decode(data, name)
@@ -68,7 +87,7 @@ def decode(data: bytes, name: str) -> str:
     """
     if data.startswith((b"\xff\xfe\x00\x00", b"\x00\x00\xfe\xff")):
         raise FormatError("not UTF-8 but UTF-32; convert the file", source=name, line=1, column=1)
-    encoding = "utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
+    encoding = "utf-16" if data.startswith(UTF16) else "utf-8-sig"
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
@@ -100,30 +119,24 @@ def check_text(source: Source) -> None:
         raise error_at(source, error.start, f"not UTF-8: half a character (U+{odd:04X})") from None
 
 
-def place_of(text: str, offset: int) -> tuple[int, int]:
-    """Return line and column of an offset into the text."""
-    line, begin = 1, 0
-    for end in re.finditer(_LINE_END, text[:offset]):
-        line, begin = line + 1, end.end()
-    return line, offset - begin + 1
+def places_of(text: str, offsets: Sequence[int]) -> list[tuple[int, int]]:
+    """Return line and column of each offset, in one pass over the text.
+
+    Behind the last character, where parsers find that something is missing, all offsets are one place.
+    """
+    last = len(text.rstrip(" \t\r\n"))
+    begins = [0, *(end.end() for end in re.finditer(_LINE_END, text[: max(offsets, default=0)]))]
+    places = []
+    for offset in offsets:
+        at = min(offset, last)
+        line = bisect_right(begins, at)
+        places.append((line, at - begins[line - 1] + 1))
+    return places
 
 
-def within(text: str, line: int, column: int) -> tuple[int, int]:
-    """Draw a place beyond the last character, where parsers find that something is missing, back to just after it."""
-    return min((line, column), place_of(text, len(text.rstrip(" \t\r\n"))))
-
-
-def error_at(source: Source, offset: int, message: str) -> FormatError:
-    """Make the error for an offset into the source's text."""
-    line, column = place_of(source.text, offset)
-    return placed_error(source, line, column, message)
-
-
-def placed_error(
-    source: Source, line: int, column: int, message: str, error: type[FormatError] = FormatError
-) -> FormatError:
-    """Make the error for a place, with the source line and a caret below it."""
-    line, column = within(source.text, line, column)
+def error_at(source: Source, offset: int, message: str, error: type[FormatError] = FormatError) -> FormatError:
+    """Make the error for an offset into the source's text, with the source line and a caret below it."""
+    ((line, column),) = places_of(source.text, [offset])
     snippet = pointer(line_of(source.text, line), column)
     return error(message, source=source.name, line=line, column=column, snippet=snippet)
 

@@ -6,7 +6,7 @@ import re
 
 from yaml.error import MarkedYAMLError
 
-from frametool.documents.source import Source, error_at, line_of, placed_error
+from frametool.documents.source import Source, error_at, line_of
 from frametool.text.numbers import odd_characters
 
 TYPE_CHECKING = False
@@ -31,9 +31,9 @@ _HINTS = {
 def translated(source: Source, error: Exception) -> FormatError:
     """Make our error of the parser's: lower case, placed, with a hint where one is known."""
     if isinstance(error, MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
-        line, column = mark.line + 1, mark.column + 1
-        message = _message(error, line_of(source.text, line), column)
-        return placed_error(source, line, column, message + _suspicion(source, line))
+        line = mark.line + 1
+        message = _message(error, line_of(source.text, line), mark.column + 1)
+        return error_at(source, mark.index, message + _suspicion(source, line))
     if odd := re.search(_UNREADABLE, source.text):
         code = f"U+{ord(odd[0]):04X}"
         return error_at(source, odd.start(), f"the character {code} may not stand in YAML or JSON; is this text?")

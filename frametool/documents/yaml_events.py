@@ -6,8 +6,6 @@ text grow without bound.  The loop here keeps every scalar as text and counts de
 
 from __future__ import annotations
 
-import re
-
 import yaml
 from yaml.events import (
     AliasEvent,
@@ -22,17 +20,17 @@ from yaml.events import (
 from frametool.documents.collector import paused_collector
 from frametool.documents.limits import DEEPEST, MOST_CONTAINERS, too_much
 from frametool.documents.marks import END, LEAF, LIST, MAP, find_marks
-from frametool.documents.source import Source, error_at, place_of, placed_error
+from frametool.documents.source import Source, error_at, places_of
 from frametool.documents.yaml_errors import translated
 from frametool.documents.yaml_lines import put_back, split_run
 from frametool.errors import FormatError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator
     from typing import Any, TypeAlias
 
-    from frametool.documents.marks import Path, PlaceEvent
+    from frametool.documents.marks import Event, Path
 
     Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
@@ -44,10 +42,7 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _ITEM = object()  # stands for the key while a list is filled
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
 _ODD_KEYS = frozenset(("", "<<"))
-_OPENCV_HEAD = r"%YAML:1\.[0-9]+[^\r\n]*"
-_OPENCV_TIGHT = r"(?m)^([ \t]*[\w.]+):(?=\S)"
-_OPENCV_TAGS = frozenset(("tag:yaml.org,2002:opencv-matrix",))
-_PLACE_KINDS: dict[type, int] = {
+_KINDS: dict[type, int] = {
     ScalarEvent: LEAF,
     AliasEvent: LEAF,
     SequenceStartEvent: LIST,
@@ -58,83 +53,46 @@ _PLACE_KINDS: dict[type, int] = {
 _MOST_DIRECTIVES = 100  # libyaml compares each new %TAG with all before it
 
 
-def parse_yaml(source: Source, allowed_tags: frozenset[str]) -> list[Value]:
+def parse_yaml(source: Source) -> list[Value]:
     """Return the value of each document of a YAML text, None for an empty one.
 
     Mappings become dicts with text keys, sequences lists, scalars text, null values None.
-    Tags that are allowed are read over.  Raises FormatError.
+    Raises FormatError.
     """
-    readable = readable_yaml(source)
-    tags = allowed_tags if readable is source else allowed_tags | _OPENCV_TAGS
-    try:
-        with paused_collector():
-            return _read_by_lines(readable, tags) or _Builder(readable, tags).build()
-    except FormatError as error:
-        if readable is source:
-            raise
-        place = _unshift((error.line, error.column), dict(_widened(source.text)))
-        raise placed_error(source, *place, error.message) from None
+    if source.text.count("\n%TAG") > _MOST_DIRECTIVES:
+        raise error_at(source, source.text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
+    with paused_collector():
+        return _read_by_lines(source) or _Builder(source).build()
 
 
-def _read_by_lines(source: Source, tags: frozenset[str]) -> list[Value] | None:
-    """Read a text that ends in a long list of plain flow maps; None for others and for mistakes."""
+def _read_by_lines(source: Source) -> list[Value] | None:
+    """Read a text that ends in a long list of plain maps; None for others and for mistakes."""
     split = split_run(source.text)
     if split is None:
         return None
     try:
-        values = _Builder(Source(source.name, split[0]), tags).build()
+        values = _Builder(Source(source.name, split[0])).build()
     except FormatError:
         return None
     return values if put_back(values, split[1]) else None
 
 
-def readable_yaml(source: Source) -> Source:
-    """Return the source itself, or what OpenCV wrote turned into YAML: same lines, blanks after the colons."""
-    text = source.text
-    if text.count("\n%TAG") > _MOST_DIRECTIVES:
-        raise error_at(source, text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
-    head = re.match(_OPENCV_HEAD, text) if text.startswith("%YAML:") else None
-    return source if head is None else Source(source.name, re.sub(_OPENCV_TIGHT, r"\1: ", text[head.end() :]))
-
-
-def yaml_marks(source: Source, paths: Sequence[Path]) -> dict[Path, tuple[tuple[int, int], tuple[int, int]]]:
-    """Find the places (line, column) of keys and values; nothing for what the text does not hold."""
-    readable = readable_yaml(source)
-    found = {
-        path: (_place(key), _place(value))
-        for path, (key, value) in find_marks(_place_events(readable.text), paths).items()
-    }
-    if readable is source:
-        return found
-    lines = {place[0] for places in found.values() for place in places}
-    shifts = {line: end for line, end in _widened(source.text) if line in lines}
-    return {path: (_unshift(key, shifts), _unshift(value, shifts)) for path, (key, value) in found.items()}
-
-
-def _place(mark: Any) -> tuple[int, int]:
-    """Return line and column from 1 of the parser's mark, which counts from 0."""
-    return mark.line + 1, mark.column + 1
-
-
-def _widened(text: str) -> Iterator[tuple[int, int]]:
-    """Return line and column of each colon that got a blank."""
-    return (place_of(text, match.end() - 1) for match in re.finditer(_OPENCV_TIGHT, text))
-
-
-def _unshift(place: tuple[int, int], shifts: dict[int, int]) -> tuple[int, int]:
-    """Take the inserted blank off a column."""
-    line, column = place
-    return line, column - (line in shifts and column > shifts[line])
-
-
-def _place_events(text: str) -> Iterator[PlaceEvent[Any]]:
-    """Reduce the parser's events to what finding places needs; what cannot be parsed ends them."""
+def yaml_events(text: str) -> Iterator[Event]:
+    """Yield the values of a text in order, with their places; what cannot be parsed ends them."""
     get: Callable[[], Any] = _Loader(text).get_event
-    kinds = _PLACE_KINDS
+    kinds = _KINDS
     try:
         while (kind := type(event := get())) is not StreamEndEvent:
             if kind in kinds:
-                yield kinds[kind], event.value if kind is ScalarEvent else "", event.start_mark
+                start = event.start_mark
+                word, style = "", ""
+                if kind is ScalarEvent:
+                    word, style = event.value, event.style or ""
+                elif kind is AliasEvent:
+                    word = style = "*"
+                elif kinds[kind] != END and event.flow_style:
+                    style = "["
+                yield kinds[kind], word, start.index, event.end_mark.index, style, start.column
     except yaml.YAMLError:
         return
 
@@ -142,12 +100,11 @@ def _place_events(text: str) -> Iterator[PlaceEvent[Any]]:
 class _Builder:
     """Build the values of one text; holds what the rare events need beside the loop."""
 
-    __slots__ = ("aliases", "allowed", "anchors", "copies", "documents", "open", "source")
+    __slots__ = ("aliases", "anchors", "copies", "documents", "open", "source")
 
-    def __init__(self, source: Source, allowed: frozenset[str]) -> None:
+    def __init__(self, source: Source) -> None:
         """Start with an empty list of documents, and the budget for aliases."""
         self.source = source
-        self.allowed = allowed
         self.anchors: dict[str, Value] = {}
         self.aliases = MOST_ALIASES
         self.copies = SPARE_COPIES + len(source.text)
@@ -220,9 +177,9 @@ class _Builder:
                 key = None if kind is MappingStartEvent else item
 
     def _note(self, event: NodeEvent, value: Value) -> None:
-        """Refuse a tag that is not allowed; remember what an anchor names."""
-        if event.tag is not None and event.tag not in self.allowed:
-            raise self._error(event, f"tag {_tag_shown(event.tag)} is not read here")
+        """Refuse a tag; remember what an anchor names."""
+        if event.tag is not None:
+            raise self._error(event, f"tag {event.tag.replace('tag:yaml.org,2002:', '!!')} is not read here")
         if event.anchor is not None:
             self.anchors[event.anchor] = value
 
@@ -231,8 +188,8 @@ class _Builder:
         if event.value == "":
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
         if event.value in current:
-            first = yaml_marks(self.source, [(*self._path(), event.value)])
-            line, column = next(reversed(first.values()))[0]
+            first = find_marks(yaml_events(self.source.text), [(*self._path(), event.value)])
+            ((line, column),) = places_of(self.source.text, [next(reversed(first.values()))[0]])
             raise self._error(event, f"key {event.value!r} stands twice; first at {line}:{column}")
         if not event.style:
             raise self._error(event, "merge keys (<<) are not supported; write the entries out")
@@ -278,23 +235,9 @@ class _Builder:
 
     def _error(self, event: Any, message: str) -> FormatError:
         """Make the error for the place where an event begins."""
-        return placed_error(self.source, *_place(event.start_mark), message)
+        return error_at(self.source, event.start_mark.index, message)
 
 
 def _children(container: dict[str, Value] | list[Value]) -> list[tuple[Any, Value]]:
     """Return keys or indices with their values."""
     return list(container.items() if isinstance(container, dict) else enumerate(container))
-
-
-def _tag_shown(tag: str) -> str:
-    """Return a tag as it is written."""
-    return tag.replace("tag:yaml.org,2002:", "!!")
-
-
-def node_events(text: str) -> Iterator[Any]:
-    """Yield the events of scalars, aliases, lists and maps with their marks."""
-    get: Callable[[], Any] = _Loader(text).get_event
-    kinds = (ScalarEvent, AliasEvent, SequenceStartEvent, MappingStartEvent, SequenceEndEvent, MappingEndEvent)
-    while type(event := get()) is not StreamEndEvent:
-        if isinstance(event, kinds):
-            yield event

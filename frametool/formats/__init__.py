@@ -1,50 +1,147 @@
-"""Bytes to records and back: one file a form of text, one table of them."""
+"""Bytes to records and back: one file a form of text, and the one table of them."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
 
-class Row:
-    """A form of text: the module that has its `write_poses`, `write_points`, `write_tree`, and what it is."""
 
-    __slots__ = ("module", "suffixes", "summary", "writes")
+class Format(NamedTuple):
+    """A form of text: what it holds, how it is recognised, and the modules that read and write it.
 
-    def __init__(self, module: str, suffixes: tuple[str, ...], summary: str, writes: tuple[str, ...]) -> None:
-        """Fill the row."""
-        self.module = module
-        self.suffixes = suffixes
-        self.summary = summary
-        self.writes = writes
+    summary: what it is, in a line
+    suffixes: of files in this form
+    reads: what is read from it: `tree` by `read` of `reader`; `messages`, `records` and `rows` by the streams
+    writes: what is written in it, by `write_poses`, `write_points` (also for a `report`), `write_tree` of `writer`
+    signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
+    """
 
+    summary: str
+    suffixes: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    reader: str = ""
+    writes: tuple[str, ...] = ()
+    writer: str = ""
+    signs: tuple[tuple[str, str | bytes], ...] = ()
+
+
+_TREE = "frametool.formats.tree_reader"
+_MESSAGES = "frametool.ros.message_reader"
+_BAG = "frametool.ros.bags"
+_MESSAGE_KEYS = (
+    "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
+)
 
 FORMATS = {
-    "yaml": Row(
-        "frametool.formats.yaml_format",
-        (".yaml", ".yml"),
-        "YAML, as trees and poses are read",
-        ("poses", "points", "tree", "report"),
+    "yaml": Format(
+        "YAML: trees, poses, documents parted by ---",
+        suffixes=(".yaml", ".yml"),
+        reads=("tree", "records"),
+        reader=_TREE,
+        writes=("poses", "points", "tree", "report"),
+        writer="frametool.formats.yaml_format",
+        signs=(
+            ("yaml key", "frames"),
+            # a header of CSV whose first column ends in a colon is no key
+            ("header", r"""(?!(?!.*(?:[{\[]|: )).*,)(?:---(?:\s|$)|%YAML|- |(?:[\w./-]+|"[^"\n]*"):(?:\s|$)|[\[{])"""),
+        ),
     ),
-    "json": Row(
-        "frametool.formats.json_format",
-        (".json", ".jsonl"),
-        "JSON, one object a line",
-        ("poses", "points", "tree", "report"),
+    "json": Format(
+        "JSON: trees, one object a line, or an array",
+        suffixes=(".json", ".jsonl", ".ndjson"),
+        reads=("tree", "records"),
+        reader=_TREE,
+        writes=("poses", "points", "tree", "report"),
+        writer="frametool.formats.json_format",
+        signs=(("json key", "frames"), ("begin", r"""\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))""")),
     ),
-    "csv": Row("frametool.formats.csv_format", (".csv",), "CSV with a header", ("poses", "points", "report")),
-    "ros1": Row(
-        "frametool.ros.echo_format", (), "messages as `rostopic echo` prints them", ("poses", "points", "tree")
+    "csv": Format(
+        "CSV with a header",
+        suffixes=(".csv",),
+        reads=("rows",),
+        writes=("poses", "points", "report"),
+        writer="frametool.formats.csv_format",
+        signs=(("header", r"[^\t]*,[^\t]*$"),),
     ),
-    "ros2": Row(
-        "frametool.ros.echo_format", (), "messages as `ros2 topic echo` prints them", ("poses", "points", "tree")
+    "tsv": Format(
+        "tab-separated values with a header", (".tsv", ".tab"), reads=("rows",), signs=(("header", r".*\t"),)
     ),
-    "foxglove": Row("frametool.ros.foxglove", (), "FrameTransform as JSON, one a line", ("poses", "tree")),
-    "static1": Row("frametool.ros.publisher", (), "static_transform_publisher of ROS 1", ("poses", "tree")),
-    "static2": Row("frametool.ros.publisher", (), "static_transform_publisher of ROS 2", ("poses", "tree")),
-    "tf2": Row("frametool.ros.tf2_listing", (), "the listing of tf2's all_frames_as_yaml", ("tree",)),
-    "dot": Row("frametool.formats.dot", (".dot", ".gv"), "graphviz", ("tree",)),
-    "mermaid": Row("frametool.formats.mermaid", (".mmd",), "a mermaid flowchart", ("tree",)),
+    "columns": Format("columns between blanks, # comments", reads=("rows",), signs=(("header", r"#|\s*\S+\s+\S"),)),
+    "tum": Format("trajectory: t x y z qx qy qz qw", suffixes=(".tum",), reads=("rows",)),
+    "echo": Format(
+        "messages as `ros2 topic echo` or `rostopic echo` print them",
+        reads=("tree", "messages"),
+        reader=_MESSAGES,
+        signs=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
+    ),
+    "jsonl": Format(
+        "messages as JSON, one a line (rosbridge, Foxglove)",
+        reads=("tree", "messages"),
+        reader=_MESSAGES,
+        signs=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
+    ),
+    "csv1": Format("CSV of `rostopic echo -p`", reads=("tree",), reader=_MESSAGES, signs=(("line", "%time,"),)),
+    "csv2": Format(
+        "CSV of `ros2 topic echo --csv`",
+        reads=("tree",),
+        reader=_MESSAGES,
+        signs=(("line", r"-?\d+,\d+,[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$"),),
+    ),
+    "calls": Format(
+        "static_transform_publisher calls",
+        reads=("tree",),
+        reader="frametool.ros.publisher",
+        signs=(
+            ("line", r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]"),
+            # numbers and two names: poses of a trajectory are numbers only
+            ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
+        ),
+    ),
+    "bag1": Format("ROS 1 bag", (".bag",), ("tree",), _BAG, signs=(("magic", b"#ROSBAG V2.0"),)),
+    "bag2": Format(
+        "ROS 2 bag (sqlite3)",
+        suffixes=(".db3",),
+        reads=("tree",),
+        reader=_BAG,
+        signs=(("magic", b"SQLite format 3\0"), ("folder", "metadata.yaml")),
+    ),
+    "mcap": Format("MCAP file", (".mcap",), ("tree",), _BAG, signs=(("magic", b"\x89MCAP0\r\n"),)),
+    "ros1": Format(
+        "messages as `rostopic echo` prints them",
+        writes=("poses", "points", "tree"),
+        writer="frametool.ros.echo_format",
+    ),
+    "ros2": Format(
+        "messages as `ros2 topic echo` prints them",
+        writes=("poses", "points", "tree"),
+        writer="frametool.ros.echo_format",
+    ),
+    "foxglove": Format(
+        "FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"
+    ),
+    "static1": Format(
+        "static_transform_publisher of ROS 1", writes=("poses", "tree"), writer="frametool.ros.publisher"
+    ),
+    "static2": Format(
+        "static_transform_publisher of ROS 2", writes=("poses", "tree"), writer="frametool.ros.publisher"
+    ),
+    "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
+    "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.dot"),
+    "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.mermaid"),
 }
 
 
+def readers(*what: str) -> tuple[str, ...]:
+    """Name the forms from which any of `tree`, `messages`, `records` and `rows` is read."""
+    return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
+
+
 def writers(what: str) -> tuple[str, ...]:
-    """Name the forms that write `poses`, `points` or a `tree`."""
+    """Name the forms in which `poses`, `points`, a `tree` or a `report` is written."""
     return tuple(name for name, row in FORMATS.items() if what in row.writes)
+
+
+def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:
+    """Return which of some forms the suffix of a file stands for, if any."""
+    begin, dot, suffix = (path or "").rpartition(".")
+    told = f"{dot}{suffix}".lower() if begin and "/" not in suffix else ""
+    return next((name for name in names if told in FORMATS[name].suffixes), None)

@@ -1,67 +1,163 @@
-"""What a file is, from its first bytes: the one place that guesses, and only between forms no other reader takes."""
+"""What form a file has, by its first bytes and its name: the one place that guesses.
+
+Kinds of signs in the table, the strongest first.  Above the suffix, a sign belongs to one form alone:
+
+    magic      the first bytes
+    folder     a file that the folder holds
+    xml        the root element
+    json key   a key of the outermost object, or of the objects in the outermost list
+    yaml key   a key at the beginning of a line
+    line       a pattern of the first line of data, behind blank lines, comments and what tools print
+
+Below it, the first form that looks so is taken:
+
+    begin      a pattern of the first characters
+    header     a pattern of the first line that is no comment, or of a comment that names columns
+"""
 
 from __future__ import annotations
 
+import os
 import re
+from functools import cached_property
 
+from frametool.documents.source import UTF16
+from frametool.errors import FormatError
+from frametool.formats import FORMATS, by_suffix, readers
 from frametool.ros.noise import NOISE
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from typing import Final
+    from collections.abc import Callable
+    from typing import Any, TypeAlias
 
-HEAD: Final = 1 << 16
-"""How many bytes are looked at."""
+    Shows: TypeAlias = Callable[["Beginning", Any], bool]
 
-FORMS = {
-    "bag1": "ROS 1 bag",
-    "bag2": "ROS 2 bag (sqlite3)",
-    "mcap": "MCAP file",
-    "echo": "messages as `ros2 topic echo` or `rostopic echo` print them",
-    "csv1": "CSV of `rostopic echo -p`",
-    "csv2": "CSV of `ros2 topic echo --csv`",
-    "jsonl": "messages as JSON, one a line (rosbridge, Foxglove)",
-    "calls": "static_transform_publisher calls",
-    "tree": "a tree or poses in YAML or JSON",
+LOOKED_AT = 4096  # characters in which keys are searched
+
+
+class Beginning:
+    """The first bytes of a file, and what they show; worked out when first asked for."""
+
+    def __init__(self, head: bytes) -> None:
+        """Keep the bytes."""
+        self.head = head
+
+    @cached_property
+    def text(self) -> str:
+        """Return the bytes as text."""
+        return self.head.decode("utf-16" if self.head.startswith(UTF16) else "utf-8-sig", "replace")
+
+    @cached_property
+    def data_line(self) -> str:
+        """Return the first line of data."""
+        lines = (line for line in self.text.splitlines() if line.strip() and not line.startswith(("#", "---")))
+        return next((line for line in lines if not NOISE(line)), "")
+
+    @cached_property
+    def first_line(self) -> str:
+        """Return the first line that is no comment; a comment with commas or tabs, as the rows below, is a header."""
+        lines = [line.strip("\r") for line in self.text.split("\n") if line.strip()]
+        plain = next((line for line in lines if not line.startswith("#")), "")
+        if lines and lines[0].startswith("#") and (not plain or _has_delimiter(plain)) and _has_delimiter(lines[0]):
+            return lines[0]
+        return plain or "".join(lines[:1])
+
+    @cached_property
+    def json_keys(self) -> set[str]:
+        """Return the outermost keys of JSON."""
+        from frametool.documents.json_reader import json_events, looks_like_json
+        from frametool.documents.marks import END, LEAF
+
+        text = self.text[:LOOKED_AT].lstrip()
+        keys, depth = set(), 0
+        if looks_like_json(text):
+            outermost = 1 + text.startswith("[")
+            for kind, word, _, end, *_ in json_events(text):
+                depth += (kind != LEAF) - 2 * (kind == END)
+                if kind == LEAF and depth == outermost and text[end:].lstrip().startswith(":"):
+                    keys.add(word)
+        return keys
+
+    @cached_property
+    def yaml_keys(self) -> set[str]:
+        """Return the words at the beginnings of lines that a colon follows."""
+        return {found[2] for found in re.finditer(r"""(?m)^(["']?)([A-Za-z_][\w./-]*)\1[ \t]*:(?=\s|$)""", self.text)}
+
+    @cached_property
+    def root(self) -> str:
+        """Return the name of the root element of XML."""
+        found = re.match(r"\s*(?:<[?!](?:--.*?--|[^>]*)>\s*)*<([\w.:-]+)", self.text, re.DOTALL)
+        return found[1] if found else ""
+
+
+def _has_delimiter(line: str) -> bool:
+    return "," in line or "\t" in line
+
+
+# kind -> whether a beginning shows what a row says, the strongest first
+_STRONG: dict[str, Shows] = {
+    "magic": lambda begin, what: begin.head.startswith(what),
+    "xml": lambda begin, what: begin.root == what,
+    "json key": lambda begin, what: what in begin.json_keys,
+    "yaml key": lambda begin, what: what in begin.yaml_keys,
+    "line": lambda begin, what: re.match(what, begin.data_line) is not None,
 }
-BAGS = ("bag1", "bag2", "mcap")
-_MAGIC = ((b"#ROSBAG V2.0", "bag1"), (b"SQLite format 3\0", "bag2"), (b"\x89MCAP0\r\n", "mcap"))
-_ECHO = re.compile(
-    r"(?:transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force): *$"
-)
-_FLOW_ECHO = re.compile(r"(?:transforms|header): *[\[{]")
-_CSV2 = re.compile(r"-?\d+,\d+,[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$")
-# the command's name, flags, or numbers and two names: poses of a trajectory are numbers only
-_CALL = re.compile(
-    r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]|[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"
-)
-_MESSAGE_KEY = re.compile(r'"(?:child_frame_id|transforms|frame_id|op)"')
+_WEAK: dict[str, Shows] = {
+    "begin": lambda begin, what: re.match(what, begin.text) is not None,
+    "header": lambda begin, what: re.match(what, begin.first_line) is not None,
+}
 
 
-def detect(head: bytes) -> str:
-    """Name the form of a file by its first bytes, up to HEAD of them."""
-    for magic, form in _MAGIC:
-        if head.startswith(magic):
-            return form
-    encoding = "utf-16" if head.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
-    lines = head.decode(encoding, "replace").splitlines()
-    first = next((line for line in lines if _counts(line)), "")
-    if first.startswith("%time,"):
-        return "csv1"
-    if first.startswith("{"):
-        return "jsonl" if _is_json_line(first) else "tree"
-    if _CSV2.match(first):
-        return "csv2"
-    if _CALL.match(first):
-        return "calls"
-    return "echo" if _ECHO.match(first) or _FLOW_ECHO.match(first) else "tree"
+def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> list[str]:
+    """Return the forms that show a sign of the strongest kind that is shown at all."""
+    for kind, shows in tests.items():
+        if found := [
+            name for name in names if any(kind == of and shows(begin, what) for of, what in FORMATS[name].signs)
+        ]:
+            return found
+    return []
 
 
-def _counts(line: str) -> bool:
-    """Tell a line of data from blank ones, comments, separators and noise."""
-    return bool(line.strip()) and not line.startswith(("#", "---")) and NOISE(line) is None
+def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
+    """Return the form, among those from which `reads` is read, whose sign the first bytes show; None if none does.
+
+    Raises FormatError if two forms fit.
+    """
+    found = _fitting(Beginning(head), _STRONG, readers(*reads))
+    if len(found) > 1:
+        raise FormatError(f"fits {' and '.join(found)}; give --in {'|'.join(found)}", source=name or "stdin")
+    return found[0] if found else None
 
 
-def _is_json_line(line: str) -> bool:
-    """Tell one message on a line from the first line of a longer object."""
-    return line.rstrip().endswith("}") and _MESSAGE_KEY.search(line) is not None
+def of_folder(path: str) -> str | None:
+    """Return the form of which a folder is; None for a file, and for any other folder."""
+    for form, row in FORMATS.items():
+        for kind, what in row.signs:
+            if kind == "folder" and os.path.isdir(path) and os.path.exists(os.path.join(path, str(what))):
+                return form
+    return None
+
+
+def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "") -> tuple[str, str]:
+    """Return the form of a file and by what it was known, among the forms from which `reads` is read.
+
+    head: its first bytes; name: of the file, "" for standard input; otherwise: the form if nothing tells.
+    Raises FormatError if nothing tells and there is no such form, or two forms fit.
+    """
+    if form := by_sign(head, *reads, name=name):
+        return form, "its first bytes"
+    if form := by_suffix(name, readers(*reads)):
+        return form, f"the suffix {name[name.rfind('.'):].lower()}"
+    begin = Beginning(head)
+    if found := _fitting(begin, _WEAK, readers(*reads)):
+        return found[0], "its first line"
+    if otherwise:
+        return otherwise, "nothing else"
+    if not begin.text.strip():
+        raise FormatError("nothing in it", source=name or "stdin")
+    raise FormatError(
+        f"cannot tell the form of {begin.first_line[:60]!r}; give --in {'|'.join(readers(*reads))}",
+        source=name or "stdin",
+        line=1,
+    )

@@ -39,7 +39,7 @@ def read_all(source: Source, read: Callable[[Any, Reading], Any], *, degrees: bo
             place = (document.index, *misfit.path)
             raise format_error(source, place, str(misfit), key=misfit.key) from misfit
         if reading.notes:
-            from frametool.formats.load import tell
+            from frametool.formats.tree_reader import tell
 
             tell(source, reading.notes)
     if not records:
@@ -74,5 +74,5 @@ def read_one_pose(value: Any, reading: Reading) -> Pose:
         return Pose(position, rotation, child or None, parent or None)
     pose = read_pose(value, reading)
     if pose.position is None and pose.rotation is None:
-        reading.note("neither position nor rotation: taken as the identity")
+        reading.note("neither position nor rotation: taken as the identity", rule="identity")
     return pose

@@ -40,8 +40,8 @@ def read_stamped_messages(
         yield message if isinstance(message, FormatError) else _batch(message, recording, kind, normalize=normalize)
     if not found:
         raise FormatError("no messages in it", source=recording.name)
-    for line, sentence in recording.tally.told():
-        warn(f"{recording.name}:{line}: {sentence}")
+    for told in recording.tally.told():
+        warn(f"{recording.name}:{told.line}: {told.message}")
 
 
 def _batch(message: Message, recording: Recording, kind: str | None, *, normalize: bool) -> Batch | FormatError:
@@ -54,8 +54,8 @@ def _batch(message: Message, recording: Recording, kind: str | None, *, normaliz
     stamped = [each._replace(form=_form(recording.form, each, message)) for each in found]
     if other := next((each.key for each in stamped if kind not in (None, each.key)), None):
         raise ValueInvalid(f"{recording.name}:{message.line}: a {other} cannot be taken for a {kind}")
-    for _, note in reading.notes:
-        recording.tally.notes.setdefault(note, message.line)
+    for note in reading.notes:
+        recording.tally.note(note, message.line)
     return Batch(message, stamped)
 
 

@@ -10,33 +10,62 @@ Metres, radians unless said; every pose is that of the frame in its parent: pare
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid
+from frametool.documents.document import locate_many, parse_documents
+from frametool.errors import ValueInvalid, warn
 from frametool.frames.stamps import parse_stamp
+from frametool.grammar.edges import Edge
 from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
-from frametool.grammar.readers import Misfit, as_mapping, kind, within
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, within
 from frametool.ros import messages
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.grammar.readers import Path, Reading
+    from frametool.documents.input_file import InputFile
+    from frametool.documents.source import Source
+    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Note, Path
 
 TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", *STAMP_KEYS))
 CHILDREN = frozenset(("children", *TIMED))
+IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-class Edge(NamedTuple):
-    """One line of a tree: the pose of `child` in `parent`; a root has no parent."""
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the edges of a text of trees, then tell of what was odd in it."""
+    source = file.source
+    notes: list[Note] = []
+    for document in parse_documents(source.text, source.name):
+        reading = Reading(source, raw=options.raw)
+        try:
+            for edge in read_edges(document.value, reading):
+                bare = edge if options.raw else without_slashes(edge, reading)
+                yield bare._replace(path=(document.index, *edge.path))
+        except Misfit as misfit:
+            raise misfit.placed(source, document.index) from None
+        notes += [note._replace(path=(document.index, *note.path)) for note in reading.notes]
+    tell(source, notes)
 
-    parent: str | None
-    child: str
-    pose: Pose
-    path: Path
-    stamp_ns: int | None = None
+
+def without_slashes(edge: Edge, reading: Reading) -> Edge:
+    """Take one leading `/` off the names, which tf2 has given up, and note it."""
+    if edge.child[0] != "/" and (edge.parent or "")[:1] != "/":
+        return edge
+    reading.here = edge.path
+    return edge._replace(child=reading.bare(edge.child), parent=edge.parent and reading.bare(edge.parent))
+
+
+def tell(source: Source, notes: list[Note], most: int = 10) -> None:
+    """Warn of what was noted while reading, each with its place; only count what exceeds `most`."""
+    places = locate_many(source.text, [note.path for note in notes[:most]])
+    for (line, column), note in zip(places, notes[:most], strict=True):
+        warn(f"{source.name}:{line}:{column}: {note.message}")
+    if len(notes) > most:
+        warn(f"{source.name}: {len(notes) - most} more like these")
 
 
 def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
@@ -77,7 +106,7 @@ def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
 def _below_root(root: str, children: Any, reading: Reading) -> Iterator[Edge]:
     """Walk one nested tree, parents before children; a stack, so that no tree is too deep."""
     path: Path = ("frames", root)
-    yield Edge(None, root, Pose(), path)
+    yield Edge(None, root, IDENTITY, path=path)
     pending = [(root, children, path)]
     while pending:
         parent, entries, path = pending.pop()
@@ -151,8 +180,8 @@ def _edges(
     if entry is not None and "samples" in entry:
         return read_samples(entry, pose, parent, child, path, reading)
     if parent is not None and pose.position is None and pose.rotation is None:
-        reading.note(f"frame {child!r} has neither position nor rotation: taken as the identity")
-    return [Edge(parent, child, pose, path, stamp_of(entry or {}))]
+        reading.note(f"frame {child!r} has neither position nor rotation: taken as the identity", rule="identity")
+    return [Edge(parent, child, pose.components, stamp_of(entry or {}), path=path)]
 
 
 def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[Edge]:
@@ -171,9 +200,9 @@ def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
         from frametool.ros.tf2_input import read_transform
 
         parent, child, components, stamp_ns = read_transform(message)
-        return Edge(parent, child, Pose.of(components), path, stamp_ns)
+        return Edge(parent, child, components, stamp_ns, path=path)
     parent, child, position, rotation, stamp_ns = messages.read_transform(message, reading)
-    return Edge(parent, child, Pose(position, rotation), path, stamp_ns)
+    return Edge(parent, child, (*position, *rotation), stamp_ns, path=path)
 
 
 def read_samples(
@@ -195,7 +224,7 @@ def read_samples(
         above = moved.parent or parent
         if above is None:
             raise Misfit(f"frame {child!r} moves but has no parent", ("samples", index))
-        edges.append(Edge(above, child, moved, reading.here, stamp_ns))
+        edges.append(Edge(above, child, moved.components, stamp_ns, path=reading.here))
     reading.degrees = outer
     return edges
 

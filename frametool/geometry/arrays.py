@@ -21,7 +21,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.geometry.types import Array, Components, Four, Kernel, Part, Two
+    from frametool.geometry.types import Array, Components, Four, Kernel, Number, Two
 
 BLOCK = 16384  # rows: numpy's calls cost little beside their work, and the temporaries of a kernel stay in the cache
 WIDE = 12  # columns in and out: kernels with more have more temporaries, and get three quarters of the rows
@@ -192,6 +192,6 @@ def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:
         yield start, min(start + rows, size)
 
 
-def _cut(column: Part, start: int, stop: int) -> Part:
+def _cut(column: Number, start: int, stop: int) -> Number:
     """Return a block of a column as contiguous float64; a float stands for every row."""
     return column if isinstance(column, float) else np.ascontiguousarray(column[start:stop], dtype=np.float64)

@@ -39,7 +39,8 @@ def check(*axis_and_angle: float, normalize: bool = False) -> Components:  # noq
     """
     ax, ay, az, angle = axis_and_angle
     if not all(map(isfinite, axis_and_angle)):
-        raise ValueInvalid(f"axis {ax:g} {ay:g} {az:g}, angle {angle:g} is not finite; give finite numbers")
+        shown = f"axis {ax:g} {ay:g} {az:g}, angle {angle:g}"
+        raise ValueInvalid(f"{shown} is not finite; give finite numbers", rule="not-finite")
     if not (ax or ay or az):
-        raise ValueInvalid("axis 0 0 0 has no direction; give a non-zero one")
+        raise ValueInvalid("axis 0 0 0 has no direction; give a non-zero one", rule="denormalized")
     return axis_and_angle

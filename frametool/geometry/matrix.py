@@ -109,29 +109,31 @@ def check(*values: float, normalize: bool = False) -> Nine[float]:
     entries = nine(values)
     problem = complaint(*entries, normalize=normalize)
     if problem:
-        raise ValueInvalid(problem)
+        raise problem
     off = defect(*entries, floats)
     if off <= ORTHONORMAL:
         return entries
     if off > SILENT and not normalize:
-        warn(f"matrix is orthonormal only to {off:.2g} and was replaced by the nearest rotation")
+        warn(f"matrix is orthonormal only to {off:.2g} and was replaced by the nearest rotation", rule="rounded")
     return nearest(*entries, floats)
 
 
-def complaint(*entries: float, normalize: bool) -> str:
-    """Say why a matrix is refused, or nothing."""
+def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
+    """Make the error for a matrix that is refused; None if it is not."""
     matrix = nine(entries)
     off = defect(*matrix, floats)
     if not all(map(isfinite, entries)):
-        return f"matrix {_shown(entries)} is not finite; give nine finite numbers"
+        return ValueInvalid(f"matrix {_shown(entries)} is not finite; give nine finite numbers", rule="not-finite")
     if not normalize and not off <= TOLERATED and not (off < 1.0 and determinant(*matrix) < 0.0):
-        return f"matrix is not a rotation: its rows are orthonormal only to {off:.2g} (normalize it with --normalize)"
+        off_by = f"its rows are orthonormal only to {off:.2g} (normalize it with --normalize)"
+        return ValueInvalid(f"matrix is not a rotation: {off_by}", rule="denormalized")
     volume = relative_volume(*matrix, floats)
     if volume < -SINGULAR:
-        return f"matrix has determinant {determinant(*matrix):.6g}: it is left-handed (mirrored); a rotation has 1"
+        found = f"matrix has determinant {determinant(*matrix):.6g}"
+        return ValueInvalid(f"{found}: it is left-handed (mirrored); a rotation has 1", rule="mirrored")
     if volume <= SINGULAR:
-        return f"matrix {_shown(entries)} is singular; no rotation is nearest to it"
-    return ""
+        return ValueInvalid(f"matrix {_shown(entries)} is singular; no rotation is nearest to it", rule="denormalized")
+    return None
 
 
 def _scaled(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:

@@ -229,9 +229,11 @@ def check(x: float, y: float, z: float, w: float, *, normalize: bool = False) ->
     off = deviation(x, y, z, w, floats)
     problem = complaint(x, y, z, w, normalize=normalize)
     if problem:
-        raise ValueInvalid(problem)
+        raise problem
     if off > SILENT and not normalize:
-        warn(f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown_norm(x, y, z, w)} and was normalised")
+        warn(
+            f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown_norm(x, y, z, w)} and was normalised", rule="rounded"
+        )
     return repaired(x, y, z, w, floats)
 
 
@@ -241,17 +243,18 @@ def _shown_norm(x: float, y: float, z: float, w: float) -> str:
     return f"{norm:.6g}" if f"{norm:.6g}" != "1" else f"{norm:.9g}"
 
 
-def complaint(x: float, y: float, z: float, w: float, *, normalize: bool = False) -> str:
-    """Say why a quaternion is refused, or nothing."""
+def complaint(x: float, y: float, z: float, w: float, *, normalize: bool = False) -> ValueInvalid | None:
+    """Make the error for a quaternion that is refused; None if it is not."""
     shown = f"quaternion {x:g} {y:g} {z:g} {w:g}"
     off = deviation(x, y, z, w, floats)
     if x == y == z == w == 0.0:
-        return f"{shown} has no direction; give a non-zero one"
+        return ValueInvalid(f"{shown} has no direction; give a non-zero one", rule="denormalized")
     if not off < inf:
-        return f"{shown} is not finite; give four finite numbers"
+        return ValueInvalid(f"{shown} is not finite; give four finite numbers", rule="not-finite")
     if normalize or off <= TOLERATED:
-        return ""
-    return f"{shown} has norm {_shown_norm(x, y, z, w)}; a rotation needs norm 1 (normalize it with --normalize)"
+        return None
+    message = f"{shown} has norm {_shown_norm(x, y, z, w)}; a rotation needs norm 1 (normalize it with --normalize)"
+    return ValueInvalid(message, rule="denormalized")
 
 
 def between(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[N]:

@@ -96,7 +96,7 @@ class Representation:
             return self._check(*components, normalize=normalize)
         if not all(map(isfinite, components)):
             shown = " ".join(f"{value:g}" for value in components)
-            raise ValueInvalid(f"{self.name} {shown} is not finite; give finite numbers")
+            raise ValueInvalid(f"{self.name} {shown} is not finite; give finite numbers", rule="not-finite")
         return tuple(components)
 
 

@@ -44,5 +44,6 @@ def check(*vector: float, what: str = "rotation vector", normalize: bool = False
     """
     x, y, z = vector
     if not x * x + y * y + z * z < inf:
-        raise ValueInvalid(f"{what} {x:g} {y:g} {z:g} is not finite or too long; give numbers below 1e+150")
+        shown = f"{what} {x:g} {y:g} {z:g}"
+        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below 1e+150", rule="not-finite")
     return vector

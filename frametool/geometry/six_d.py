@@ -56,9 +56,9 @@ def check(*columns: float, normalize: bool = False) -> Components:  # noqa: ARG0
     ax, ay, az, bx, by, bz = columns
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
     if not all(map(isfinite, columns)):
-        raise ValueInvalid(f"{shown} are not finite; give six finite numbers")
+        raise ValueInvalid(f"{shown} are not finite; give six finite numbers", rule="not-finite")
     if not (ax or ay or az) or not (bx or by or bz):
-        raise ValueInvalid(f"{shown} span no plane: one is zero")
+        raise ValueInvalid(f"{shown} span no plane: one is zero", rule="denormalized")
     if deviation(ax, ay, az, bx, by, bz, floats):
-        raise ValueInvalid(f"{shown} span no plane: they are parallel")
+        raise ValueInvalid(f"{shown} span no plane: they are parallel", rule="denormalized")
     return columns

@@ -53,10 +53,10 @@ if TYPE_CHECKING:
         def reduced_exactly(self, x: N, /) -> Two[N]: ...
 
     # Outside the kernels a value holds floats or arrays, which of them only its maker knows: no type tells.
-    Part: TypeAlias = Any
+    Number: TypeAlias = Any
     Namespace: TypeAlias = Functions[Any]
-    Vector: TypeAlias = tuple[Part, Part, Part]
-    Quaternion: TypeAlias = tuple[Part, Part, Part, Part]
-    Rigid: TypeAlias = tuple[Part, Part, Part, Part, Part, Part, Part]
-    Components: TypeAlias = tuple[Part, ...]
+    Vector: TypeAlias = tuple[Number, Number, Number]
+    Quaternion: TypeAlias = tuple[Number, Number, Number, Number]
+    Rigid: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number]
+    Components: TypeAlias = tuple[Number, ...]
     Kernel: TypeAlias = Callable[..., Components]

@@ -84,7 +84,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     except Misfit as error:
         raise error.below(key) from None
     except ValueInvalid as error:
-        raise Misfit(str(error), (key,)) from None
+        raise Misfit(str(error), (key,), rule=error.rule) from None
     finally:
         reading.degrees = outer_degrees
     name, parent = mapping.get("name", ""), mapping.get("parent", "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.text.numbers import NotFinite, parse_number
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.documents.source import Source
+    from frametool.errors import FormatError
 
     Path = tuple[str | int, ...]
     Vector = tuple[float, float, float]
@@ -23,19 +24,35 @@ INDICES: tuple[Path, ...] = tuple((index,) for index in range(16))
 class Misfit(ValueInvalid):
     """A value that does not fit, with the keys and indices that lead to it from where reading began."""
 
-    def __init__(self, message: str, path: Path = (), *, key: bool = False) -> None:
+    def __init__(self, message: str, path: Path = (), *, key: bool = False, rule: str = "") -> None:
         """Keep the path; `key` says that the last key itself is wrong rather than its value."""
-        super().__init__(message)
+        super().__init__(message, rule=rule)
         self.path = path
         self.key = key
 
     def below(self, *outer: str | int) -> Misfit:
         """Return the same misfit as seen from further up."""
-        return type(self)(str(self), (*outer, *self.path), key=self.key)
+        return type(self)(str(self), (*outer, *self.path), key=self.key, rule=self.rule)
+
+    def placed(self, source: Source, document: int) -> FormatError:
+        """Make the error that names the line and column; the path begins at the top of a document of `source`."""
+        from frametool.documents.document import format_error
+
+        error = format_error(source, (document, *self.path), str(self), key=self.key)
+        error.rule = self.rule
+        return error
 
 
 class NotARotation(Misfit):
     """Numbers that were read well but make no rotation."""
+
+
+class Note(NamedTuple):
+    """Something odd that does not stop the reading: the rule of `check` that finds it, in words, and where."""
+
+    rule: str
+    message: str
+    path: Path
 
 
 class Reading:
@@ -44,7 +61,7 @@ class Reading:
     __slots__ = ("degrees", "here", "normalize", "notes", "raw", "source")
 
     def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False) -> None:
-        """Begin at the top of a document of `source`; `notes` collects (path, message).
+        """Begin at the top of a document of `source`; `notes` collects what is odd.
 
         raw: take messages as they are; whoever gets them judges.
         """
@@ -53,11 +70,23 @@ class Reading:
         self.normalize = normalize
         self.raw = raw
         self.here: Path = ()
-        self.notes: list[tuple[Path, str]] = []
+        self.notes: list[Note] = []
 
-    def note(self, message: str, *path: str | int) -> None:
+    def note(self, message: str, *path: str | int, rule: str = "odd") -> None:
         """Keep something worth telling about a place below `here`."""
-        self.notes.append(((*self.here, *path), message))
+        self.notes.append(Note(rule, message, (*self.here, *path)))
+
+    def bare(self, name: str, *path: str | int) -> str:
+        """Take one leading `/` off a frame's name, as tf2 does, and note it."""
+        if not name.startswith("/") or len(name) == 1:
+            return name
+        self.note(slash_note(name), *path, rule="slash")
+        return name[1:]
+
+
+def slash_note(name: str) -> str:
+    """Say that a name lost its leading `/`."""
+    return f"frame {name!r}: the leading / is no part of a name and was left out"
 
 
 def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
@@ -130,5 +159,5 @@ def misfit_among(texts: Sequence[Any], value: Any, names: Sequence[str], read: C
             return error.below(names[index] if type(value) is dict else index)
         except ValueInvalid as error:
             misfit = NotARotation if isinstance(error, NotFinite) else Misfit
-            return misfit(str(error), (names[index] if type(value) is dict else index,))
+            return misfit(str(error), (names[index] if type(value) is dict else index,), rule=error.rule)
     return Misfit("expected numbers")

@@ -81,9 +81,9 @@ def _checked(form: Notation, numbers: Sequence[float], reading: Reading, *, degr
             form.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
         )
     except ValueInvalid as error:
-        raise NotARotation(str(error)) from None
-    for message in odd:
-        reading.note(message)
+        raise NotARotation(str(error), rule=error.rule) from None
+    for rule, message in odd:
+        reading.note(message, rule=rule)
     return rotation
 
 
@@ -119,7 +119,7 @@ def _read_one_by_one(
                 units.append(_unit_for(unit, text, form))
         except ValueInvalid as error:
             misfit = NotARotation if isinstance(error, NotFinite) else Misfit
-            raise misfit(str(error), places[index]) from None
+            raise misfit(str(error), places[index], rule=error.rule) from None
         numbers.append(number)
     return numbers, _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
 
@@ -150,7 +150,7 @@ def _note_degrees(form: Notation, numbers: Sequence[float], places: Sequence[Pat
     if abs(numbers[index]) > TURN:
         name = form.representation.name
         message = f"{name} {numbers[index]:g} is more than a full turn in radians; degrees? write {name}_deg"
-        reading.note(message, form.spec, *places[index])
+        reading.note(message, form.spec, *places[index], rule="degrees")
 
 
 def _list_or_map(form: Notation, value: Any) -> Shape:
@@ -225,6 +225,6 @@ def read_homogeneous(
     m, _ = read_components(form, texts, places, reading)
     if m[12:] != [0.0, 0.0, 0.0, 1.0]:
         found = " ".join(f"{number:g}" for number in m[12:])
-        raise NotARotation(f"the last row of a 4x4 pose is 0 0 0 1, found {found}")
+        raise NotARotation(f"the last row of a 4x4 pose is 0 0 0 1, found {found}", rule="denormalized")
     rows = [*m[0:3], *m[4:7], *m[8:11]]
     return (m[3], m[7], m[11]), _checked(form, rows, reading)

@@ -5,37 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.documents.source import Source
 from frametool.errors import FormatError
-from frametool.formats.load import without_slashes
-from frametool.formats.tree_reader import read_edges
-from frametool.grammar.readers import Misfit, Reading
+from frametool.formats.tree_reader import read_edges, without_slashes
+from frametool.grammar.readers import Misfit, Note, Reading
 from frametool.lint.findings import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from frametool.documents.source import Source
     from frametool.formats.recordings import Recording
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path
 
     Find = Callable[[Finding], None]
 
-# what the readers say -> the rule; the first that fits counts
-PHRASES = (
-    ("not finite", "not-finite"),
-    ("mirrored", "mirrored"),
-    ("normalised", "rounded"),
-    ("projected", "rounded"),
-    ("norm ", "denormalized"),
-    ("no direction", "denormalized"),
-    ("orthonormal", "denormalized"),
-    ("degrees?", "degrees"),
-    ("neither position nor rotation", "identity"),
-    ("leading /", "slash"),
-    ("its own parent", "self"),
-    ("between messages", "noise"),
-)
 WRITTEN_XYZW = frozenset(("quaternion", "xyzw", "rotation", "orientation", "transform"))
 
 
@@ -56,30 +40,24 @@ class Seen(NamedTuple):
         return Finding(rule, message, self.source, self.line, self.column)
 
 
-def rule_of(message: str, otherwise: str) -> str:
-    """Name the rule that a reader's message is about."""
-    return next((rule for phrase, rule in PHRASES if phrase in message), otherwise)
-
-
 def read_all(recording: Recording, find: Find) -> Iterator[Seen]:
     """Yield everything that can be read of a file, and report what cannot."""
     if recording.holds_samples:
         yield from _read_recording(recording, find)
     else:
-        yield from _read_tree(Source(recording.name, recording.text()), find)
+        yield from _read_tree(recording.source, find)
 
 
 def _read_recording(recording: Recording, find: Find) -> Iterator[Seen]:
     def report(error: FormatError) -> None:
-        rule = rule_of(error.message, "syntax")
-        find(Finding(rule, error.message, error.source, error.line, error.column))
+        find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
 
-    for sample in recording.samples(report, tell=False):
+    for sample in recording.edges(report, tell=False):
         w_first = looks_w_first(sample.components)
         column = 1 if sample.line else 0
-        yield Seen(*sample[:4], recording.name, sample.line, column, w_first)
-    for line, message in recording.tally.told():
-        find(Finding(rule_of(message, "odd"), message, recording.name, line, 1))
+        yield Seen(sample.parent or "", *sample[1:4], recording.name, sample.line, column, w_first)
+    for told in recording.tally.told():
+        find(Finding(told.rule, told.message, recording.name, told.line, 1))
 
 
 def looks_w_first(components: Rigid) -> bool:
@@ -107,7 +85,7 @@ def _read_tree(source: Source, find: Find) -> Iterator[Seen]:
     except FormatError as error:
         find(Finding("syntax", error.message, source.name, error.line, error.column))
         return
-    said: list[tuple[str, str, Path]] = []
+    said: list[Note] = []
     edges: list[tuple[Any, Path, bool]] = []
     for document in documents:
         for entry in _entries(document.value):
@@ -116,12 +94,12 @@ def _read_tree(source: Source, find: Find) -> Iterator[Seen]:
     for (rule, message, _), (line, column) in zip(said, places, strict=False):
         find(Finding(rule, message, source.name, line, column))
     for (edge, _, w_first), (line, column) in zip(edges, places[len(said) :], strict=True):
-        yield Seen(edge.parent, edge.child, edge.pose.components, edge.stamp_ns, source.name, line, column, w_first)
+        yield Seen(edge.parent, edge.child, edge.components, edge.stamp_ns, source.name, line, column, w_first)
 
 
 def _read_entry(
     entry: _Entry, document: int, source: Source,
-    said: list[tuple[str, str, Path]], edges: list[tuple[Any, Path, bool]],
+    said: list[Note], edges: list[tuple[Any, Path, bool]],
 ) -> None:  # fmt: skip
     """Read one entry; what it gives and what is to be said of it is kept with its path."""
     reading = Reading(source)
@@ -132,8 +110,8 @@ def _read_entry(
                 path = (document, *entry.place(edge.path))
                 edges.append((edge, path, _written_w_first(entry, edge)))
     except Misfit as misfit:
-        said.append((rule_of(str(misfit), "syntax"), str(misfit), (document, *entry.place(misfit.path))))
-    said += [(rule_of(note, "odd"), note, (document, *entry.place(path))) for path, note in reading.notes]
+        said.append(Note(misfit.rule or "syntax", str(misfit), (document, *entry.place(misfit.path))))
+    said += [note._replace(path=(document, *entry.place(note.path))) for note in reading.notes]
 
 
 def _written_w_first(entry: _Entry, edge: Any) -> bool:
@@ -141,7 +119,7 @@ def _written_w_first(entry: _Entry, edge: Any) -> bool:
     value = entry.value
     for step in edge.path:
         value = value[step]
-    return looks_w_first(edge.pose.components) and type(value) is dict and not WRITTEN_XYZW.isdisjoint(value)
+    return looks_w_first(edge.components) and type(value) is dict and not WRITTEN_XYZW.isdisjoint(value)
 
 
 def _entries(value: Any) -> Iterator[_Entry]:

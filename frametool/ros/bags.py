@@ -7,26 +7,35 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FileProblem, FormatError, FrametoolError
+from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
+from frametool.grammar.edges import Edge
 from frametool.ros.echo_blocks import unit_components
-from frametool.ros.samples import Sample
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.ros.samples import Tally
+    from frametool.documents.input_file import InputFile
+    from frametool.grammar.edges import Options, Tally
 
 TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
 
 
-def read_bag(path: str, tally: Tally) -> Iterator[Sample]:
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the transforms of a bag in the order they were recorded.
 
-    A sample's line is the number of its message among those with transforms.
-    Raises FileProblem when the extra is missing, FormatError for a bag that is broken or holds no transforms.
+    An edge's line is the number of its message among those with transforms.
+    Raises FileProblem when the extra is missing; FormatError for a bag that is broken or holds no transforms.
     """
+    try:
+        yield from _edges(file.path, options.tally)
+    except FormatError as error:
+        options.report(error)
+
+
+def _edges(path: str, tally: Tally) -> Iterator[Edge]:
+    """Open the bag; whatever the library raises for a broken one is one error."""
     try:
         from rosbags.highlevel import AnyReader
     except ImportError:
@@ -45,7 +54,7 @@ def read_bag(path: str, tally: Tally) -> Iterator[Sample]:
         raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None
 
 
-def _transforms(reader: Any, path: str, tally: Tally) -> Iterator[Sample]:
+def _transforms(reader: Any, path: str, tally: Tally) -> Iterator[Edge]:
     """Walk the messages of every topic with transforms."""
     topics = [connection for connection in reader.connections if connection.msgtype in TYPES]
     if not topics:
@@ -54,25 +63,26 @@ def _transforms(reader: Any, path: str, tally: Tally) -> Iterator[Sample]:
     for number, (topic, received_ns, data) in enumerate(reader.messages(connections=topics), 1):
         still = topic.topic.endswith("tf_static")
         for transform in reader.deserialize(data, topic.msgtype).transforms:
-            sample = _sample(transform, number, path, tally)
-            yield sample._replace(stamp_ns=None if still else sample.stamp_ns, received_ns=received_ns)
+            edge = _edge(transform, number, path, tally)
+            yield edge._replace(stamp_ns=None if still else edge.stamp_ns, received_ns=received_ns)
 
 
-def _sample(message: Any, number: int, path: str, tally: Tally) -> Sample:
-    """Return one TransformStamped as a sample."""
+def _edge(message: Any, number: int, path: str, tally: Tally) -> Edge:
+    """Return one TransformStamped."""
     moved, turned = message.transform.translation, message.transform.rotation
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
     parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(message.child_frame_id)
     components = unit_components(tally, number, *numbers)
     if components is None or not parent or not child:
-        raise FormatError(f"message {number}: {_complaint(parent, child, numbers)}", source=path)
+        problem = _complaint(parent, child, numbers)
+        raise FormatError(f"message {number}: {parent!r} -> {child!r}: {problem}", source=path, rule=problem.rule)
     stamp = message.header.stamp
-    return Sample(parent, child, components, stamp.sec * BILLION + stamp.nanosec, number)
+    return Edge(parent, child, components, stamp.sec * BILLION + stamp.nanosec, number)
 
 
-def _complaint(parent: str, child: str, numbers: tuple[float, ...]) -> str:
+def _complaint(parent: str, child: str, numbers: tuple[float, ...]) -> ValueInvalid:
     """Say what is wrong with a transform that was refused."""
     if not parent or not child:
-        return f"{parent!r} -> {child!r}: an empty frame name"
+        return ValueInvalid("an empty frame name")
     problem = quaternion.complaint(*numbers[3:])
-    return f"{parent} -> {child}: {problem or 'its position is not finite'}"
+    return problem or ValueInvalid("its position is not finite", rule="not-finite")

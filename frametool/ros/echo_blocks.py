@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, quaternion
-from frametool.ros.samples import Sample
+from frametool.grammar.edges import Edge
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from frametool.ros.samples import Components, Tally
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Tally
 
 INFINITE = float("inf")
 NUMBER = "([-+0-9.eE]+)"
@@ -100,13 +101,13 @@ class Blocks:
     __slots__ = ("at", "line", "tally", "text")
 
     def __init__(self, text: str, line: int, tally: Tally) -> None:
-        """Begin at the top of a text."""
+        """Start at the top of a text."""
         self.text = text
         self.at = 0
         self.line = line
         self.tally = tally
 
-    def samples(self) -> Iterator[Sample]:
+    def edges(self) -> Iterator[Edge]:
         """Yield the records of the documents from `at` on, up to one that is not plain."""
         text = self.text
         while head := HEAD(text, self.at):
@@ -114,10 +115,10 @@ class Blocks:
             found = []
             at, line = head.end(), self.line + 1
             while entry := spelling.match(text, at):
-                sample = _sample(entry.groups(), self.tally, line + spelling.first)
-                if sample is None:
+                edge = _edge(entry.groups(), self.tally, line + spelling.first)
+                if edge is None:
                     return
-                found.append(sample)
+                found.append(edge)
                 at = entry.end()
                 line += spelling.lines
             if not text.startswith(TAIL, at) and (at < len(text) or not found):
@@ -126,7 +127,7 @@ class Blocks:
             yield from found
 
 
-def _sample(texts: tuple[str, ...], tally: Tally, line: int) -> Sample | None:
+def _edge(texts: tuple[str, ...], tally: Tally, line: int) -> Edge | None:
     """Make the record of one transform's texts; None for one that needs a closer look."""
     parent, child = tally.names[texts[2]], tally.names[texts[3]]
     try:
@@ -135,12 +136,12 @@ def _sample(texts: tuple[str, ...], tally: Tally, line: int) -> Sample | None:
         return None
     if not parent or not child or components is None:
         return None
-    return Sample(parent, child, components, int(texts[0]) * BILLION + int(texts[1]), line)
+    return Edge(parent, child, components, int(texts[0]) * BILLION + int(texts[1]), line)
 
 
 def unit_components(
     tally: Tally, line: int, tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float
-) -> Components | None:
+) -> Rigid | None:
     """Check the numbers of one transform as every door does; None for those that are refused there."""
     squared = x * x + y * y + z * z + w * w
     if not abs(tx) + abs(ty) + abs(tz) < INFINITE:

@@ -42,15 +42,7 @@ def frame_of(
     here = (*path, key) if key in mapping else path
     if type(name) is not str or not name:
         raise Misfit(f"{key} must name a frame, found {kind(name or None)}", here)
-    if name.startswith("/") and len(name) > 1:
-        reading.note(slash_note(name), *here)
-        return name[1:]
-    return name
-
-
-def slash_note(name: str) -> str:
-    """Say that a name lost its leading `/`."""
-    return f"frame {name!r}: the leading / is no part of a name and was left out"
+    return reading.bare(name, *here)
 
 
 def header_stamp(header: dict[str, Any]) -> int | None:

@@ -1,6 +1,6 @@
 """Every message of a recording in text, one after the other, whatever form it is in: bounded memory, any length.
 
-Forms are those of `frametool.formats.detect`. A message is plain values, as the document reader gives them.
+Forms are those of `frametool.formats.FORMATS`. A message is plain values, as the document reader gives them.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.chunks import Piece, counted_from, documents, lines
-from frametool.documents.document import format_error, parse_documents
+from frametool.documents.document import parse_documents
 from frametool.documents.json_reader import strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import BinaryIO
 
-    from frametool.ros.samples import Tally
+    from frametool.grammar.edges import Tally
 
 _SEPARATOR = re.compile(r"^.*---[ \t]*$\n?", re.MULTILINE)
 _ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^\ufeff])", re.MULTILINE)  # no key that ROS prints begins so
@@ -40,9 +40,9 @@ class Message(NamedTuple):
     def error(self, misfit: Misfit) -> FormatError:
         """Make the error for what does not fit in this message, placed in the whole file."""
         if self.cells:
-            error = FormatError(str(misfit), source=self.source.name, line=1, snippet="")
+            error = FormatError(str(misfit), source=self.source.name, line=1, rule=misfit.rule)
         else:
-            error = format_error(self.source, (self.document, *misfit.path), str(misfit), key=misfit.key)
+            error = misfit.placed(self.source, self.document)
         error.line += self.line - 1
         return error
 

@@ -13,18 +13,22 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from frametool.errors import ValueInvalid
+from frametool.documents.chunks import lines
+from frametool.documents.source import Source
+from frametool.errors import FormatError, ValueInvalid
 from frametool.geometry.representations import notation
+from frametool.grammar.edges import Edge
 from frametool.grammar.pose import Pose
-from frametool.grammar.readers import INDICES, read_number
+from frametool.grammar.readers import INDICES, Reading, read_number
 from frametool.grammar.result import rotation_numbers
 from frametool.grammar.rotation import ROTATION_KEYS, rotation_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
+    from frametool.documents.input_file import InputFile
     from frametool.frames.tree import FrameTree
-    from frametool.grammar.readers import Reading
+    from frametool.grammar.edges import Options
     from frametool.grammar.result import Result, Style
 
 CALL = "static_transform_publisher"
@@ -43,15 +47,15 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
     Raises ValueInvalid.
     """
     poses: dict[str, Pose] = {}
-    lines, moving = [], []
+    calls, moving = [], []
     for pose in (result.pose for result in results):
-        lines.append(f"{_line(pose, style)}\n")
+        calls.append(f"{_line(pose, style)}\n")
         known = poses.setdefault(pose.name or "", pose)
         if (known.parent, known.components) != (pose.parent, pose.components):
             moving.append(known.name or "")
     if moving:
         raise ValueInvalid(moving_frames(dict.fromkeys(moving)))
-    return "".join(lines)
+    return "".join(calls)
 
 
 def moving_frames(names: Iterable[str]) -> str:
@@ -81,6 +85,23 @@ def _line(pose: Pose, style: Style) -> str:
     cells = [*position, *rotation, quote(pose.parent), quote(pose.name)]
     names = (*XYZ, *(RPY if angles else QUATERNION), *FRAMES)
     return " ".join(f"--{name} {cell}" for name, cell in zip(names, cells, strict=True))
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the pose that each line publishes."""
+    for piece in lines(file.stream, file.name):
+        for number, line in enumerate(piece.text.split("\n"), piece.line):
+            if not line.strip() or line.lstrip().startswith("#"):
+                continue
+            reading = Reading(Source(file.name, line))
+            try:
+                pose = read_call(line, reading)
+            except ValueInvalid as error:
+                options.report(FormatError(str(error), source=file.name, line=number, rule=error.rule))
+                continue
+            for note in reading.notes:
+                options.tally.note(note, number)
+            yield Edge(pose.parent, pose.name or "", pose.components, line=number)
 
 
 def read_call(line: str, reading: Reading) -> Pose:
@@ -153,5 +174,5 @@ def _pose(
     if not parent or not child:
         raise ValueInvalid(f"an empty frame name; {CALL} takes {_FORMS}")
     if parent == child:
-        raise ValueInvalid(f"frame {child!r} is its own parent")
+        raise ValueInvalid(f"frame {child!r} is its own parent", rule="self")
     return Pose((x, y, z), turned, child, parent)

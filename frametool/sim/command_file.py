@@ -14,7 +14,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, parse_documents
-from frametool.documents.source import Source, placed_error
+from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, ValueInvalid, alternatives
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_number, read_numbers, within
@@ -65,7 +65,7 @@ class Chunk:
             error = format_error(self.source, path, message, key=key)
         else:
             before = self.source.text.split(",")[: int(path[0]) if path else 0]
-            error = placed_error(self.source, 1, sum(map(len, before)) + len(before) + 1, message)
+            error = error_at(self.source, sum(map(len, before)) + len(before), message)
         error.line += self.line - 1
         return error
 

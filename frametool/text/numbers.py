@@ -34,6 +34,8 @@ LONGEST_SHOWN = 60
 class NotFinite(ValueInvalid):
     """Report nan, inf, or a number beyond the range of doubles."""
 
+    rule = "not-finite"
+
 
 def parse_number(text: str) -> float:
     """Read a finite decimal number, correctly rounded.
@@ -79,7 +81,7 @@ def _degrees_of_pi(text: str, sign: str, factor: str | None, divisor: str | None
         raise ValueInvalid(f"{shown(text)} divides by zero")
     degrees = parse_number(factor or "1") * 180.0 / below
     if degrees == _INFINITE:
-        raise ValueInvalid(f"{shown(text)} is not finite")
+        raise NotFinite(f"{shown(text)} is not finite")
     return -degrees if sign == "-" else degrees
 
 

@@ -107,7 +107,7 @@ def samples(path: str) -> int:
     """Read one record after the other and keep none."""
     from frametool.formats.recordings import Recording
 
-    return sum(1 for _ in Recording(path).samples())
+    return sum(1 for _ in Recording(path).edges())
 
 
 def safe(path: str) -> int:

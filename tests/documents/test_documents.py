@@ -8,32 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 import yaml
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as some
 
 from frametool.documents import json_reader, source, yaml_events
-from frametool.documents.document import (
-    decode,
-    explain_scalar,
-    format_error,
-    locate,
-    locate_many,
-    parse_documents,
-    read_text,
-)
+from frametool.documents.document import explain_scalar, format_error, locate, locate_many, parse_documents
+from frametool.documents.nodes import parse_nodes
+from frametool.documents.source import decode, read_text
 from frametool.errors import FileProblem, FormatError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-def values(text: str, **options: Any) -> list[Any]:
-    """Give the values of the documents of a text."""
-    return [document.value for document in parse_documents(text, "f", **options)]
+def values(text: str) -> list[Any]:
+    """Return the values of the documents of a text."""
+    return [document.value for document in parse_documents(text, "f")]
 
 
 def refusal(text: str) -> str:
-    """Give the message a text is refused with."""
+    """Return the message a text is refused with."""
     with pytest.raises(FormatError) as caught:
         parse_documents(text, "f")
     assert "\n" not in str(caught.value)
@@ -66,7 +60,6 @@ READ = {
     '{"n": ' + "9" * 5000 + "}": [{"n": "9" * 5000}],
 }
 
-OPENCV_ODD = "%YAML:1.0\n---\nM: !!opencv-matrix\n   data:[ 1., @ ]"
 REFUSED = {
     "a: 1\nb: {x: 1, x: 2}": "f:2:11: key 'x' stands twice; first at 2:5",
     '{"a": {"b": 1,\n "b": 2}}': "f:2:2: key 'b' stands twice; first at 1:8",
@@ -93,7 +86,6 @@ REFUSED = {
     '{"a":' * 200_000: "f:1:5001: nested deeper than 1000 levels",
     "- " * 5000: "f:1:2001: nested deeper than 1000 levels",
     "a: [1, 2": "f:1:9: did not find expected ',' or ']', while parsing a flow sequence begun at line 1",
-    OPENCV_ODD: "f:4:15: nothing can begin with '@' here; quote the name: \"@\"",
 }
 
 
@@ -113,25 +105,6 @@ def test_the_parser_without_libyaml_reads_the_same(text: str, monkeypatch: pytes
     assert values(text) == READ[text]
 
 
-def test_tags_that_are_allowed_are_read_over() -> None:
-    assert values("r: !Rpy {deg: [1, 2, 3]}", allowed_tags=["!Rpy"]) == [{"r": {"deg": ["1", "2", "3"]}}]
-
-
-OPENCV = (
-    "%YAML:1.0\n---\nT: !!opencv-matrix\n   rows: 1\n   cols: 2\n   dt: d\n   data:[ 1., 2. ]\nViewer.PointSize:2\n"
-)
-
-
-def test_what_opencv_writes_is_read() -> None:
-    matrix = {"rows": "1", "cols": "2", "dt": "d", "data": ["1.", "2."]}
-    assert values(OPENCV) == [{"T": matrix, "Viewer.PointSize": "2"}]
-
-
-def test_places_in_what_opencv_writes_are_those_of_the_file() -> None:
-    assert locate_many(OPENCV, [(0, "T", "data", 1), (0, "T", "rows")]) == [(7, 15), (4, 10)]
-    assert locate(OPENCV, (0, "T", "data")) == (7, 9)
-
-
 @pytest.mark.parametrize("text", ["[" + "[]," * 30 + "[]]", "[a," + "[]," * 30 + "[]]", "- []\n" * 30])
 def test_lists_and_maps_are_counted(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (json_reader, yaml_events):
@@ -148,7 +121,7 @@ def test_a_text_too_long_is_refused_before_it_is_read(tmp_path: Path, monkeypatc
 
 
 def laughs(depth: int) -> str:
-    """Give a text whose aliases would repeat 9**depth values."""
+    """Return a text whose aliases would repeat 9**depth values."""
     rows = [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, depth)]
     return "\n".join(["a0: &a0 [x, x, x, x, x, x, x, x, x]", *rows])
 
@@ -214,7 +187,7 @@ NESTED = some.recursive(
 
 
 def leaves(value: Any, path: tuple[Any, ...]) -> list[tuple[tuple[Any, ...], str]]:
-    """Give the paths and texts of the leaves."""
+    """Return the paths and texts of the leaves."""
     if isinstance(value, str):
         return [(path, value)]
     inner = value.items() if isinstance(value, dict) else enumerate(value)
@@ -231,6 +204,28 @@ def test_at_the_place_of_a_leaf_stands_the_leaf(value: dict[str, Any], indent: i
     rows = yaml_lines(text)
     for (line, column), (_, leaf) in zip(locate_many(text, [path for path, _ in found]), found, strict=True):
         assert rows[line - 1].startswith(json.dumps(leaf, ensure_ascii=ascii_only)[:1], column - 1)
+
+
+@settings(max_examples=60, deadline=None)
+@given(some.dictionaries(NAMES, NESTED, min_size=1))
+def test_json_and_yaml_have_the_same_nodes(value: dict[str, Any]) -> None:
+    text = json.dumps(value)
+    assume("\\ud8" not in text)  # YAML has no pairs of escapes
+    (ours,) = parse_nodes(text)
+    (as_yaml,) = parse_nodes(f"--- {text}")
+    assert [(leaf.start + 4, leaf.end + 4, leaf.value, leaf.quote) for leaf in ours.leaves()] == [
+        (leaf.start, leaf.end, leaf.value, leaf.quote) for leaf in as_yaml.leaves()
+    ]
+    assert [json.loads(text[leaf.start : leaf.end]) for leaf in ours.leaves()] == [leaf.value for leaf in ours.leaves()]
+
+
+@pytest.mark.parametrize("text", ["[" * 990 + "1" + "]" * 990, "- " * 990 + "1", '{"a":' * 990 + "1" + "}" * 990])
+def test_the_deepest_text_has_nodes_and_places(text: str) -> None:
+    (node,) = parse_nodes(text)
+    (leaf,) = node.leaves()
+    assert text[leaf.start : leaf.end] == "1"
+    step: int | str = "a" if text.startswith("{") else 0
+    assert locate(text, (0, *[step] * 990)) == (1, leaf.start + 1)
 
 
 def yaml_lines(text: str) -> list[str]:
@@ -338,7 +333,7 @@ def test_any_bytes_are_documents_or_one_placed_line(data: bytes) -> None:
 
 
 def list_of_frames(count: int) -> str:
-    """Give a tree in list form."""
+    """Return a tree in list form."""
     row = (
         "  - {{name: f{}, parent: f{}, xyz: [0.692039, 3.022651, -4.368932], rpy_deg: [-68.7746, 46.9732, -4.9959]}}\n"
     )

@@ -17,7 +17,7 @@ from frametool.ros.echo_format import message_text
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frametool.ros.samples import Sample
+    from frametool.grammar.edges import Edge
 
 EPOCH = 1_700_000_000_123_456_789
 EXPECTED = [
@@ -90,8 +90,8 @@ def recording(tmp_path: Path, text: str | bytes) -> Recording:
     return Recording(path)
 
 
-def read(tmp_path: Path, text: str | bytes) -> list[Sample]:
-    return list(recording(tmp_path, text).samples())
+def read(tmp_path: Path, text: str | bytes) -> list[Edge]:
+    return list(recording(tmp_path, text).edges())
 
 
 @pytest.mark.filterwarnings("ignore::frametool.errors.FrametoolWarning")
@@ -163,7 +163,7 @@ def test_what_is_wrong_is_placed_in_the_whole_file(text: str, tmp_path: Path) ->
 def test_a_report_takes_the_errors_and_reading_goes_on(tmp_path: Path) -> None:
     errors: list[FormatError] = []
     bad = GOOD.replace("w: 0.8", "w: 0.9")
-    samples = list(recording(tmp_path, GOOD + bad + GOOD).samples(errors.append))
+    samples = list(recording(tmp_path, GOOD + bad + GOOD).edges(errors.append))
     assert (len(samples), [error.line for error in errors]) == (2, [GOOD.count("\n") + 14])
 
 
@@ -227,7 +227,7 @@ def write_bag(path: Path, kind: str) -> None:
 def test_a_bag_gives_its_samples_with_the_time_they_were_received(kind: str, file: str, tmp_path: Path) -> None:
     path = tmp_path / ("run.bag" if kind == "ros1" else "run")
     write_bag(path, kind)
-    samples = list(Recording(next(path.glob(file)) if file else path).samples())
+    samples = list(Recording(next(path.glob(file)) if file else path).edges())
     assert [each[:4] for each in samples if each.stamp_ns is not None] == EXPECTED
     assert [each[:3] for each in samples if each.stamp_ns is None] == [EXPECTED[0][:3]]
     assert {each.received_ns for each in samples} == {EPOCH + 7, EPOCH + 8}
@@ -238,4 +238,4 @@ def test_without_the_extra_a_bag_says_what_to_install(tmp_path: Path, monkeypatc
     path.write_bytes(b"#ROSBAG V2.0\n")
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     with pytest.raises(FileProblem, match=r"frametool\[bag\]"):
-        list(Recording(path).samples())
+        list(Recording(path).edges())

@@ -11,7 +11,6 @@ from frametool.cli.output import Output
 from frametool.cli.recordings import opened
 from frametool.cli.trees import verbose_option
 from frametool.errors import FormatError
-from frametool.formats.recordings import samples_of
 from frametool.frames.edge_log import EdgeLog, chain
 from frametool.lint.monitor_report import chain_entry, edge_entry
 
@@ -56,9 +55,10 @@ def _logs(recordings: Sequence[Recording]) -> dict[str, EdgeLog]:
     """Log every edge of the recordings, in the order of first mention."""
     logs: dict[str, EdgeLog] = {}
     for recording in recordings:
-        for sample in samples_of(recording):
-            log = logs.get(sample.child) or logs.setdefault(sample.child, EdgeLog(sample.child))
-            log.add(sample.parent, sample.components, sample.stamp_ns, sample.line, sample.received_ns)
+        for edge in recording.edges():
+            if edge.parent is not None:
+                log = logs.get(edge.child) or logs.setdefault(edge.child, EdgeLog(edge.child))
+                log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)
     if not logs:
         raise FormatError("no transforms in it", source=", ".join(recording.name for recording in recordings))
     return logs

@@ -76,6 +76,6 @@ def _pose(arguments: Sequence[str], flags: dict[str, str], reading: Reading) -> 
         raise
     except ValueInvalid as error:
         raise click.UsageError(str(error)) from None
-    for _, message in reading.notes:
-        warn(message)
+    for note in reading.notes:
+        warn(note.message)
     return pose

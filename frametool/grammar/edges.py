@@ -1,0 +1,123 @@
+"""What a file of frames comes down to: edges, and what is worth telling of how they were written."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from frametool.grammar.readers import slash_note
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from frametool.errors import FormatError
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.readers import Note, Path
+
+    Report = Callable[[FormatError], None]
+
+
+class Edge(NamedTuple):
+    """The pose of `child` in `parent`: parent_from_child, for good or at one time.
+
+    parent: None for a root
+    components: tx, ty, tz (metres), x, y, z, w (unit)
+    stamp_ns: None where it stands still
+    line: on which it was written, 0 if that says nothing
+    received_ns: when the recorder got it, if that is known
+    path: in a document, the way to it from the top of the text
+    """
+
+    parent: str | None
+    child: str
+    components: Rigid
+    stamp_ns: int | None = None
+    line: int = 0
+    received_ns: int | None = None
+    path: Path = ()
+
+
+def stop(error: FormatError) -> None:
+    """Raise an error: what a reader does with one unless it is told otherwise."""
+    raise error
+
+
+class Names(dict[str, str]):
+    """Frame names by the text they stand in: quotes off, one leading `/` off; each is worked out once."""
+
+    def __init__(self) -> None:
+        """Create an empty table; `slashed` collects the names that began with `/`."""
+        super().__init__()
+        self.slashed: list[str] = []
+
+    def __missing__(self, text: str) -> str:
+        """Work a name out; "" for a text that YAML takes for nothing, which is no name."""
+        name = text[1:-1].replace("''", "'") if text[0] in "\"'" else text
+        self[text] = "" if text in {"null", "Null", "NULL"} else self.bare(name)
+        return self[text]
+
+    def bare(self, name: str) -> str:
+        """Take one leading `/` off, as tf2 does, and remember it."""
+        if not name.startswith("/") or len(name) == 1:
+            return name
+        if name not in self.slashed:
+            self.slashed.append(name)
+        return name[1:]
+
+
+class Told(NamedTuple):
+    """One sentence about a recording: the first line it is about, in words, and the rule of `check` that finds it."""
+
+    line: int
+    message: str
+    rule: str
+
+
+class Tally:
+    """What is worth telling about a recording once it is read: counted here, told at the end."""
+
+    __slots__ = ("names", "noise", "notes", "others", "rough")
+
+    def __init__(self) -> None:
+        """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic."""
+        self.names = Names()
+        self.noise: list[tuple[int, str]] = []
+        self.rough: list[int] = []
+        self.others: dict[str, int] = {}
+        self.notes: dict[str, Told] = {}
+
+    def note(self, note: Note, line: int) -> None:
+        """Keep what was noted while reading; of rotations that had to be normalised only the lines."""
+        if note.rule == "rounded":
+            self.rough.append(line)
+        else:
+            self.notes.setdefault(note.message, Told(line, note.message, note.rule))
+
+    def told(self) -> Iterator[Told]:
+        """Yield one sentence for each kind of oddity."""
+        if self.rough:
+            count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
+            yield Told(self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised", "rounded")
+        if self.noise:
+            line, text = self.noise[0]
+            count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
+            yield Told(line, f"{count} printed between messages skipped: {text!r}", "noise")
+        if self.others:
+            kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
+            yield Told(1, f"messages without transforms were left out: {kinds}", "odd")
+        for name in self.names.slashed:
+            self.notes.setdefault(slash_note(name), Told(1, slash_note(name), "slash"))
+        yield from self.notes.values()
+
+
+class Options(NamedTuple):
+    """How a file of frames is read.
+
+    tally: takes what is worth telling at the end
+    report: takes the errors, and reading goes on behind them
+    raw: messages are taken as tf2 receives them, unchecked
+    """
+
+    tally: Tally
+    report: Report = stop
+    raw: bool = False

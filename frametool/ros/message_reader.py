@@ -1,0 +1,113 @@
+"""Transforms out of ROS messages in text: what the echo tools print, their CSV, rosbridge and Foxglove JSON lines."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.chunks import Piece, documents
+from frametool.errors import FormatError
+from frametool.grammar.edges import Edge
+from frametool.grammar.readers import Misfit, Reading, as_mapping
+from frametool.ros import messages
+from frametool.ros.echo_blocks import Blocks
+from frametool.ros.message_stream import Message, document_messages, end_of_document, read_messages
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.input_file import InputFile
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Options, Tally
+    from frametool.grammar.readers import Path
+
+_HEADER = re.compile(r"\bheader\b")
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the transforms of every message, in the order they were recorded."""
+    if file.form == "echo":
+        for piece in documents(file.stream, file.name):
+            yield from _echo(piece, file.name, options)
+    else:
+        for message in read_messages(file.stream, file.name, file.form, options.tally):
+            yield from _message_edges(message, options)
+
+
+def _echo(piece: Piece, name: str, options: Options) -> Iterator[Edge]:
+    """Read plain documents fast and the others in full."""
+    blocks = Blocks(piece.text, piece.line, options.tally)
+    while True:
+        if not options.raw:
+            yield from blocks.edges()
+        if blocks.at >= len(piece.text):
+            return
+        text = piece.text[blocks.at : end_of_document(piece.text, blocks.at)]
+        for message in document_messages(Piece(text, blocks.line), name, options.tally):
+            yield from _message_edges(message, options)
+        blocks.at += len(text)
+        blocks.line += text.count("\n")
+
+
+def _message_edges(message: Message | FormatError, options: Options) -> Iterator[Edge]:
+    """Yield the edges of one message; what is wrong with one of them does not touch the others."""
+    if isinstance(message, FormatError):
+        options.report(message)
+        return
+    try:
+        found = list(_transforms(message.value, (), options.tally))
+    except Misfit as misfit:
+        options.report(message.error(misfit))
+        return
+    numbers = _header_lines(message, len(found))
+    still = messages.topic_of(message.value).endswith("tf_static")
+    for (transform, path), line in zip(found, numbers, strict=True):
+        reading = Reading(message.source)
+        try:
+            parent, child, components, stamp_ns = _read(transform, reading, options, line)
+        except Misfit as misfit:
+            options.report(message.error(misfit.below(*path)))
+            continue
+        yield Edge(parent, child, components, None if still else stamp_ns, line, message.received_ns)
+
+
+def _read(
+    transform: dict[str, Any], reading: Reading, options: Options, line: int
+) -> tuple[str, str, Rigid, int | None]:
+    """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
+    if options.raw and "header" in transform:
+        from frametool.ros.tf2_input import read_transform
+
+        return read_transform(transform)
+    parent, child, position, rotation, stamp_ns = messages.read_transform(transform, reading)
+    for note in reading.notes:
+        options.tally.note(note, line)
+    return parent, child, (*position, *rotation), stamp_ns
+
+
+def _transforms(value: Any, path: Path, tally: Tally) -> Iterator[tuple[dict[str, Any], Path]]:
+    """Yield every transform of a message, or of a list of messages; count messages that hold none."""
+    if type(value) is list:
+        for index, item in enumerate(value):
+            yield from _transforms(item, (*path, index), tally)
+        return
+    mapping = as_mapping(value, "a message with transforms")
+    inner = mapping["msg"] if messages.is_envelope(mapping) else mapping
+    if messages.is_message(inner):
+        yield from messages.messages(mapping, path)
+    elif "op" in mapping:
+        topic = str(mapping.get("topic") or f"op {mapping['op']}")
+        tally.others[topic] = tally.others.get(topic, 0) + 1
+    else:
+        keys = ", ".join(map(repr, list(mapping)[:8]))
+        raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
+
+
+def _header_lines(message: Message, count: int) -> list[int]:
+    """Return the lines on which the transforms of a message begin."""
+    if message.source.text.count("\n") > 1:
+        text = message.source.text
+        offsets = [match.start() for match in _HEADER.finditer(text)]
+        if len(offsets) == count:
+            return [message.line + text.count("\n", 0, offset) for offset in offsets]
+    return [message.line] * count

@@ -1,0 +1,175 @@
+"""The table of forms: one row and one file are a form, wherever forms are read, written, recognised and listed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from frametool.errors import FormatError
+from frametool.formats import FORMATS, Format, by_suffix, readers, writers
+from frametool.formats.detect import by_sign, detect, of_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+TOY = '''
+"""Toy: a line a frame, `child < parent x y z`, behind a line that says so."""
+from frametool.grammar.edges import Edge
+
+def read(file, options):
+    for number, line in enumerate(file.text.split("\\n")[1:], 2):
+        if line:
+            child, _, parent, *xyz = line.split()
+            yield Edge(parent, child, (*map(float, xyz), 0.0, 0.0, 0.0, 1.0), line=number)
+
+def write_tree(tree, style):
+    rows = ((child, parent, *map(style.number, edge.components[:3])) for parent, child, edge in tree.edges())
+    return "toy 1\\n" + "".join("{} < {} {} {} {}\\n".format(*row) for row in rows)
+'''
+ROW = {
+    "summary": "a toy",
+    "suffixes": (".toy",),
+    "reads": ("tree",),
+    "reader": "toy",
+    "writes": ("tree",),
+    "writer": "toy",
+    "signs": (("line", r"toy \d"),),
+}
+TEXT = "toy 1\nodom < map 1.0 2.0 3.0\nbase < odom 0.5 0.0 0.0\n"
+
+
+def with_toy(folder: Path, *arguments: str, stdin: str = "") -> tuple[int, str, str]:
+    """Run the command line in a new interpreter in which the toy has its row."""
+    (folder / "toy.py").write_text(TOY)
+    code = (
+        f"import sys; sys.path[:0] = [{str(folder)!r}, {str(ROOT)!r}]; import frametool.formats as formats; "
+        f"formats.FORMATS['toy'] = formats.Format(**{ROW!r}); from frametool.cli import run; "
+        f"sys.exit(run({list(arguments)!r}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], input=stdin, capture_output=True, text=True, check=False, cwd=folder
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_a_made_up_form_is_read_wherever_a_tree_is(tmp_path: Path) -> None:
+    (tmp_path / "map.toy").write_text(TEXT)
+    status, out, err = with_toy(tmp_path, "lookup", "map.toy", "map", "base", "-f", "json")
+    assert (status, json.loads(out)["xyz"]) == (0, [1.5, 2.0, 3.0]), err
+    assert with_toy(tmp_path, "tree", "-", "-f", "toy", stdin=TEXT)[:2] == (0, TEXT)
+    assert with_toy(tmp_path, "check", "map.toy")[0] == 0
+    assert json.loads(with_toy(tmp_path, "monitor", "map.toy", "-f", "json")[1].splitlines()[0])["child"] == "odom"
+
+
+def test_a_made_up_form_is_written_by_name_and_by_suffix_and_read_back(tmp_path: Path) -> None:
+    assert with_toy(tmp_path, "tree", "-", "-o", "out.toy", stdin=TEXT) == (0, "", "")
+    assert (tmp_path / "out.toy").read_text() == TEXT
+    assert "toy" in with_toy(tmp_path, "tree", "--help")[1]
+    assert with_toy(tmp_path, "tree", "-v", "out.toy", "-f", "toy")[2] == "frametool: out.toy: a toy\n"
+
+
+def test_what_is_wrong_in_a_made_up_form_names_its_line(tmp_path: Path) -> None:
+    (tmp_path / "map.toy").write_text(TEXT + "base < map 0 0 0\n")
+    status, _, err = with_toy(tmp_path, "tree", "map.toy")
+    assert (status, "map.toy:4: frame 'base' has two parents: 'odom' (line 3) and 'map' (line 4)" in err) == (1, True)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
+    from importlib import import_module
+
+    row = FORMATS[name]
+    functions = {"poses": "write_poses", "points": "write_points", "tree": "write_tree", "report": "write_points"}
+    assert all(hasattr(import_module(row.writer), functions[what]) for what in row.writes)
+    assert "tree" not in row.reads or hasattr(import_module(row.reader), "read")
+    assert row.summary
+
+
+BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
+    "a tree in YAML": (b"# robot\nframes:\n  a:\n", "tree", "yaml"),
+    "a tree in JSON": (b'{"angles": "deg",\n "frames": []}', "tree", "json"),
+    "a tree in JSON on one line, with what messages have": (b'{"frames": [{"child_frame_id": 1}]}\n', "tree", "json"),
+    "echo behind noise": (b"WARNING: topic [/tf] x\n\n---\ntransforms:\n- header:\n", "tree", "echo"),
+    "echo in UTF-16": ("transforms:\n- header:\n".encode("utf-16"), "tree", "echo"),
+    "echo in flow style": (b"transforms: [{header: ..", "tree", "echo"),
+    "lines of messages": (b'{"op": "publish", "msg": {}}\n', "tree", "jsonl"),
+    "rostopic echo -p": (b"%time,field.header.seq\n", "tree", "csv1"),
+    "ros2 topic echo --csv": (b"12,5,map,base,0.0,0.0\n", "tree", "csv2"),
+    "calls with flags": (b"# c\nros2 run tf2_ros static_transform_publisher --x 1\n", "tree", "calls"),
+    "calls without a name": (b"0 0 5 0 0 0 world odom 100\n", "tree", "calls"),
+    "a bag": (b"#ROSBAG V2.0\n", "tree", "bag1"),
+    "sqlite": (b"SQLite format 3\0..", "tree", "bag2"),
+    "mcap": (b"\x89MCAP0\r\n", "tree", "mcap"),
+    "rows": (b"x,y,z\n1,2,3\n", "rows records", "csv"),
+    "rows whose first column ends in a colon": (b"a:,y\n1,2\n", "rows records", "csv"),
+    "rows under a comment": (b"# t,x,y\n1,2,3\n", "rows records", "csv"),
+    "rows between tabs": (b"x\ty,m\n", "rows records", "tsv"),
+    "rows between blanks": (b"# a trajectory, in metres\n1.0 2 3\n", "rows records", "columns"),
+    "records": (b'\n {"x": 1}\n', "rows records", "json"),
+    "an array": (b"[\n {", "rows records", "json"),
+    "an array of numbers": (b"[-1, 2]", "rows records", "json"),
+    "documents": (b"# c\n- {x: 1}\n", "rows records", "yaml"),
+    "a document in braces": (b"{x: 1, y: 2}\n", "rows records", "yaml"),
+    "documents behind dashes": (b"---\nx: 1\n", "rows records", "yaml"),
+}
+
+
+@pytest.mark.parametrize("name", BEGINNINGS)
+def test_a_form_is_known_by_how_it_begins(name: str) -> None:
+    head, reads, form = BEGINNINGS[name]
+    assert detect(head, *reads.split())[0] == form
+
+
+def test_a_folder_is_known_by_what_it_holds(tmp_path: Path) -> None:
+    assert of_folder(str(tmp_path)) is None
+    (tmp_path / "metadata.yaml").write_text("")
+    assert of_folder(str(tmp_path)) == "bag2"
+    assert of_folder(str(tmp_path / "metadata.yaml")) is None
+
+
+def test_the_suffix_counts_more_than_the_look_and_less_than_a_sign() -> None:
+    assert detect(b"1 2 3\n", "rows", "records", name="a.csv") == ("csv", "the suffix .csv")
+    assert detect(b"1 2 3\n", "rows", "records", name="a.txt") == ("columns", "its first line")
+    assert detect(b"\x89MCAP0\r\n", "tree", name="a.yaml") == ("mcap", "its first bytes")
+
+
+def test_two_forms_that_fit_are_both_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("yaml key", "frames"),)))
+    with pytest.raises(FormatError, match=r"^a\.yaml: fits yaml and toy; give --in yaml\|toy$"):
+        by_sign(b"frames:\n", "tree", name="a.yaml")
+
+
+def test_the_root_element_of_xml_is_a_sign(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "robot"),)))
+    for head in (b"<robot name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<robot>", b"\xef\xbb\xbf<robot/>"):
+        assert by_sign(head, "tree") == "toy"
+    assert by_sign(b"<robots>", "tree") is None
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_suffix_belongs_to_one_form_of_each_kind(name: str) -> None:
+    kinds: list[tuple[Any, ...]] = [readers(what) for what in ("tree", "rows", "records")]
+    kinds += [writers(what) for what in ("poses", "points", "tree", "report")]
+    for names in kinds:
+        for suffix in FORMATS[name].suffixes if name in names else ():
+            assert by_suffix(f"dir.d/a{suffix}", names) == name
+
+
+def test_a_name_without_a_suffix_tells_nothing() -> None:
+    for path in (None, "", "a", "dir.csv/a", ".csv"):
+        assert by_suffix(path, tuple(FORMATS)) is None
+
+
+@pytest.mark.parametrize("output", [("-f", "csv"), ("-o", "x.csv"), ("-f", "json"), ()])
+@pytest.mark.parametrize(("text", "form"), [("1 2 3\n4 5 6\n", "columns"), ("x,y,z\n1,2,3\n", "csv"), ("x\ty\tz\n1\t2\t3\n", "tsv")])
+def test_the_form_of_the_result_does_not_steer_how_the_input_is_read(
+    run: Callable[..., Any], output: tuple[str, ...], text: str, form: str
+) -> None:
+    tree = "{name: a, parent: map, xyz: [1, 0, 0]}"
+    assert f"read as {form} " in run("apply", tree, "map", "a", "-v", *output, stdin=text).err
