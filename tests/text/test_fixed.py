@@ -59,3 +59,10 @@ def test_many_floats_are_written_as_percent_writes_them(precision: int) -> None:
     rng = np.random.default_rng(precision)
     values = [*random_bits(50_000), *(rng.uniform(-1, 1, 50_000) * 10.0 ** rng.integers(-8, 16, 50_000)).tolist()]
     assert lines(values, precision) == by_percent(values, precision)
+
+
+@pytest.mark.parametrize("precision", range(19))
+def test_zero_keeps_its_sign_as_it_does_in_python(precision: int) -> None:
+    values = [-0.0, 0.0, -5e-324, -0.4, -0.5, -0.05, -1e-7, 1e300, -1e22]
+    for some in (values, values[:1], values[:2] * 20):
+        assert lines(some, precision) == by_percent(some, precision)
