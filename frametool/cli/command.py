@@ -11,7 +11,7 @@ from frametool.cli.help import WithHelp
 from frametool.errors import ValueInvalid
 from frametool.formats import writers
 from frametool.geometry.euler import AXES
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notation
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
-SPELLINGS = [f"{name}:AXES" if name == "euler" else name for name in REPRESENTATIONS]
+SPELLINGS = [row.spelling for row in REPRESENTATIONS.values()]
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file, 130 interrupted."
 
 
@@ -103,8 +103,9 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
 
         done, comma, begun = incomplete.rpartition(",")
         names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
-        if begun.startswith("euler"):
-            names += [f"{begun.partition(':')[0]}:{axes}" for axes in AXES]
+        spec = begun.partition(":")[0]
+        if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
+            names += [f"{spec}:{axes}" for axes in AXES]
         return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
 
 

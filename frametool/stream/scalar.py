@@ -9,7 +9,7 @@ from frametool.errors import FrametoolError, ValueInvalid, overheard
 from frametool.geometry import floats, rigid
 from frametool.stream.row_layout import IDENTITY, POSE, TURN, pose_of
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
-from frametool.stream.text_parts import Const, In, Out
+from frametool.stream.text_parts import Const, IfLocked, In, Out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -131,6 +131,6 @@ def _text(template: Template, numbers: Sequence[str], *, locked: bool) -> str:
             text += segments[piece.part]
         elif isinstance(piece, Out):
             text += numbers[piece.first]
-        elif isinstance(piece, Const) or locked:
+        elif isinstance(piece, Const) or (locked and isinstance(piece, IfLocked)):
             text += piece.text.decode()
     return text
