@@ -6,7 +6,7 @@ kernels this calls, nowhere else. Knows no syntax of any file.
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 
 from frametool.errors import ValueInvalid, alternatives, did_you_mean
 from frametool.geometry import axis_angle, euler, matrix, mrp, quaternion, rotvec, six_d
@@ -16,12 +16,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.geometry.types import Components, Namespace, Quaternion
+    from frametool.geometry.types import Components, Kernel, Namespace, Quaternion
 
     Check = Callable[..., Components]
 
 LIST, MAP, NAMED, ROWS = "list", "map", "named", "rows"  # how documents hold the numbers of a rotation
 NAMED_AXES = "AXES"
+
 
 class Whole:
     """How a notation writes a whole pose, position and rotation in one: the 4x4 matrix.
@@ -44,6 +45,25 @@ class Whole:
         self.tail = tail
 
 
+class BatchRule:
+    """How many rows of a notation are checked at once, where not every finite row is a rotation as it stands.
+
+    what: what the rows are, in the plural
+    deviation: kernel (components, xp) of how far each row is from a rotation; inf where nothing can be made of it
+    repair: kernel (components, xp) that makes rotations of rows
+    exact: the deviation up to which a row keeps its bits
+    """
+
+    __slots__ = ("deviation", "exact", "repair", "what")
+
+    def __init__(self, what: str, deviation: Callable[..., Any], repair: Kernel, exact: float) -> None:
+        """Bind the kernels."""
+        self.what = what
+        self.deviation = deviation
+        self.repair = repair
+        self.exact = exact
+
+
 class Representation:
     """One notation and everything that is known about it: no other list or table names it.
 
@@ -55,12 +75,13 @@ class Representation:
     axes: Euler axes: "" none, NAMED_AXES where the user names them, else the fixed ones
     whole: how it carries the position too, if it can; searched: whether headers are searched for its columns
     alone: columns that say the last number where the others are missing and 0
+    batch: how many rows are checked at once; without it those are refused whose quaternion is not finite
     overview: the units in which an overview shows it ("" for no unit)
     """
 
     __slots__ = (
-        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "columns", "label", "name", "names",
-        "overview", "searched", "shape", "summary", "whole",
+        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "label", "name",
+        "names", "overview", "searched", "shape", "summary", "whole",
     )  # fmt: skip
 
     def __init__(
@@ -68,7 +89,7 @@ class Representation:
         forward: Callable[..., Any], backward: Callable[..., Any], check: Check | None = None,
         kept: Callable[..., Components] | None = None, shape: str | dict[str, int] = LIST, names: str = "",
         label: str = "", axes: str = "", whole: Whole | None = None, searched: bool = True, alone: str = "",
-        overview: tuple[str, ...] = (),
+        overview: tuple[str, ...] = (), batch: BatchRule | None = None,
     ) -> None:  # fmt: skip
         """Describe a notation.
 
@@ -92,6 +113,7 @@ class Representation:
         self._backward = backward
         self._check = check
         self._kept = kept
+        self.batch = batch
 
     def __repr__(self) -> str:
         """Show the name."""
@@ -169,12 +191,21 @@ def _wxyz(x: Any, y: Any, z: Any, w: Any) -> Components:
     return w, x, y, z
 
 
+def _in_wxyz(kernel: Kernel) -> Kernel:
+    """Let a kernel of x, y, z, w take and return w, x, y, z."""
+    return lambda w, x, y, z, *xp, **options: _wxyz(*kernel(x, y, z, w, *xp, **options))
+
+
 def _as_wxyz(x: Any, y: Any, z: Any, w: Any, xp: Namespace) -> Components:
     return _wxyz(*quaternion.from_quaternion(x, y, z, w, xp))
 
 
-def _check_wxyz(w: float, x: float, y: float, z: float, *, normalize: bool = False) -> Components:
-    return _wxyz(*quaternion.check(x, y, z, w, normalize=normalize))
+def _wxyz_deviation(w: Any, x: Any, y: Any, z: Any, xp: Namespace) -> Any:
+    return quaternion.deviation(x, y, z, w, xp)
+
+
+def _check_mrp(*parameters: float, normalize: bool = False) -> Components:
+    return rotvec.check(*parameters, normalize=normalize, what="mrp")
 
 
 def _homogeneous(position: Components, rows: Components) -> Components:
@@ -190,19 +221,23 @@ LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 HOMOGENEOUS = Whole(
     "m11 m12 m13 m14 m21 m22 m23 m24 m31 m32 m33 m34 m41 m42 m43 m44", _homogeneous, _of_homogeneous, LAST_ROW
 )
+QUATERNIONS = BatchRule("quaternions", quaternion.deviation, quaternion.repaired, quaternion.UNIT)
 
 REPRESENTATIONS: dict[str, Representation] = {
     "quaternion": Representation(
         "qx qy qz qw", (), "unit quaternion, named x y z w", names="x y z w", shape=NAMED, overview=("",),
         forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), check=quaternion.check, kept=_xyzw,
+        batch=QUATERNIONS,
     ),
     "xyzw": Representation(
         "qx qy qz qw", (), "unit quaternion, scalar last", names="x y z w", label="quaternion",
         forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), check=quaternion.check, kept=_xyzw,
+        batch=QUATERNIONS,
     ),
     "wxyz": Representation(
         "qw qx qy qz", (), "unit quaternion, scalar first", names="w x y z", label="quaternion",
-        forward=_arithmetic(_from_wxyz), backward=_plain(_as_wxyz), check=_check_wxyz, kept=_wxyz,
+        forward=_arithmetic(_from_wxyz), backward=_plain(_as_wxyz), check=_in_wxyz(quaternion.check), kept=_wxyz,
+        batch=BatchRule("quaternions", _wxyz_deviation, _in_wxyz(quaternion.repaired), quaternion.UNIT),
     ),
     "rpy": Representation(
         "roll pitch yaw", (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
@@ -227,16 +262,18 @@ REPRESENTATIONS: dict[str, Representation] = {
     "matrix": Representation(
         "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "rotation matrix, row by row",
         shape=ROWS, whole=HOMOGENEOUS, overview=("",),
-        forward=_plain(matrix.to_quaternion), backward=_arithmetic(matrix.from_quaternion), check=matrix.check,
+        forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
+        batch=BatchRule("matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL),
     ),
     "mrp": Representation(
         "mrp_x mrp_y mrp_z", (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
-        forward=_arithmetic(mrp.to_quaternion), backward=_plain(mrp.from_quaternion), check=mrp.check,
+        forward=_arithmetic(mrp.to_quaternion), backward=_plain(mrp.from_quaternion), check=_check_mrp,
     ),
     "six_d": Representation(
         "r11 r21 r31 r12 r22 r32", (), "first two columns of the matrix (Zhou's continuous 6D)", label="6d",
         searched=False,
         forward=_plain(six_d.to_quaternion), backward=_arithmetic(six_d.from_quaternion), check=six_d.check,
+        batch=BatchRule("pairs of columns", six_d.deviation, six_d.repaired, inf),
     ),
 }  # fmt: skip
 for _name, _row in REPRESENTATIONS.items():

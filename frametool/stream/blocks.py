@@ -9,9 +9,9 @@ import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, rigid
+from frametool.geometry.batch_validation import read_rotations
 from frametool.stream.faults import NULL, STOP, Fault
 from frametool.stream.row_layout import FLAT, IDENTITY, POSE, TURN, pose_of
-from frametool.stream.row_rotations import read_rotations
 from frametool.stream.row_transforms import NOWHERE, by_frame, by_time
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
 from frametool.stream.text_parts import Const, In, Instead, Out

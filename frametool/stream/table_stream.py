@@ -13,7 +13,7 @@ from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.table import UNCLOSED, open_table, table_block
 from frametool.stream.table_names import Naming
 from frametool.stream.table_plan import TUM, plan_table
-from frametool.text.cells import is_torn, torn_record, whole_records
+from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import BLOCK_BYTES, read_blocks
 
 if TYPE_CHECKING:
@@ -60,12 +60,7 @@ def _blocks(stream: Source, delimiter: bytes, size: int) -> Iterator[bytes]:
     size = size or BLOCK_BYTES
     if not delimiter:
         return read_blocks(stream, size=size)
-
-    def whole(text: bytes) -> int:
-        end = whole_records(text, delimiter)
-        return -1 if is_torn(text[end:], delimiter) else end
-
-    return read_blocks(stream, size=size, whole=whole)
+    return read_blocks(stream, size=size, whole=RecordEnds(delimiter))
 
 
 def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
