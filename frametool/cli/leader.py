@@ -10,7 +10,7 @@ import click
 
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, alternatives
-from frametool.sim.command_file import read_script, read_twists
+from frametool.sim.command_file import read_commands, read_script
 from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
 
 if TYPE_CHECKING:
@@ -39,9 +39,9 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
     if sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe commands in, or see frametool sim teleop")
     if not paced:
-        return scripted(read_twists(stdin_lines(), "stdin"))
+        return scripted(read_commands(stdin_lines(), "stdin"))
     mailbox = Mailbox()
-    mailbox.fill_from(read_twists(stdin_lines(), "stdin", period_ns=0))
+    mailbox.fill_from(read_commands(stdin_lines(), "stdin", period_ns=0))
     return lambda: mailbox
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.grammar.result import columns_of, is_matrix, rotation_numbers
+from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -65,14 +66,16 @@ def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:
     if not rows:
         return ""
     columns = list(rows[0])
-    lines = [",".join(columns)]
-    lines += [",".join(_cell(row.get(column, ""), style) for column in columns) for row in rows]
-    return "\n".join(lines) + "\n"
+    return row(columns, style) + "".join(row([each.get(column, "") for column in columns], style) for each in rows)
+
+
+def row(cells: Iterable[Any], style: Style) -> str:
+    """Return one line of cells with its line end."""
+    return ",".join(_cell(value, style) for value in cells) + "\n"
 
 
 def _cell(value: Any, style: Style) -> str:
     """Write one cell, quoted where a reader would split it."""
     if isinstance(value, float):
         return style.number(value)
-    text = "" if value is None else str(value)
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
+    return quoted("" if value is None else str(value))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from struct import Struct
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 
@@ -50,14 +50,14 @@ class Twist(_Components):
         return super().__new__(cls, linear_x, angular_z, linear_y)
 
 
-class State(NamedTuple):
+class TurtleState(NamedTuple):
     """Where a turtle is, in double precision: metres, radians."""
 
     x: float
     y: float
     theta: float
 
-    def distance(self, other: State) -> float:
+    def distance(self, other: TurtleState) -> float:
         """Return the metres to another turtle."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
@@ -90,9 +90,18 @@ def single(value: float) -> float:
         return math.copysign(math.inf, value)
 
 
-def wrapped(theta: float) -> float:
+def wrapped(theta: Any, xp: Any = math) -> Any:
     """Bring an angle into [-PI, PI) by turtlesim's formula."""
-    return theta - 2.0 * PI * math.floor((theta + PI) / (2.0 * PI))
+    return theta - 2.0 * PI * xp.floor((theta + PI) / (2.0 * PI))
+
+
+def turned(theta: Any, turning: Any, xp: Any) -> tuple[Any, Any, Any]:
+    """Return the heading after one tick at a turn rate (rad/s), its cosine and its sine.
+
+    Floats with `math` as xp, or arrays with numpy.
+    """
+    theta = wrapped(theta + turning * DT, xp)
+    return theta, xp.cos(theta), xp.sin(theta)
 
 
 class Turtle:
@@ -123,9 +132,9 @@ class Turtle:
         self._heading: float | None = None
 
     @property
-    def state(self) -> State:
+    def state(self) -> TurtleState:
         """Return where the turtle is, in double precision, y up."""
-        return State(self._x, SIZE - self._down, self._theta)
+        return TurtleState(self._x, SIZE - self._down, self._theta)
 
     @property
     def pose(self) -> TurtlePose:
@@ -138,12 +147,16 @@ class Turtle:
         self._inbox = twist
 
     def teleport_absolute(self, x: float, y: float, theta: float) -> None:
-        """Be somewhere else from the next tick on; float32, as the service takes it."""
+        """Jump to a place at the next tick; float32, as the service takes it."""
         self._teleports.append((False, single(x), single(y), single(theta)))
 
     def teleport_relative(self, linear: float, angular: float) -> None:
         """Turn, then jump ahead, at the next tick."""
         self._teleports.append((True, single(linear), 0.0, single(angular)))
+
+    def set_pen(self, r: float, g: float, b: float, width: float, off: float) -> None:
+        """Draw with another pen from the next tick on; the service's numbers, `off` is 0 or 1."""
+        self.pen = Pen(int(r), int(g), int(b), int(width), bool(off))
 
     def rotate_absolute(self, theta: float | None) -> None:
         """Turn to a heading at 1 rad/s (ROS 2); a velocity command aborts it, None gives it up."""
@@ -151,8 +164,8 @@ class Turtle:
             self._velocity = Twist(0.0, 0.0)
         self._heading = None if theta is None else single(theta)
 
-    def update(self, now_ns: int) -> State | None:
-        """Live through one tick.
+    def update(self, now_ns: int) -> TurtleState | None:
+        """Advance one tick.
 
         Returns where the turtle would have been outside the world before it was put back to the wall, else None.
         """
@@ -163,7 +176,10 @@ class Turtle:
         self._turn_to_heading(now_ns)
         if now_ns - self._commanded_ns > TIMEOUT_NS:
             self._velocity = Twist(0.0, 0.0)
-        self._move()
+        ahead, turning, aside = self._velocity
+        self._theta, cosine, sine = turned(self._theta, turning, math)
+        self._x += cosine * ahead * DT - sine * aside * DT
+        self._down -= cosine * aside * DT + sine * ahead * DT
         return self._stay_inside()
 
     def _take_command(self, now_ns: int) -> None:
@@ -194,15 +210,7 @@ class Turtle:
             self._velocity = Twist(0.0, math.copysign(TURN_SPEED, remaining))
             self._commanded_ns = now_ns
 
-    def _move(self) -> None:
-        """Turn first, then go along the new heading."""
-        ahead, turning, aside = self._velocity
-        self._theta = wrapped(self._theta + turning * DT)
-        cosine, sine = math.cos(self._theta), math.sin(self._theta)
-        self._x += cosine * ahead * DT - sine * aside * DT
-        self._down -= cosine * aside * DT + sine * ahead * DT
-
-    def _stay_inside(self) -> State | None:
+    def _stay_inside(self) -> TurtleState | None:
         if 0.0 <= self._x <= SIZE and 0.0 <= self._down <= SIZE:
             return None
         outside = self.state

@@ -9,8 +9,8 @@ from frametool.frames.stamps import BILLION
 
 if TYPE_CHECKING:
     from frametool.sim.scene import Scene
-    from frametool.sim.simulate import Step
-    from frametool.sim.turtle import Pen, State
+    from frametool.sim.simulate import SimulationStep
+    from frametool.sim.turtle import Pen, TurtleState
 
     Point = tuple[float, float]
 
@@ -44,12 +44,12 @@ class Drawing:
     def __init__(self, scene: Scene) -> None:
         """Begin with an empty sheet."""
         self.strokes: list[Stroke] = []
-        self.turtles: dict[str, State] = {}
+        self.turtles: dict[str, TurtleState] = {}
         self.curves: dict[str, Curves] = {name: Curves([], [], [], []) for name in scene.followers}
         self._current: dict[str, Stroke] = {}
         self._clears = 0
 
-    def watch(self, step: Step) -> None:
+    def watch(self, step: SimulationStep) -> None:
         """Take a step into the drawing."""
         if step.is_tick:
             self._wipe_if_cleared(step)
@@ -68,13 +68,13 @@ class Drawing:
         names = sorted({*self.turtles, *self.curves})
         return COLOURS[names.index(turtle) % len(COLOURS)] if turtle in names else COLOURS[-1]
 
-    def _wipe_if_cleared(self, step: Step) -> None:
+    def _wipe_if_cleared(self, step: SimulationStep) -> None:
         if step.clears != self._clears:
             self._clears = step.clears
             self.strokes.clear()
             self._current.clear()
 
-    def _draw(self, name: str, step: Step) -> None:
+    def _draw(self, name: str, step: SimulationStep) -> None:
         """Go on with a turtle's stroke, or begin one with its new pen."""
         x, y, _ = step.states[name]
         pen = step.pens[name]

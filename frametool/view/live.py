@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from typing import Self
 
     from frametool.sim.scene import Scene
-    from frametool.sim.simulate import Command, Step
-    from frametool.sim.turtle import State
+    from frametool.sim.simulate import IssuedCommand, SimulationStep
+    from frametool.sim.turtle import TurtleState
 
 FRAME = 1.0 / 20.0  # seconds
 ARROWS = "→↗↑↖←↙↓↘"
@@ -43,8 +43,8 @@ class Screen:
         # what goes to stdout beside the picture is data and must not be caught
         self._live = Live(console=self._console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
         self._talk: list[str] = []
-        self._last: dict[str, Command] = {}
-        self._states: dict[str, State] = {}
+        self._last: dict[str, IssuedCommand] = {}
+        self._states: dict[str, TurtleState] = {}
         self._clears = self._t_ns = 0
         self._drawn = -math.inf
 
@@ -60,7 +60,7 @@ class Screen:
         self._live.update(self._picture(), refresh=True)
         self._live.__exit__(kind, error, trace)
 
-    def watch(self, step: Step) -> None:
+    def watch(self, step: SimulationStep) -> None:
         """Take a step into the picture, and show it if the last frame is old enough."""
         self._talk = [*self._talk, *step.log, *map(str, step.walls)][-TALK:]
         self._last.update((command.turtle, command) for command in step.commands)
@@ -72,7 +72,7 @@ class Screen:
             self._live.update(self._picture(), refresh=True)
             self._drawn = monotonic()
 
-    def _mark(self, step: Step) -> None:
+    def _mark(self, step: SimulationStep) -> None:
         """Set the dots of a tick."""
         if step.clears != self._clears:
             self._clears = step.clears
@@ -103,12 +103,12 @@ class Screen:
         return Panel(text, title=f"{self._t_ns / BILLION:.1f} s", width=canvas.columns + 4)
 
 
-def _arrow(state: State) -> str:
+def _arrow(state: TurtleState) -> str:
     """Return the arrow nearest to a heading."""
     return ARROWS[round(state.theta / (math.pi / 4.0)) % 8]
 
 
-def _sentence(command: Command) -> str:
+def _sentence(command: IssuedCommand) -> str:
     """Say what a follower does."""
     ahead, turning, _ = command.twist
     return f"{command.turtle}: {command.distance or 0.0:.2f} m, linear {ahead:.2f}, angular {turning:+.2f}"

@@ -12,7 +12,7 @@ from frametool.view.drawing import COLOURS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.sim.turtle import State
+    from frametool.sim.turtle import TurtleState
     from frametool.view.drawing import Drawing, Stroke
 
 WINDOW = 500  # pixels, as turtlesim's
@@ -85,7 +85,7 @@ def _stroke(stroke: Stroke) -> str:
     )
 
 
-def _turtle(name: str, state: State, colour: str) -> str:
+def _turtle(name: str, state: TurtleState, colour: str) -> str:
     """Draw a turtle from above: shell, head and feet; nose along its heading."""
     place = f"translate({_number(state.x * METRE)} {_number((SIZE - state.y) * METRE)})"
     feet = "".join(f'<circle cx="{x}" cy="{y}" r="4"/>' for x in (-9, 9) for y in (-11, 11))
