@@ -11,7 +11,7 @@ from heapq import heapify, heappop, heapreplace
 from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import LookupFailed, UnknownFrame, ValueInvalid
+from frametool.errors import LookupFailed, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
 from frametool.sim.leaders import EndOfRun, Heading
@@ -249,7 +249,7 @@ class FollowerNode:
         """Look the target up and command the turtle; log once why there is no command, until there is one again."""
         step = simulation.step
         try:
-            x, y = self._look(simulation.buffer)
+            x, y = self._look(simulation.buffer, step.t_ns)
         except LookupFailed as error:
             if type(error).__name__ != self._failing:
                 self._failing = type(error).__name__
@@ -264,12 +264,12 @@ class FollowerNode:
         leader, state = simulation.states.get(self.follow.leader), simulation.states[self.turtle]
         step.commands.append(IssuedCommand(step.t_ns, self.turtle, twist, math.sqrt(x * x + y * y), leader, state))
 
-    def _look(self, buffer: TransformBuffer) -> tuple[float, float]:
-        """Return the target as the turtle sees it: at the latest common time, or where it was a while ago."""
+    def _look(self, buffer: TransformBuffer, now_ns: int) -> tuple[float, float]:
+        """Return the target as the turtle sees it: at the latest common time, or where it was `delay_ns` before now.
+
+        Looking back, the turtle itself counts as standing where tf saw it last (tf2's lookup across time).
+        """
         if not self.follow.delay_ns:
             return buffer.lookup(self.turtle, self.frame).components[:2]
-        now_ns = buffer.latest(WORLD, self.turtle)
-        if now_ns is None:
-            raise UnknownFrame(self.turtle, known=())
         past_ns = now_ns - self.follow.delay_ns
-        return buffer.lookup_across(self.turtle, now_ns, self.frame, past_ns, WORLD).components[:2]
+        return buffer.lookup_across(self.turtle, None, self.frame, past_ns, WORLD).components[:2]
