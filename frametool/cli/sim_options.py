@@ -13,7 +13,7 @@ from frametool.sim.controllers import LAWS
 from frametool.sim.scene import LONGEST
 from frametool.sim.targets import TARGETS
 from frametool.sim.world import VARIANTS
-from frametool.text.numbers import parse_angle, parse_number
+from frametool.text.numbers import parse_angle, parse_number, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +30,7 @@ class Spawn(Text):
         """Read metres and radians; the angle may carry a unit."""
         cells = [cell.strip() for cell in str(super().convert(value, param, ctx)).split(",")]
         if len(cells) not in (2, 3):
-            self.fail(f"expected X,Y,THETA, found {value!r}", param, ctx)
+            self.fail(f"expected X,Y,THETA, found {shown(str(value))}", param, ctx)
         try:
             angle, unit = parse_angle(cells[2]) if len(cells) == 3 else (0.0, None)
             return parse_number(cells[0]), parse_number(cells[1]), math.radians(angle) if unit == "deg" else angle

@@ -22,6 +22,7 @@ from frametool.grammar.result import Style
 from frametool.sim.run_summary import RunSummary
 from frametool.sim.simulate import simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
+from frametool.text.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -197,9 +198,9 @@ def check_files(plot: str | None, output: str | None, *, force: bool) -> None:
     Raises click.UsageError, FileProblem, ValueInvalid when matplotlib is missing.
     """
     if plot and suffix_of(plot) not in PLOTS:
-        raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {plot!r}")
+        raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {shown(plot)}")
     if plot and output and os.path.realpath(plot) == os.path.realpath(output) and not is_special(plot):
-        raise click.UsageError(f"--output and --plot are the same file: {plot}")
+        raise click.UsageError(f"--output and --plot are the same file: {shown(plot)}")
     for path in filter(None, (plot, output)):
         refuse_existing(path, force=force)
         if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):

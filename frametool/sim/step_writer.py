@@ -9,9 +9,11 @@ Metres, radians, seconds; quaternions x, y, z, w; a transform is the pose of the
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json_writer import dump
+from frametool.errors import ValueInvalid
 from frametool.formats.csv_format import row, write_points
 from frametool.formats.yaml_format import flow
 from frametool.frames.stamps import BILLION
@@ -131,6 +133,9 @@ def _commands(commands: Iterable[IssuedCommand]) -> Iterator[Emission]:
 def _poses(step: SimulationStep) -> Iterator[Emission]:
     """Yield the poses of a tick, as turtlesim/Pose; what is there at time 0 has not moved yet."""
     for name, pose in step.poses.items() if step.t_ns else ():
+        if not all(map(math.isfinite, pose)):
+            when = f"{name} at {step.t_ns / BILLION:g} s"
+            raise ValueInvalid(f"{when}: its speed does not fit the float32 of a pose message")
         labels, message = _labels(step.t_ns, name), pose._asdict()
         yield Emission(labels | message, message, labels)
 

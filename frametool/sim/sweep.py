@@ -15,7 +15,7 @@ from frametool.frames.stamps import BILLION
 from frametool.sim.controllers import ARRIVED, FollowController, unbounded
 from frametool.sim.scene import TUTORIAL_SPAWN, tutorial
 from frametool.sim.simulate import simulate
-from frametool.sim.turtle import DT, SIZE, TICK_NS, TIMEOUT_NS, turned
+from frametool.sim.turtle import DT, FASTEST_TURN, SIZE, TICK_NS, TIMEOUT_NS, turned
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -119,9 +119,11 @@ def _places(spawn: ArrayLike) -> Floats:
     places = np.asarray(spawn, dtype=float)
     if places.shape[-1:] != (3,):
         raise ValueInvalid(f"spawn must have the shape (..., 3) of x, y, theta, found {places.shape}")
-    if not np.isfinite(places).all():
-        raise ValueInvalid("spawn must be finite")
-    return _single(places)
+    with np.errstate(over="ignore"):
+        rounded = _single(places)
+    if not np.isfinite(rounded).all():
+        raise ValueInvalid("spawn must be finite float32 numbers")
+    return rounded
 
 
 def _single(values: Floats) -> Floats:
@@ -207,7 +209,7 @@ class _FollowerBlock:
             self.speed = np.clip(self.gain_linear * distance * moving, -self.max_linear, self.max_linear)
             turn = self.gain_angular * np.arctan2(left, ahead) * moving
         self.turn = np.clip(turn, -self.max_angular, self.max_angular)
-        finite = np.isfinite(self.speed) & np.isfinite(self.turn)
+        finite = np.isfinite(self.speed) & (abs(self.turn) <= FASTEST_TURN)
         if not finite.all():
             first = int(np.argmin(finite))
             raise ValueInvalid(unbounded(self.gain_linear[first], self.gain_angular[first], distance[first]))

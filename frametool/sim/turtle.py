@@ -23,6 +23,7 @@ SIZE = 11.088889122009277  # metres: float32 of 499 pixels / 45 pixels a metre
 CENTRE = SIZE / 2.0
 TURN_SPEED = 1.0  # radians a second, of rotate_absolute
 TURN_NEAR = 0.02  # radians, where rotate_absolute ends
+FASTEST_TURN = 1e15  # radians a second; beyond, what is left of an angle after wrapping is rounding
 
 _ONE_SINGLE = Struct("f")
 _FIVE_SINGLES = Struct("5f")
@@ -38,15 +39,17 @@ class Twist(_Components):
     """A velocity command: metres and radians a second, in the turtle's own frame; x ahead, y to its left.
 
     Raises:
-        ValueInvalid: a component is nan or infinite; turtlesim would take it and lose the turtle for good.
+        ValueInvalid: a component is nan or infinite, or a turn so fast that no heading is left; turtlesim would take it
+            and lose the turtle for good.
     """
 
     __slots__ = ()
 
     def __new__(cls, linear_x: float, angular_z: float, linear_y: float = 0.0) -> Self:
-        """Check that every component is finite."""
-        if not (math.isfinite(linear_x) and math.isfinite(angular_z) and math.isfinite(linear_y)):
-            raise ValueInvalid(f"a velocity must be finite, found linear {linear_x} {linear_y}, angular {angular_z}")
+        """Check that every component can be used."""
+        if not (math.isfinite(linear_x) and abs(angular_z) <= FASTEST_TURN and math.isfinite(linear_y)):
+            limits = f"must be finite, and turns at most {FASTEST_TURN:g} rad/s"
+            raise ValueInvalid(f"a velocity {limits}, found linear {linear_x} {linear_y}, angular {angular_z}")
         return super().__new__(cls, linear_x, angular_z, linear_y)
 
 
@@ -90,6 +93,16 @@ def single(value: float) -> float:
         return math.copysign(math.inf, value)
 
 
+def check_single(**numbers: float) -> None:
+    """Refuse numbers that a message of float32 cannot hold.
+
+    Raises ValueInvalid, which names the first of them.
+    """
+    for name, value in numbers.items():
+        if not math.isfinite(single(value)):
+            raise ValueInvalid(f"{name} must be a number within float32, found {value:g}")
+
+
 def wrapped(theta: Any, xp: Any = math) -> Any:
     """Bring an angle into [-PI, PI) by turtlesim's formula."""
     return theta - 2.0 * PI * xp.floor((theta + PI) / (2.0 * PI))
@@ -120,7 +133,11 @@ class Turtle:
         self, x: float = CENTRE, y: float = CENTRE, theta: float = 0.0, *,
         name: str = "turtle1", holonomic: bool = True,
     ) -> None:  # fmt: skip
-        """Put a turtle into the world; x, y, theta are float32, as in the spawn service."""
+        """Put a turtle into the world; x, y, theta are float32, as in the spawn service.
+
+        Raises ValueInvalid for what is no finite float32.
+        """
+        check_single(x=x, y=y, theta=theta)
         self.name = name
         self.holonomic = holonomic
         self.pen = Pen()

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, listing
-from frametool.sim.turtle import CENTRE, Turtle, single
+from frametool.sim.turtle import CENTRE, Turtle, check_single, single
 
 if TYPE_CHECKING:
     from frametool.sim.turtle import TurtleState
 
 VARIANTS = ("ros1", "ros2")
+FAR = 1e9  # metres, from where on a place is written with an exponent
 # service -> its arguments and what they are when left out (None: must be given)
 SERVICES: dict[str, dict[str, float | str | None]] = {
     "spawn": {"x": None, "y": None, "theta": 0.0, "name": ""},
@@ -37,7 +38,8 @@ class WallHit(NamedTuple):
 
     def __str__(self) -> str:
         """Warn as turtlesim does, with y up."""
-        return f"{self.turtle}: Oh no! I hit the wall! (Clamping from [x={self.place.x:f}, y={self.place.y:f}])"
+        x, y = (f"{each:f}" if abs(each) < FAR else f"{each:g}" for each in self.place[:2])
+        return f"{self.turtle}: Oh no! I hit the wall! (Clamping from [x={x}, y={y}])"
 
 
 class World:
@@ -139,7 +141,7 @@ class World:
 def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float | str]:
     """Return a service's arguments with the defaults of the table.
 
-    Raises ValueInvalid for a service or argument that does not exist, or one that is missing.
+    Raises ValueInvalid for a service or argument that does not exist, or one that is missing or no finite float32.
     """
     if service not in SERVICES:
         raise ValueInvalid(f"no service {service!r}; services: {', '.join(SERVICES)}")
@@ -149,4 +151,5 @@ def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float
     given = {name: arguments.get(name, default) for name, default in expected.items()}
     if missing := [name for name, value in given.items() if value is None]:
         raise ValueInvalid(f"{service} needs {', '.join(missing)}")
+    check_single(**{name: value for name, value in given.items() if isinstance(value, float)})
     return {name: value for name, value in given.items() if value is not None}

@@ -23,6 +23,7 @@ WIDTH = LEFT + 420 + MARGIN
 HEIGHT = WINDOW + 2 * MARGIN
 BACKGROUND = "#4556ff"  # turtlesim's 69, 86, 255
 INK = "#333"
+LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is drawn at its end
 # the turtles' colours as they show on white
 DARKENED = dict(
     zip(COLOURS, ("#c79a00", "#d4691b", "#1593ad", "#2a9d8f", "#d6458b", "#5a9a16", "#7d5fc7", "#666666"), strict=True)
@@ -107,7 +108,7 @@ def _panel(panel: Panel) -> Iterator[str]:
         return _number(LEFT + width * t / right)
 
     def down(value: float) -> str:
-        return _number(panel.top + panel.height * (high - value) / (high - low))
+        return _number(panel.top + panel.height * (high - min(max(value, low), high)) / (high - low))
 
     bottom = _number(panel.top + panel.height)
     yield f'<text x="{LEFT}" y="{_number(panel.top - 8)}">{panel.title}</text>\n'
@@ -126,7 +127,7 @@ def _panel(panel: Panel) -> Iterator[str]:
 
 def ticks(low: float, high: float) -> list[float]:
     """Return round numbers that enclose two values: 1, 2 or 5 times a power of ten apart, four to ten of them."""
-    span = (high - low) or 1.0
+    span = high - low if high - low > LEAST_SPAN else 1.0
     step = 10.0 ** math.floor(math.log10(span / 4.0))
     step *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if span / (step * factor) <= 6.0)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
@@ -134,9 +135,9 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _bounds(values: Iterable[float]) -> tuple[float, float]:
-    """Return the least and the greatest value, zero included."""
+    """Return the least and the greatest value, zero included, as far as an axis reaches."""
     known = [0.0, *values]
-    return min(known), max(known)
+    return max(min(known), -FURTHEST), min(max(known), FURTHEST)
 
 
 def _number(value: float) -> str:

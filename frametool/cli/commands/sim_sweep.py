@@ -13,7 +13,7 @@ from frametool.cli.sim_output import check_files, format_options, style_of, suff
 from frametool.cli.sink import writing
 from frametool.errors import ValueInvalid
 from frametool.sim.step_writer import table
-from frametool.text.numbers import parse_number
+from frametool.text.numbers import parse_number, shown
 
 MOST = 10_000  # values of one gain
 
@@ -34,7 +34,7 @@ class Range(Text):
         except ValueInvalid as error:
             self.fail(str(error), param, ctx)
         except ValueError:
-            self.fail(f"expected START:STOP:COUNT, e.g. 0.1:2:20, or numbers like 0.5,1; found {value!r}", param, ctx)
+            self.fail(f"expected START:STOP:COUNT, e.g. 0.1:2:20, or numbers like 0.5,1; found {shown(text)}", param, ctx)
 
 
 def _spaced(start: float, stop: float, count: int) -> list[float]:
