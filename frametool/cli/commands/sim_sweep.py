@@ -34,7 +34,7 @@ class Range(Text):
         except ValueInvalid as error:
             self.fail(str(error), param, ctx)
         except ValueError:
-            self.fail(f"expected START:STOP:COUNT, e.g. 0.1:2:20, or numbers like 0.5,1; found {shown(text)}", param, ctx)
+            self.fail(f"expected START:STOP:COUNT (0.1:2:20), or numbers (0.5,1); found {shown(text)}", param, ctx)
 
 
 def _spaced(start: float, stop: float, count: int) -> list[float]:
