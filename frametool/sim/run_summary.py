@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from frametool.errors import printable
 from frametool.frames.stamps import BILLION
 from frametool.sim.targets import offset
 from frametool.sim.turtle import TurtleState
@@ -48,12 +49,12 @@ class RunSummary:
                 self.gone[name] = (follow.leader if name in step.states else name, step.t_ns)
 
     def lines(self) -> Iterator[str]:
-        """Yield the summary: one line a follower, then the walls."""
+        """Yield the summary: one line a follower, then the walls; names as a terminal may show them."""
         if self.t_ns is None:
             yield "ended before the first step"
             return
-        yield from (self._line(name, follow) for name, follow in self._follows.items())
-        hits = ", ".join(f"{name} {count}" for name, count in sorted(self.walls.items()))
+        yield from (printable(self._line(name, follow)) for name, follow in self._follows.items())
+        hits = ", ".join(f"{printable(name)} {count}" for name, count in sorted(self.walls.items()))
         yield f"{_seconds(self.t_ns)} simulated; wall hits: {sum(self.walls.values())}" + (f" ({hits})" if hits else "")
 
     def _line(self, name: str, follow: Follow) -> str:

@@ -13,7 +13,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json_writer import dump
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, printable
 from frametool.formats.csv_format import row, write_points
 from frametool.formats.yaml_format import flow
 from frametool.frames.stamps import BILLION
@@ -78,7 +78,7 @@ class StepWriter:
 
     def _yaml(self, emission: Emission) -> str:
         labels = emission.labels
-        comment = f"# {labels['turtle']} at {labels['t']} s\n" if self._labelled and labels else ""
+        comment = f"# {printable(labels['turtle'])} at {labels['t']} s\n" if self._labelled and labels else ""
         return comment + message_text(emission.message, self._style)
 
     def _json(self, emission: Emission) -> str:
@@ -109,7 +109,7 @@ def table(rows: Sequence[dict[str, float | None]], style: Style) -> str:
 def _text_cell(cell: Any, style: Style) -> str:
     """Round for reading; zero has no sign there."""
     if not isinstance(cell, float):
-        return "-" if cell is None else str(cell)
+        return "-" if cell is None else printable(str(cell))
     digits = DECIMALS if style.precision is None else style.precision
     return f"{round(cell, digits) + 0.0:.{digits}f}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid, listing
+from frametool.errors import ValueInvalid, listing, printable
 from frametool.sim.turtle import CENTRE, Turtle, check_single, single
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class WallHit(NamedTuple):
     def __str__(self) -> str:
         """Warn as turtlesim does, with y up."""
         x, y = (f"{each:f}" if abs(each) < FAR else f"{each:g}" for each in self.place[:2])
-        return f"{self.turtle}: Oh no! I hit the wall! (Clamping from [x={x}, y={y}])"
+        return f"{printable(self.turtle)}: Oh no! I hit the wall! (Clamping from [x={x}, y={y}])"
 
 
 class World:

@@ -59,10 +59,11 @@ def panels(drawing: Drawing) -> list[Panel]:
     if not curves:
         return []
     height = (WINDOW - 2 * 50) / 3
+    colours = drawing.colours()
     rows = (("distance (m)", "distance"), ("linear.x (m/s)", "linear"), ("angular.z (rad/s)", "angular"))
     return [
         Panel(title, MARGIN + index * (height + 50), height, [
-            (name, DARKENED[drawing.colour(name)], curve.times, getattr(curve, key)) for name, curve in curves.items()
+            (name, DARKENED[colours[name]], curve.times, getattr(curve, key)) for name, curve in curves.items()
         ])
         for index, (title, key) in enumerate(rows)
     ]  # fmt: skip
@@ -73,7 +74,8 @@ def _window(drawing: Drawing) -> Iterator[str]:
     yield f'<svg x="{MARGIN}" y="{MARGIN}" width="{WINDOW}" height="{WINDOW}" viewBox="0 0 {WINDOW} {WINDOW}">\n'
     yield f'<rect width="{WINDOW}" height="{WINDOW}" fill="{BACKGROUND}"/>\n'
     yield from map(_stroke, drawing.strokes)
-    yield from (_turtle(name, state, drawing.colour(name)) for name, state in drawing.turtles.items())
+    colours = drawing.colours()
+    yield from (_turtle(name, state, colours[name]) for name, state in drawing.turtles.items())
     yield "</svg>\n"
 
 

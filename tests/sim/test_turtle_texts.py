@@ -12,8 +12,10 @@ from frametool.documents.source import Source
 from frametool.errors import FormatError
 from frametool.grammar.result import Style
 from frametool.sim.command_file import read_commands, read_script
-from frametool.sim.leaders import KEYS
-from frametool.sim.scene import tutorial
+from frametool.sim.controllers import FollowController
+from frametool.sim.leaders import KEYS, scripted
+from frametool.sim.run_summary import RunSummary
+from frametool.sim.scene import Follow, tutorial
 from frametool.sim.scene_file import read_scene
 from frametool.sim.simulate import simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter, table
@@ -245,3 +247,20 @@ def test_a_turtles_name_is_quoted_in_csv_where_a_reader_would_split_it(name: str
     assert {len(row) for row in rows} == {10 + 1}
     assert {row[1] for row in rows[1:]} == {name}
     assert read_script(Source("commands", text)) == [(each.t_ns, each.twist) for step in steps for each in step.commands]
+
+
+def test_a_name_with_control_characters_reaches_no_terminal_raw() -> None:
+    scene = tutorial(followers=1, duration=2.0, leader=scripted([(0, Twist(30.0, 0.0))]))
+    leader, follower = scene.turtles
+    names = [leader._replace(name="a\x1b[31m"), follower._replace(name="b\n\x07", driver=Follow("a\x1b[31m", FollowController()))]
+    scene = scene._replace(turtles=names)
+    summary, texts = RunSummary(scene), []
+    writers = [StepWriter("commands", Style(form), labelled=True) for form in ("text", "yaml")]
+    for step in simulate(scene):
+        summary.watch(step)
+        texts += [text for writer in writers for text in writer.write(step)]
+        texts += map(str, step.walls)
+    shown = "".join([*texts, *summary.lines()])
+    assert "a\\x1b[31m" in shown
+    assert not {"\x1b", "\x07"} & set(shown)
+    assert all(text.startswith("# b\\n\\x07 at ") for text in texts if text.startswith("#"))
