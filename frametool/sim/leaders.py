@@ -7,6 +7,7 @@ no more).
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
@@ -87,7 +88,7 @@ class Mailbox:
     def __init__(self) -> None:
         """Create an empty one."""
         self.due_ns: int | None = 0
-        self._posted: list[tuple[int, Twist | Heading]] = []
+        self._posted: deque[tuple[int, Twist | Heading]] = deque()
         self._failure: BaseException | None = None
 
     def post(self, command: Twist | Heading, t_ns: int = 0) -> None:
@@ -120,7 +121,7 @@ class Mailbox:
         self.due_ns = now_ns + TICK_NS
         newest = None
         while self._posted and self._posted[0][0] <= now_ns:
-            newest = self._posted.pop(0)[1]
+            newest = self._posted.popleft()[1]
         if newest is None and self._failure is not None:
             raise self._failure
         return newest

@@ -80,10 +80,6 @@ class SimulationStep:
     clears: how often the drawing has been cleared so far.
     """
 
-    __slots__ = (
-        "broadcasts", "clears", "commands", "is_tick", "led", "log", "pens", "poses", "states", "t_ns", "walls",
-    )  # fmt: skip
-
     def __init__(self, t_ns: int) -> None:
         """Create an instant at which nothing has happened yet."""
         self.t_ns = t_ns
