@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, alternatives
+from frametool.formats.detect import detect
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.readers import Misfit, read_numbers, within
 from frametool.ros.noise import NOISE
@@ -48,7 +49,6 @@ AXES = ("x", "y", "z")
 COMMAND = f"{{t: 0.5, linear: 2.0, angular: 0.0}}, a Twist message, or a key: {', '.join(KEYS)}"
 EXPECTED = f"a command is {COMMAND}"
 _WORD = re.compile(r"[A-Za-z_]+\s*").fullmatch
-_CSV_HEADER = re.compile(r"[^-{\[:,][^:,]*(,[^:,]*)+").fullmatch
 
 
 class CommandText:
@@ -140,7 +140,7 @@ def _pieces(lines: Iterable[str], name: str) -> Iterator[CommandText]:
     for number, text in numbered:
         if not _says_something(text):
             continue
-        if _CSV_HEADER(text):
+        if detect(text.encode(), "rows", "records", otherwise="yaml")[0] == "csv":
             yield from _rows(numbered, name, _columns(CommandText(name, text, number, ())))
         else:
             yield from _documents(chain(((number, text),), numbered), name)

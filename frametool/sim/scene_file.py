@@ -52,7 +52,7 @@ def read_scene(source: Source, *, seed: int | None = None) -> Scene:
     try:
         return _SceneReader(source, seed).scene(documents[0].value)
     except Misfit as misfit:
-        raise format_error(source, (documents[0].index, *misfit.path), str(misfit), key=misfit.key) from None
+        raise misfit.placed(source, documents[0].index) from None
 
 
 class _SceneReader:
