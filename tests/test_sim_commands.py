@@ -6,9 +6,11 @@ import json
 import os
 import pty
 import re
+import select
 import signal
 import subprocess
 import sys
+import termios
 import xml.etree.ElementTree as ET
 from importlib import import_module
 from importlib.util import find_spec
@@ -290,6 +292,36 @@ def test_keys_drive_the_turtle_in_a_terminal_and_commands_go_to_stdout() -> None
     assert any(each["turtle"] == "turtle1" and each["linear"]["x"] == 2.0 for each in lines)
     assert "→" in drawn.decode()
     assert b"\x1b[?25h" in drawn  # the cursor is back
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("name", [("follow", "--live", "--duration", "inf"), ("teleop",)])
+def test_a_signal_gives_the_terminal_back_with_its_cursor_and_leaves_no_file(
+    number: signal.Signals, name: tuple[str, ...], tmp_path: Path,
+) -> None:  # fmt: skip
+    ours, theirs = pty.openpty()
+    before = termios.tcgetattr(theirs)
+    tool = subprocess.Popen(
+        [*TOOL, "sim", *name, "-o", "run.csv"], stdin=theirs, stderr=theirs, stdout=theirs, cwd=tmp_path,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "LINES": "24", "PYTHONPATH": str(console.ROOT)},
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # noqa: PLW1509 - ignored under nohup
+    )  # fmt: skip
+    drawn = b""
+    while "→" not in drawn.decode(errors="replace"):
+        drawn += os.read(ours, 1 << 16)
+    tool.send_signal(number)
+    while tool.poll() is None:
+        if select.select([ours], [], [], 0.05)[0]:
+            drawn += os.read(ours, 1 << 16)
+    assert termios.tcgetattr(theirs) == before
+    os.close(theirs)
+    while chunk := _read(ours):
+        drawn += chunk
+    os.close(ours)
+    assert drawn.rindex(b"\x1b[?25h") > drawn.rindex(b"\x1b[?25l")
+    assert tool.returncode == (130 if number == signal.SIGINT else -number)
+    assert b"Traceback" not in drawn
+    assert list(tmp_path.iterdir()) == []
 
 
 def _read(terminal: int) -> bytes:

@@ -291,7 +291,8 @@ def _flat_rotation(value: dict[str, Any], rotations: list[str]) -> Columns | Non
     from frametool.stream.header import find_rotations
 
     names = [key for key, each in value.items() if type(each) not in (dict, list)]
-    found = [each for each in find_rotations(names, None) if not (each.prefix or each.suffix or each.whole or each.absent)]
+    every = find_rotations(names, None)
+    found = [each for each in every if not (each.prefix or each.suffix or each.whole or each.absent)]
     if odd := [each for each in found if each.wrong or each.is_mixed]:
         raise Misfit(odd[0].wrong or f"angles of several units: {odd[0].shown}; write all in one", (odd[0].names[0],))
     if found and len(found) + len(rotations) > 1:
