@@ -6,8 +6,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid
-from frametool.frames.stamps import BILLION
-from frametool.frames.track_store import FURTHEST_NS
+from frametool.frames.stamps import BILLION, FURTHEST_NS
 from frametool.sim.controllers import FollowController
 from frametool.sim.leaders import built_in
 from frametool.sim.targets import TARGETS

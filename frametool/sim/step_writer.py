@@ -13,9 +13,9 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json_writer import dump
+from frametool.documents.yaml_writer import flow
 from frametool.errors import ValueInvalid, printable
 from frametool.formats.csv_format import row, write_points
-from frametool.formats.yaml_format import flow
 from frametool.frames.stamps import BILLION
 from frametool.ros.echo_format import message_text
 
@@ -98,7 +98,7 @@ def table(rows: Sequence[dict[str, float | None]], style: Style) -> str:
         case "json":
             return "".join(f"{dump(each, style.number)}\n" for each in rows)
         case "yaml":
-            return "".join(f"- {flow(each, style)}\n" for each in rows)
+            return "".join(f"- {flow(each, style.number)}\n" for each in rows)
         case "csv":
             return write_points(rows, style)
     columns = list(rows[0])
