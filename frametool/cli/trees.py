@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import VERBOSE, Text, be_verbose
+from frametool.cli.command import Text, say_if_verbose
 from frametool.cli.poses import is_inline, source_of
-from frametool.cli.stderr import say
 from frametool.errors import warn
 from frametool.formats.load import load_sources
 from frametool.formats.recordings import Recording
@@ -44,16 +43,8 @@ def opened(arguments: Sequence[str]) -> list[Recording]:
 
 def announced(file: Recording) -> Recording:
     """Say what a file was taken for, if the command was asked to."""
-    context = click.get_current_context(silent=True)
-    if context is not None and context.meta.get(VERBOSE):
-        say(file.described)
+    say_if_verbose(file.described)
     return file
-
-
-verbose_option = click.option(
-    "-v", "--verbose", is_flag=True, expose_value=False, callback=be_verbose,
-    help="say on stderr what each file was taken for",
-)  # fmt: skip
 
 
 def tree_file(argument: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION
-from frametool.geometry import floats, quaternion
+from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
 from frametool.ros.echo_blocks import unit_components
 
@@ -85,6 +85,5 @@ def _complaint(parent: str, child: str, numbers: tuple[float, ...], *, normalize
     """Say what is wrong with a transform that was refused."""
     if not parent or not child:
         return ValueInvalid("an empty frame name")
-    x, y, z, w = numbers[3:]
-    problem = quaternion.complaint(x, y, z, w, floats.length(x, y, z, w), normalize=normalize)
+    problem = quaternion.complaint(*numbers[3:], normalize=normalize)
     return problem or ValueInvalid("its position is not finite", rule="not-finite")

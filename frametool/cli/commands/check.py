@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Command, pose_options
+from frametool.cli.command import FILE, Command, pose_options, verbose_option
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import opened, verbose_option
+from frametool.cli.trees import opened
 from frametool.lint.findings import RULES, WRITERS
 from frametool.lint.rules import check
 

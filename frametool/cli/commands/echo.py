@@ -8,10 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Command, Number, pose_options, result_options, rotation_options
+from frametool.cli.command import (
+    FILE,
+    Command,
+    Number,
+    pose_options,
+    result_options,
+    rotation_options,
+    verbose_option,
+)
 from frametool.cli.output import Output
 from frametool.cli.times import Skipped, Time, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
+from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import NoDataAt, ValueInvalid
 from frametool.frames.replay import checked_rate
 from frametool.grammar.looked_up import result_at

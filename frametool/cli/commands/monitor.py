@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options
+from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, verbose_option
 from frametool.cli.output import Output
-from frametool.cli.trees import opened, verbose_option
+from frametool.cli.trees import opened
 from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:
