@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     Listener = Callable[[str, str, "type[FrametoolWarning]"], None]
 
 SHOWN = 60  # characters of the input that a message quotes at most
+LONGEST_NAME = 200  # characters of a name that is compared with others
+MOST_COMPARED = 500  # names
 
 
 class FrametoolError(Exception):
@@ -117,6 +119,8 @@ class UnknownFrame(LookupFailed):
 
     def __init__(self, name: str, *, known: Iterable[str], where: str = "") -> None:
         """Compose the message from the name, the frames there are and the tree's name."""
+        from heapq import nsmallest
+
         self.name = name
         self.known = tuple(known)
         place = f" in {where}" if where else ""
@@ -125,7 +129,7 @@ class UnknownFrame(LookupFailed):
         super().__init__(
             f"{self.short}{'' if near else ';'} frames: {listing(self.known)}",
             frame=name,
-            known=sorted(self.known)[:20],
+            known=nsmallest(20, self.known),
         )
 
 
@@ -198,8 +202,41 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
     """Return `; did you mean 'x'?` for the nearest known name, or nothing."""
     from difflib import get_close_matches
 
-    near = get_close_matches(name, list(known), n=1, cutoff=cutoff)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    near = get_close_matches(name[:LONGEST_NAME], _likely(name[:LONGEST_NAME], list(known)), n=1, cutoff=cutoff)
+    return f"; did you mean {quoted(near[0])}?" if near else ""
+
+
+def _likely(name: str, known: list[str]) -> list[str]:
+    """Return the names worth comparing: of many those with the same first or second half that share the most beyond it.
+
+    A typing error leaves one half of a name as it was.
+    """
+    if len(known) <= MOST_COMPARED:
+        return known
+    size = len(name)
+
+    def begins(each: str, count: int) -> bool:
+        return each.startswith(name[:count])
+
+    def ends(each: str, count: int) -> bool:
+        return each.endswith(name[size - count :])
+
+    first = [each for each in known if begins(each, size // 2)]
+    second = [each for each in known if ends(each, size // 2)]
+    found = (_sharing_most(*way, size) for way in ((first, begins), (first, ends), (second, begins), (second, ends)))
+    return [each for part in found for each in part[: MOST_COMPARED // 4]]
+
+
+def _sharing_most(names: list[str], shares: Callable[[str, int], bool], most: int) -> list[str]:
+    """Return the names that share as many characters as any of them does."""
+    least = 0
+    while least < most:
+        middle = (least + most + 1) // 2
+        if some := [each for each in names if shares(each, middle)]:
+            least, names = middle, some
+        else:
+            most = middle - 1
+    return names
 
 
 def alternatives(name: str, known: Iterable[str], label: str) -> str:
@@ -210,9 +247,11 @@ def alternatives(name: str, known: Iterable[str], label: str) -> str:
 
 def listing(names: Iterable[str], most: int = 20) -> str:
     """Return the names sorted and joined by commas, cut after `most` of them."""
-    ordered = sorted(names)
-    more = f" and {len(ordered) - most} more" if len(ordered) > most else ""
-    return ", ".join(quoted(name)[1:-1] for name in ordered[:most]) + more
+    from heapq import nsmallest
+
+    everything = list(names)
+    more = f" and {len(everything) - most} more" if len(everything) > most else ""
+    return ", ".join(cut(name) for name in nsmallest(most, everything)) + more
 
 
 def printable(name: str) -> str:
@@ -220,6 +259,11 @@ def printable(name: str) -> str:
     if name.isprintable():
         return name
     return "".join(each if each.isprintable() else repr(each)[1:-1] for each in name)
+
+
+def cut(name: str) -> str:
+    """Return a name for a message without quotes: on one line, within 60 characters."""
+    return name if len(name) <= SHOWN - 2 and name.isprintable() else quoted(name)[1:-1]
 
 
 def quoted(value: object) -> str:

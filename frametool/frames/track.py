@@ -131,11 +131,27 @@ class MovingTrack:
     def add(self, stamp_ns: int, parent: str, components: Rigid) -> None:
         """Sort a sample in, after those of the same stamp."""
         self.varies = self.varies or parent != self.parent
-        page = self._page(stamp_ns)
-        if stamp_ns < self.last_ns and len(page.stamps) > PAGE:
-            self._cut(page)
-            page = self._page(stamp_ns)
+        page = self._short_page(stamp_ns)
+        self._insert(page, bisect_right(page.stamps, stamp_ns), stamp_ns, parent, components)
+
+    def add_if_new(self, stamp_ns: int, components: Rigid) -> bool:
+        """Sort a sample in under the newest parent, unless its stamp is there already; return whether it was not."""
+        page = self._short_page(stamp_ns)
         at = bisect_right(page.stamps, stamp_ns)
+        if at and page.stamps[at - 1] == stamp_ns:
+            return False
+        self._insert(page, at, stamp_ns, self.parent, components)
+        return True
+
+    def _short_page(self, stamp_ns: int) -> Page:
+        """Return the page of a stamp, cut if a late sample would have to move many."""
+        page = self._page(stamp_ns)
+        if stamp_ns >= self.last_ns or len(page.stamps) <= PAGE:
+            return page
+        self._cut(page)
+        return self._page(stamp_ns)
+
+    def _insert(self, page: Page, at: int, stamp_ns: int, parent: str, components: Rigid) -> None:
         page.stamps.insert(at, stamp_ns)
         page.parents.insert(at, parent)
         page.samples.insert(at, components)

@@ -15,7 +15,7 @@ from frametool.frames.tree import FrameTree
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -38,7 +38,7 @@ def chain(*, moving: bool) -> TransformBuffer:
 
 
 def rate(count: int, action: Callable[[], object], repeats: int = 5) -> float:
-    """Give things a second, the best of several runs."""
+    """Return things a second, the best of several runs."""
     best = float("inf")
     for _ in range(repeats):
         begin = perf_counter()
@@ -47,16 +47,18 @@ def rate(count: int, action: Callable[[], object], repeats: int = 5) -> float:
     return count / best
 
 
-def insert_rate(count: int = 100_000) -> float:
-    """Measure inserts in the order of time."""
+def insert_rate(order: Sequence[int], *, ask: bool = False, repeats: int = 5) -> float:
+    """Measure inserts at stamps in some order, with a lookup after each if asked."""
     pose = Transform.of(1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8)
 
     def fill() -> None:
         buffer = TransformBuffer()
-        for at in range(count):
+        for at in order:
             buffer.insert("map", "base", pose, START + at)
+            if ask:
+                buffer.lookup("map", "base", START + at)
 
-    return rate(count, fill)
+    return rate(len(order), fill, repeats)
 
 
 def single_rate(frames: TransformBuffer | FrameTree, stamps: list[int]) -> float:
@@ -90,7 +92,10 @@ def main() -> None:
     moving, standing = chain(moving=True), chain(moving=False)
     few = times[:20_000].tolist()
     rows = [
-        ("insert, in order", insert_rate(), 200_000),
+        ("insert, in order", insert_rate(range(100_000)), 200_000),
+        ("insert, 1e6 in reverse", insert_rate(range(1_000_000, 0, -1), repeats=1), 333_000),
+        ("insert, 1e6 shuffled", insert_rate(generator.permutation(1_000_000).tolist(), repeats=1), 333_000),
+        ("insert and look up, 1e6 in reverse", insert_rate(range(1_000_000, 0, -1), ask=True, repeats=1), 150_000),
         ("lookup, 10 standing edges, tree", single_rate(standing_tree(), few), 100_000),
         ("lookup, 10 standing edges, buffer", single_rate(standing, few), 100_000),
         ("lookup, 10 moving edges, random times", single_rate(moving, few), 20_000),

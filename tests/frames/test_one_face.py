@@ -327,3 +327,47 @@ def test_an_unknown_frame_and_a_second_pose_say_the_rule_they_break() -> None:
             with pytest.raises(BadTopology) as caught:
                 add(*edge, POSES[0])
             assert caught.value.rule == rule
+
+
+# --- what is said --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", ["f{}", "robot_{}/arm_link", "{}_camera_optical"])
+def test_among_many_names_only_the_likely_ones_are_compared(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    compared = []
+
+    def matches(name: str, known: list[str], **_: object) -> list[str]:
+        compared.extend(known)
+        return [min(known, key=lambda each: (each != form.format(7777), each))] if name else []
+
+    monkeypatch.setattr("difflib.get_close_matches", matches)
+    tree = FrameTree()
+    for number in range(20_000):
+        tree.add("root", form.format(number), POSES[0])
+    wrong = form.format(7777)
+    for name in (wrong + "q", wrong.replace("777", "77q"), "q" + wrong):
+        compared.clear()
+        with pytest.raises(UnknownFrame, match="did you mean"):
+            tree.lookup("root", name)
+        assert wrong in compared
+        assert len(compared) <= 500
+
+
+@pytest.mark.parametrize("name", ["x" * 1000, "a\x1b[31mb", "\n" * 80])
+def test_no_message_holds_a_long_name_or_a_control_character(name: str) -> None:
+    buffer = drive()
+    buffer.insert("base", name, shifted(0), 2 * 10**9)
+    buffer.insert("island", f"{name}!", shifted(0), 2 * 10**9)
+    questions = (
+        lambda: buffer.lookup("map", name, 9 * 10**9),
+        lambda: buffer.lookup("map", f"{name}!"),
+        lambda: buffer.lookup("map", f"{name}?"),
+        lambda: buffer.insert(name, "map", shifted(0), 2 * 10**9),
+        lambda: buffer.insert(name, name, shifted(0), 0),
+        lambda: buffer.insert("base", name, shifted(0)),
+    )
+    for question in questions:
+        with pytest.raises((LookupFailed, BadTopology)) as caught:
+            question()
+        assert str(caught.value).isprintable()
+        assert len(str(caught.value)) < 500
