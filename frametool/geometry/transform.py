@@ -130,15 +130,17 @@ class Transform(Batched):
             product = _new(Transform)
             product._components = rigid.compose(*ours, *theirs)
             return product
-        return self._of_columns(dispatch.run(rigid.compose, 7, (*ours, *theirs)))
+        return self._of_columns(dispatch.run(rigid.compose, 7, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Transform:
         """Return b_from_a of a_from_b."""
-        return self._of_columns(dispatch.run(rigid.inverse, 7, self._components))
+        return self._of_columns(dispatch.run(rigid.inverse, 7, self._components, functions=False))
 
     def relative(self, other: Transform) -> Transform:
         """Return the pose of the other seen from this one: self.inverse() @ other, near poses keeping their digits."""
-        return self._of_columns(dispatch.run(rigid.relative, 7, (*self._components, *_components_of(other))))
+        return self._of_columns(
+            dispatch.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
+        )
 
     def apply(self, points: Numbers) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
@@ -165,11 +167,11 @@ class Transform(Batched):
         fraction: a number, or an array that broadcasts with the transforms.
         """
         parts = (*self._components, *_components_of(other), validation.scalars(fraction, "fraction"))
-        return self._of_columns(dispatch.run_with_xp(rigid.interpolate, 7, parts))
+        return self._of_columns(dispatch.run(rigid.interpolate, 7, parts))
 
     def distance(self, other: Transform) -> tuple[Any, Any]:
         """Return the metres and the radians between two."""
-        metres, radians = dispatch.run_with_xp(rigid.distance, 2, (*self._components, *_components_of(other)))
+        metres, radians = dispatch.run(rigid.distance, 2, (*self._components, *_components_of(other)))
         return metres, radians
 
     def is_close(self, other: Transform, *, angle: float = NEAR, distance: float = NEAR_BY) -> Any:
