@@ -104,24 +104,24 @@ def chosen(components: Components, index: Any) -> Components:
 
 def second_moment(components: Components, mass: Array) -> list[list[float]]:
     """Return sum(w q q^T), 4 by 4."""
-    heavy = [mass * part for part in components]
-    upper = {(i, j): total(heavy[i], components[j]) for i in range(4) for j in range(i, 4)}
+    from frametool.geometry import arrays
+
+    upper = {(i, j): 0.0 for i in range(4) for j in range(i, 4)}
+    for _, (weight, *parts) in arrays.cut((mass, *components), 0):
+        heavy = [weight * part for part in parts]
+        for i, j in upper:
+            upper[i, j] += total(heavy[i] * parts[j])
     return [[upper[min(i, j), max(i, j)] for j in range(4)] for i in range(4)]
 
 
-def total(part: Array, factor: Array | float) -> float:
-    """Return the sum of products, block by block and each by halves: numpy's own order depends on the machine."""
-    from frametool.geometry import arrays
-
-    whole = 0.0
-    for _, (first, second) in arrays.cut((part, factor), 0):
-        products = first * second
-        while products.size > 1:
-            half = products.size // 2
-            products[:half] += products[-half:]
-            products = products[: products.size - half]
-        whole += float(products[0])
-    return whole
+def total(values: Array) -> float:
+    """Return a sum, adding halves onto each other in place: numpy's own order depends on the machine."""
+    sums = values.reshape(-1)
+    while sums.size > 1:
+        half = sums.size // 2
+        sums[:half] += sums[-half:]
+        sums = sums[: sums.size - half]
+    return float(sums[0])
 
 
 def masses(heavy: Numbers | None, shape: tuple[int, ...]) -> Array:

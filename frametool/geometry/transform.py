@@ -189,9 +189,9 @@ class Transform(Batched):
         if not self.shape:
             return self
         mass = dispatch.masses(weights, self.shape)
-        whole = dispatch.total(mass, 1.0)
-        x, y, z = (dispatch.total(part, mass) / whole for part in self._components[:3])
-        return Transform.of(x, y, z, *self.rotation.mean(weights).components)
+        x, y, z = (dispatch.total(part * mass) for part in self._components[:3])
+        whole = dispatch.total(mass.copy())
+        return Transform.of(x / whole, y / whole, z / whole, *self.rotation.mean(weights).components)
 
     def __repr__(self) -> str:
         """Show one transform's numbers, or the shape of many."""
