@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import VERBOSE, Text, be_verbose
+from frametool.cli.command import Text, say_if_verbose
 from frametool.cli.poses import is_inline, source_of
-from frametool.cli.stderr import say
 from frametool.errors import warn
 from frametool.formats.load import load_sources
 from frametool.formats.recordings import Recording
@@ -20,39 +19,32 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from frametool.documents.source import Source
     from frametool.formats.assembly import Rules
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
 
 def load_tree(argument: str, more: Sequence[str] = (), rules: Rules | None = None) -> FrameTree | TransformBuffer:
-    """Read the tree of an argument (a file, inline, `-`, or `.` for FRAMETOOL_TREE) and merge further files into it."""
-    if (argument, *more).count("-") > 1:
+    """Read the tree of an argument and merge further files into it."""
+    return load_sources(opened((argument, *more)), rules)
+
+
+def opened(arguments: Sequence[str]) -> list[Recording]:
+    """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline."""
+    if list(arguments).count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
-    return load_sources([_input(tree_file(each)) for each in (argument, *more)], rules)
+    if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
+        raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
+    return [
+        Recording.inline(source_of(each)) if is_inline(each) else announced(Recording(tree_file(each)))
+        for each in arguments
+    ]
 
 
-def _input(argument: str) -> Source | Recording:
-    """Take an inline tree as it stands, or open what the argument names."""
-    if is_inline(argument) or (argument == "-" and sys.stdin.isatty()):
-        return source_of(argument)
-    file = Recording(argument)
-    announce(file)
-    return file
-
-
-def announce(file: Recording) -> None:
+def announced(file: Recording) -> Recording:
     """Say what a file was taken for, if the command was asked to."""
-    context = click.get_current_context(silent=True)
-    if context is not None and context.meta.get(VERBOSE):
-        say(file.described)
-
-
-verbose_option = click.option(
-    "-v", "--verbose", is_flag=True, expose_value=False, callback=be_verbose,
-    help="say on stderr what each file was taken for",
-)  # fmt: skip
+    say_if_verbose(file.described)
+    return file
 
 
 def tree_file(argument: str) -> str:

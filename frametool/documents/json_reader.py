@@ -10,8 +10,9 @@ import re
 import sys
 
 from frametool.documents.limits import DEEPEST, MOST_CONTAINERS, too_much
-from frametool.documents.marks import END, LEAF, LIST, MAP
-from frametool.documents.source import Source, error_at, places_of
+from frametool.documents.marks import END, LEAF, LIST, MAP, repeated_key
+from frametool.documents.source import Source, error_at
+from frametool.errors import FormatError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -19,16 +20,20 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.documents.marks import Event
-    from frametool.errors import FormatError
 
 _BLANKS = re.compile(r"[ \t\n\r]*")
 _WORD = r'"[^"\\]*+(?:\\.[^"\\]*+)*+"|[{}\[\]]|[^\s{}\[\],:"]+'
-_ESCAPE = r"(?s)\\(?:u([0-9a-fA-F]{4})|.)"
+# up to \ud83d and the like without the other half of the pair
+_WHOLE = r"(?s)(?:[^\\]++|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(?!\\u[dD][89a-fA-F])\\.)*+"
 _BRACKETS = {"{": MAP, "[": LIST, "]": END, "}": END}
 
 
 class _RepeatedKey(Exception):
-    """Carry a key that stands twice in one object."""
+    """Report that a key stands twice in one object, or is empty."""
+
+
+class _NoJson(FormatError):
+    """Report a text that is no JSON at all."""
 
 
 def looks_like_json(text: str) -> bool:
@@ -42,16 +47,29 @@ def parse_json(source: Source) -> list[Any] | None:
     Numbers and truth values stay text, null is None.  Raises FormatError for what is JSON but must not be:
     a key twice, half a character, too deep, too much.
     """
+    try:
+        return strict_json(source)
+    except _NoJson:
+        return None
+
+
+def strict_json(source: Source) -> list[Any]:
+    """Return the values of a text that must be JSON; raises FormatError with the place where it is none."""
     if source.text.count("[") + source.text.count("{") > MOST_CONTAINERS:
         raise error_at(source, 0, too_much(0))
     try:
         values = _deeply_decoded(source)
     except _RepeatedKey:
-        raise _repeated(source) from None
-    except ValueError:
-        return None
-    if "\\u" in source.text:
-        _check_escapes(source)
+        raise repeated_key(source, json_events(source.text)) from None
+    except FormatError:
+        raise
+    except ValueError as error:
+        problem = getattr(error, "msg", str(error))
+        message = f"not JSON: {problem[:1].lower()}{problem[1:]}"
+        raise error_at(source, getattr(error, "pos", 0), message, _NoJson) from None
+    at = re.match(_WHOLE, source.text).end() if "\\u" in source.text else len(source.text)  # type: ignore[union-attr]
+    if at < len(source.text):
+        raise error_at(source, at, f"{source.text[at:at + 6]} is half a character; its other half is missing")
     if not _settle(values):
         raise _too_deep(source)
     return values
@@ -70,19 +88,6 @@ def _deeply_decoded(source: Source) -> list[Any]:
         return _decoded(source.text)
     finally:
         sys.setrecursionlimit(limit)
-
-
-def strict_json(source: Source) -> list[Any]:
-    """Return the values of a text that must be JSON; raises FormatError with the place where it is none."""
-    values = parse_json(source)
-    if values is not None:
-        return values
-    try:
-        _decoded(source.text)
-    except ValueError as error:
-        problem = getattr(error, "msg", str(error))
-        raise error_at(source, getattr(error, "pos", 0), f"not JSON: {problem[:1].lower()}{problem[1:]}") from None
-    return []
 
 
 def _decoded(text: str) -> list[Any]:
@@ -145,28 +150,6 @@ def json_events(text: str) -> Iterator[Event]:
             yield LEAF, word, token.start(), token.end(), "", 0
 
 
-def _repeated(source: Source) -> FormatError:
-    """Find the first key that its object holds twice, or that is empty."""
-    open_keys: list[dict[str, int] | None] = []
-    value_next = True
-    for kind, text, start, *_ in json_events(source.text):
-        if kind == END:
-            open_keys.pop()
-        elif kind == LEAF and open_keys and (keys := open_keys[-1]) is not None and not value_next:
-            if not text:
-                return error_at(source, start, "an empty key")
-            if text in keys:
-                ((line, column),) = places_of(source.text, [keys[text]])
-                return error_at(source, start, f"key {text!r} stands twice; first at {line}:{column}")
-            keys[text] = start
-            value_next = True
-            continue
-        elif kind != LEAF:
-            open_keys.append({} if kind == MAP else None)
-        value_next = not open_keys or open_keys[-1] is None
-    return error_at(source, 0, "a key stands twice")
-
-
 def _depths(text: str) -> Iterator[tuple[int, int]]:
     """Yield the depth and the offset of each list and map."""
     depth = 0
@@ -180,22 +163,3 @@ def _too_deep(source: Source) -> FormatError:
     """Find the bracket that is one too many."""
     at = next((start for depth, start in _depths(source.text) if depth > DEEPEST), 0)
     return error_at(source, at, too_much(DEEPEST))
-
-
-def _check_escapes(source: Source) -> None:
-    r"""Refuse \ud83d without its other half: a text that no file can hold."""
-    high = None
-    for escape in re.finditer(_ESCAPE, source.text):
-        code = int(escape[1] or "0", 16)
-        if high is not None and not (0xDC00 <= code < 0xE000 and escape.start() == high.end()):
-            raise _half(source, high)
-        if high is None and 0xDC00 <= code < 0xE000:
-            raise _half(source, escape)
-        high = escape if 0xD800 <= code < 0xDC00 else None
-    if high is not None:
-        raise _half(source, high)
-
-
-def _half(source: Source, escape: re.Match[str]) -> FormatError:
-    """Make the error for half a surrogate pair."""
-    return error_at(source, escape.start(), f"{escape[0]} is half a character; its other half is missing")

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from frametool.documents.source import error_at, places_of
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from typing import TypeAlias
+
+    from frametool.documents.source import Source
+    from frametool.errors import FormatError
 
     Path: TypeAlias = tuple[str | int, ...]
     # kind, text of a scalar, start, end, quote of a scalar or bracket of a container ("" for a block), column
@@ -65,3 +70,23 @@ def mark_of(path: Path, found: dict[Path, tuple[int, int]], *, key: bool) -> int
         if path[:length] in found:
             return found[path[:length]][not (key and length == len(path))]
     return 0
+
+
+def repeated_key(source: Source, events: Iterable[Event]) -> FormatError:
+    """Make the error for the first key that its map holds twice, or that is empty."""
+    opened: list[dict[str, int] | None] = [None]  # the keys of a map; None for a list
+    key_next = False
+    for kind, text, start, *_ in events:
+        keys = opened[-1]
+        if kind == END:
+            opened.pop()
+        elif key_next and keys is not None:
+            if not text or text in keys:
+                places = places_of(source.text, [keys.get(text, 0)])
+                said = "key {!r} stands twice; first at {}:{}".format(text, *places[0]) if text else "an empty key"
+                return error_at(source, start, said)
+            keys[text] = start
+        elif kind != LEAF:
+            opened.append({} if kind == MAP else None)
+        key_next = opened[-1] is not None and not (kind == LEAF and key_next)
+    return error_at(source, 0, "a key stands twice")

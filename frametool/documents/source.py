@@ -10,6 +10,7 @@ import re
 import sys
 from bisect import bisect_right
 from io import BufferedReader
+from typing import NamedTuple
 
 from frametool.errors import FileProblem, FormatError
 
@@ -31,15 +32,11 @@ _LINE_END = "\r\n|[\r\n\x85\u2028\u2029]"
 _WIDEST_SNIPPET = 100
 
 
-class Source:
-    """Hold a text under the name that messages use for it."""
+class Source(NamedTuple):
+    """A text under the name that messages use for it."""
 
-    __slots__ = ("name", "text")
-
-    def __init__(self, name: str, text: str) -> None:
-        """Keep name and text as they are."""
-        self.name = name
-        self.text = text
+    name: str
+    text: str
 
 
 def opened(path: str | PathLike[str]) -> BinaryIO:

@@ -19,8 +19,8 @@ from yaml.events import (
 
 from frametool.documents.collector import paused_collector
 from frametool.documents.limits import DEEPEST, MOST_CONTAINERS, too_much
-from frametool.documents.marks import END, LEAF, LIST, MAP, find_marks
-from frametool.documents.source import Source, error_at, places_of
+from frametool.documents.marks import END, LEAF, LIST, MAP, repeated_key
+from frametool.documents.source import Source, error_at
 from frametool.documents.yaml_errors import translated
 from frametool.documents.yaml_lines import put_back, split_run
 from frametool.errors import FormatError
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Any, TypeAlias
 
-    from frametool.documents.marks import Event, Path
+    from frametool.documents.marks import Event
 
     Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
@@ -188,16 +188,9 @@ class _Builder:
         if event.value == "":
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
         if event.value in current:
-            first = find_marks(yaml_events(self.source.text), [(*self._path(), event.value)])
-            ((line, column),) = places_of(self.source.text, [next(reversed(first.values()))[0]])
-            raise self._error(event, f"key {event.value!r} stands twice; first at {line}:{column}")
+            raise repeated_key(self.source, yaml_events(self.source.text))
         if not event.style:
             raise self._error(event, "merge keys (<<) are not supported; write the entries out")
-
-    def _path(self) -> Path:
-        """Return the path of what is being filled: the last index or key at each level."""
-        levels = [container for container, _ in self.open]
-        return tuple(len(level) - 1 if isinstance(level, list) else next(reversed(level)) for level in levels)
 
     def _repeat(self, event: AliasEvent, current: object, key: object) -> Value:
         """Return a copy of what the alias stands for, within the budget."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 
+from frametool.documents.json_writer import Verbatim
 from frametool.errors import ValueInvalid
 
 TYPE_CHECKING = False
@@ -40,6 +41,15 @@ def dump(value: Any, number: Callable[[float], str] = repr) -> str:
     return "".join(f"{line}\n" for line in _block(value, number))
 
 
+def flow(value: Any, number: Callable[[float], str] = repr) -> str:
+    """Write a value on one line, as it may stand inside brackets."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(key, value)}: {flow(each, number)}" for key, each in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(flow(each, number) for each in value) + "]"
+    return _scalar(value, number)
+
+
 def quoted(text: str) -> str:
     """Write a text as it is where that is safe, else in double quotes with escapes."""
     if text.isascii() and text.isidentifier() and len(text) <= _LONGEST_KEY and text.lower() not in _WORDS:
@@ -50,7 +60,7 @@ def quoted(text: str) -> str:
     return f'"{re.sub(_ESCAPED, _escape, text)}"'
 
 
-def key_text(key: str, beside: dict[str, Any]) -> str:
+def _key(key: str, beside: dict[str, Any]) -> str:
     """Write a key; y beside x is the coordinate, which no reader in use takes for a truth value."""
     return key if key == "y" and "x" in beside else quoted(key)
 
@@ -66,7 +76,7 @@ def _escape(match: re.Match[str]) -> str:
 def _scalar(value: Any, number: Callable[[float], str]) -> str:
     """Write what is neither a list nor a map."""
     if isinstance(value, str):
-        return quoted(value)
+        return str(value) if isinstance(value, Verbatim) else quoted(value)
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -87,24 +97,21 @@ def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
     if isinstance(value, dict):
         if len(value) > _WIDEST_FLOW_MAP or not all(_fits_flow(*item) for item in value.items()):
             return None
-        return "{" + ", ".join(f"{key_text(key, value)}: {_scalar(each, number)}" for key, each in value.items()) + "}"
-    if isinstance(value, (list, tuple)):
-        if any(isinstance(each, (dict, list, tuple)) for each in value):
-            return None
-        return "[" + ", ".join(_scalar(each, number) for each in value) + "]"
-    return _scalar(value, number)
+    elif isinstance(value, (list, tuple)) and any(isinstance(each, (dict, list, tuple)) for each in value):
+        return None
+    return flow(value, number)
 
 
 def _fits_flow(key: str, value: Any) -> bool:
     """Say whether an entry may stand in a map on one line."""
-    return isinstance(value, (int, float)) and len(key) <= _LONGEST_KEY
+    return isinstance(value, (int, float, Verbatim)) and len(key) <= _LONGEST_KEY
 
 
 def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:
     """Yield the lines of a list or map, not indented."""
     if isinstance(value, dict):
         for key, each in value.items():
-            yield from _entry(key, key_text(key, value), each, number)
+            yield from _entry(key, _key(key, value), each, number)
     else:
         for each in value:
             yield from _item(each, number)

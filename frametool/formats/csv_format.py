@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
 from frametool.grammar.result import carries_position, pose_numbers
+from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -62,15 +63,17 @@ def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:
     """Write rows under the columns of all of them."""
     if not rows:
         return ""
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    lines = [",".join(columns)]
-    lines += [",".join(_cell(row.get(column, ""), style) for column in columns) for row in rows]
-    return "\n".join(lines) + "\n"
+    columns = list(dict.fromkeys(name for each in rows for name in each))
+    return row(columns, style) + "".join(row([each.get(column, "") for column in columns], style) for each in rows)
+
+
+def row(cells: Iterable[Any], style: Style) -> str:
+    """Return one line of cells with its line end."""
+    return ",".join(_cell(value, style) for value in cells) + "\n"
 
 
 def _cell(value: Any, style: Style) -> str:
     """Write one cell, quoted where a reader would split it."""
     if isinstance(value, float):
         return style.number(value)
-    text = "" if value is None else str(value)
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
+    return quoted("" if value is None else str(value))

@@ -24,7 +24,6 @@ from functools import cached_property
 from frametool.documents.source import UTF16
 from frametool.errors import FormatError
 from frametool.formats import FORMATS, by_suffix, readers
-from frametool.ros.noise import NOISE
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -51,6 +50,8 @@ class Beginning:
     @cached_property
     def data_line(self) -> str:
         """Return the first line of data."""
+        from frametool.ros.noise import NOISE
+
         lines = (line for line in self.text.splitlines() if line.strip() and not line.startswith(("#", "---")))
         return next((line for line in lines if not NOISE(line)), "")
 

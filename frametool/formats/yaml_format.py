@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.yaml_writer import dump, key_text
+from frametool.documents.yaml_writer import dump, flow
 from frametool.grammar.result import tree_entries
 
 if TYPE_CHECKING:
@@ -33,19 +33,5 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 
 def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     """Return the tree in the list form, roots first."""
-    entries = "".join(f"  - {_flow(entry, style)}\n" for entry in tree_entries(tree, style))
+    entries = "".join(f"  - {flow(entry, style.number)}\n" for entry in tree_entries(tree, style))
     return f"frames:\n{entries}"
-
-
-def _flow(entry: dict[str, Any], style: Style) -> str:
-    """Write one entry on one line."""
-    return "{" + ", ".join(f"{key_text(key, entry)}: {_value(each, style)}" for key, each in entry.items()) + "}"
-
-
-def _value(value: Any, style: Style) -> str:
-    """Write a value as it may stand inside braces."""
-    if isinstance(value, dict):
-        return _flow(value, style)
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(each, style) for each in value) + "]"
-    return dump(value, style.number).rstrip("\n")

@@ -65,7 +65,7 @@ class Names(dict[str, str]):
         return name[1:]
 
 
-class Told(NamedTuple):
+class Remark(NamedTuple):
     """One sentence about a recording: the first line it is about, in words, and the rule of `check` that finds it."""
 
     line: int
@@ -84,29 +84,29 @@ class Tally:
         self.noise: list[tuple[int, str]] = []
         self.rough: list[int] = []
         self.others: dict[str, int] = {}
-        self.notes: dict[str, Told] = {}
+        self.notes: dict[str, Remark] = {}
 
     def note(self, note: Note, line: int) -> None:
         """Keep what was noted while reading; of rotations that had to be normalised only the lines."""
         if note.rule == "rounded":
             self.rough.append(line)
         else:
-            self.notes.setdefault(note.message, Told(line, note.message, note.rule))
+            self.notes.setdefault(note.message, Remark(line, note.message, note.rule))
 
-    def told(self) -> Iterator[Told]:
+    def told(self) -> Iterator[Remark]:
         """Yield one sentence for each kind of oddity."""
         if self.rough:
             count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
-            yield Told(self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised", "rounded")
+            yield Remark(self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised", "rounded")
         if self.noise:
             line, text = self.noise[0]
             count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
-            yield Told(line, f"{count} printed between messages skipped: {text!r}", "noise")
+            yield Remark(line, f"{count} printed between messages skipped: {text!r}", "noise")
         if self.others:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
-            yield Told(1, f"messages without transforms were left out: {kinds}", "odd")
+            yield Remark(1, f"messages without transforms were left out: {kinds}", "odd")
         for name in self.names.slashed:
-            self.notes.setdefault(slash_note(name), Told(1, slash_note(name), "slash"))
+            self.notes.setdefault(slash_note(name), Remark(1, slash_note(name), "slash"))
         yield from self.notes.values()
 
 

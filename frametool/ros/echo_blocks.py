@@ -30,44 +30,29 @@ NUMBER = "([-+0-9.eE]+)"
 WHOLE = " *([0-9]{1,20})"
 NAME = r"""([A-Za-z0-9_/][\w/.+-]*|"[^"\\\n]+"|'[^'\n]+')"""
 
-ROS2 = """\
-- header:
-    stamp:
-      sec:WHOLE
-      nanosec:WHOLE
-    frame_id: NAME
-  child_frame_id: NAME
-  transform:
-    translation:
-      x: NUMBER
-      y: NUMBER
-      z: NUMBER
-    rotation:
-      x: NUMBER
-      y: NUMBER
-      z: NUMBER
-      w: NUMBER
+FIELDS = """\
+header:
+  stamp:
+    sec:WHOLE
+    nanosec:WHOLE
+  frame_id: NAME
+child_frame_id: NAME
+transform:
+  translation:
+    x: NUMBER
+    y: NUMBER
+    z: NUMBER
+  rotation:
+    x: NUMBER
+    y: NUMBER
+    z: NUMBER
+    w: NUMBER
 """
-ROS1 = """\
-  -
-    header:
-      seq: [0-9]+
-      stamp:
-        secs:WHOLE
-        nsecs:WHOLE
-      frame_id: NAME
-    child_frame_id: NAME
-    transform:
-      translation:
-        x: NUMBER
-        y: NUMBER
-        z: NUMBER
-      rotation:
-        x: NUMBER
-        y: NUMBER
-        z: NUMBER
-        w: NUMBER
-"""
+ROS2 = "- " + FIELDS[:-1].replace("\n", "\n  ") + "\n"
+ROS1 = (
+    ("  -\n" + FIELDS[:-1]).replace("\n", "\n    ").replace("nanosec", "nsecs").replace(" sec:", " secs:")
+    .replace("header:", "header:\n      seq: [0-9]+") + "\n"
+)  # fmt: skip
 
 
 class Spelling(NamedTuple):

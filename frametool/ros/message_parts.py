@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path, Quaternion, Reading, Vector
 
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
+PARTS = "a TransformStamped has header, child_frame_id, transform"
 _INTEGER = r"(?a) *[-+]?\d{1,25}"
 _LEFT_OUT = "<(array|sequence) type: .*>"
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.grammar.readers import Misfit, as_mapping, within
 from frametool.grammar.rotation import read_rotation
 from frametool.ros import foxglove
-from frametool.ros.message_parts import frame_of, header_stamp, only, part, read_rigid, whole_list
+from frametool.ros.message_parts import PARTS, frame_of, header_stamp, only, part, read_rigid, whole_list
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,7 +25,6 @@ MESSAGE_KEYS = frozenset(("header", "linear", "force"))  # of messages that hold
 MARKS = frozenset(("child_frame_id", *LISTS))
 STALE = "euler_angles_degree"  # Apollo writes it beside the quaternion and does not keep it up to date
 BESIDE_LIST = ("timestamp",)  # of a FrameTransforms message
-PARTS = "a TransformStamped has header, child_frame_id, transform"
 STALE_DEGREES = 0.1
 
 

@@ -46,6 +46,8 @@ def run_table(
         raise FormatError("nothing in it", source=source)
     table, rest = open_table(first, delimiter, header=header, source=source)
     table = _as_tum(table, form, request)
+    if request.timed is not None and not request.timed.name:
+        request = request._replace(timed=None)  # rows have no header
     plan, layout = plan_table(table, request, source)
     taken = len(first) - len(rest)
     yield Outcome(table.opening(layout), lines=first.count(b"\n", 0, taken), size=taken)

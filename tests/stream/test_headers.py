@@ -76,7 +76,7 @@ def test_a_result_that_leaves_the_plane_is_a_bad_row_that_says_what_to_do() -> N
         b"x,y,z,roll,pitch,yaw\n1.0,2.0,1.0,0.0,0.0,0.0\n"
     )
     assert flow(b"x,y,z,yaw\n1,2,0,0\n", UP).text == b"x,y,z,yaw\n1.0,2.0,1.0,0.0\n"
-    assert flow(b"x,y,z,yaw\n1,2,0,0\n", STEP._replace(operation=Operation(right=(0, 0, 0, 0.6, 0, 0, 0.8)))).status == 1
+    assert flow(b"x,y,z,yaw\n1,2,0,0\n", STEP._replace(operation=Operation(right=((0, 0, 0, 0.6, 0, 0, 0.8),)))).status == 1
 
 
 def test_converting_a_pose_in_the_plane_adds_its_height() -> None:

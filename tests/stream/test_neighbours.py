@@ -14,7 +14,7 @@ from frametool.stream.request import Request
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-COMPOSE = Request(Operation(left=QUARTER, right=QUARTER))
+COMPOSE = Request(Operation(left=QUARTER, right=(QUARTER,)))
 SWAP = INVERT._replace(rename=lambda parent, name: (name, parent))
 TABLES = {
     "points": ("x,y,z", MOVE),
