@@ -108,11 +108,6 @@ class Transform(Batched):
         """The rotation."""
         return Rotation.of(*self._components[3:])
 
-    @property
-    def translation(self) -> Array:
-        """The translations, shape (..., 3), metres."""
-        return self.xyz
-
     def as_matrix(self) -> Array:
         """Return homogeneous matrices of shape (..., 4, 4)."""
         return dispatch.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
