@@ -10,14 +10,16 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, did_you_mean
+from frametool.errors import FormatError, ValueInvalid, did_you_mean
 from frametool.geometry.representations import NAMED, REPRESENTATIONS, notation
 from frametool.stream.faults import Misused
+from frametool.stream.row_layout import POINT, POSE, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.geometry.representations import Notation, Representation
+    from frametool.stream.request import Request
     from frametool.stream.row_layout import Unit
 
     Spot = tuple[int, str]  # a column's place, and the unit that its name says
@@ -309,6 +311,28 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
     raise _refusal(f"columns of {wanted} are wanted, found {found}; choose with --columns", source)
 
 
+def plain_pose(names: Sequence[str]) -> PoseColumns:
+    """Find the one point or pose among names without affixes, if there is one.
+
+    Raises ValueInvalid for several rotations or positions, and for a rotation that is there by half.
+    """
+    header = Header(names)
+    bare = ("", "")
+    header.found = {word: {bare: spots[bare]} if bare in spots else {} for word, spots in header.found.items()}
+    positions, rotations = find_positions(header), find_rotations(header, None)
+    if len(rotations) > 1 or len(positions) > 1:
+        what = "rotation" if len(rotations) > 1 else "position"
+        shown = " and ".join(each.shown for each in (rotations if len(rotations) > 1 else positions))
+        raise ValueInvalid(f"expected one {what}, found {shown}")
+    rotation = rotations[0] if rotations else None
+    if rotation is None and (half := _half_rotation(header, None)):
+        raise ValueInvalid(half.replace("columns", "keys").replace("choose with --columns", "leave it out"))
+    position = positions[0] if positions and not (rotation and rotation.whole) else None
+    if position is None and rotation and not rotation.whole:
+        position = _half_position(header, rotation)
+    return PoseColumns(position, rotation)
+
+
 def _refusal(reason: str, source: str) -> FormatError:
     return FormatError(reason, source=source, line=1)
 
@@ -408,6 +432,30 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
             break
         same += 1
     return position.suffix == rotation.suffix, same
+
+
+def row_shape(pose: PoseColumns, request: Request) -> Shape:
+    """Say what the numbers of a pose's columns mean."""
+    position, rotation = pose
+    unit = position.unit if position else None
+    if rotation is None or rotation.notation is None:
+        moved = request.operation.moves and request.kind != POSE
+        return Shape((request.kind or POINT) if moved else POSE, unit)
+    if request.kind not in ("", POSE) and request.operation.moves:
+        raise Misused(
+            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.kind}; "
+            "name the three with --columns"
+        )
+    form = rotation.notation
+    angles = form.representation.angles
+    said = [request.in_degrees(form) if each is None else each for each in rotation.degrees]
+    degrees = any(said[at] for at in angles if at not in rotation.absent)
+    radians_at = tuple(at for at in angles if degrees and not said[at])
+    first = 0 if unit is None else len(XYZ)
+    absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
+    if rotation.whole:
+        return Shape(POSE, None, form, degrees, whole=True)
+    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent)
 
 
 def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notation | None) -> PoseColumns:
