@@ -116,8 +116,10 @@ class Options(NamedTuple):
     tally: takes what is worth telling at the end
     report: takes the errors, and reading goes on behind them
     raw: messages are taken as tf2 receives them, unchecked
+    normalize: any non-zero quaternion and any matrix near a rotation is taken
     """
 
     tally: Tally
     report: Report = stop
     raw: bool = False
+    normalize: bool = False
