@@ -40,7 +40,10 @@ def say_error(error: FrametoolError, *, in_json: bool) -> None:
 
         tell(as_json(error))
         return
-    say(str(error))
+    first, *rest = str(error).split("\n") if error.many_lines else [str(error)]
+    say(first)
+    for line in rest:
+        tell(printable(line))
     if snippet := getattr(error, "snippet", ""):
         tell(snippet)
 

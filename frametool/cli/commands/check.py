@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Command
+from frametool.cli.command import FILE, Command, verbose_option
+from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import opened, verbose_option
+from frametool.cli.trees import opened
 from frametool.lint.findings import RULES, WRITERS
 from frametool.lint.rules import check
 
