@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid
+from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
@@ -76,7 +76,8 @@ def _edge(message: Any, number: int, path: str, options: Options) -> Edge:
     components = unit_components(tally, number, *numbers, normalize=options.normalize)
     if components is None or not parent or not child:
         problem = _complaint(parent, child, numbers, normalize=options.normalize)
-        raise FormatError(f"message {number}: {parent!r} -> {child!r}: {problem}", source=path, rule=problem.rule)
+        edge = f"{shown(parent)} -> {shown(child)}"
+        raise FormatError(f"message {number}: {edge}: {problem}", source=path, rule=problem.rule)
     stamp = message.header.stamp
     return Edge(parent, child, components, stamp.sec * BILLION + stamp.nanosec, number)
 

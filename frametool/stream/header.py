@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, ValueInvalid, did_you_mean
+from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import NAMED, REPRESENTATIONS, notation
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, Shape
@@ -210,7 +210,7 @@ def _position(header: Header, match: Match) -> Columns:
     if 0.0 in units:
         place, unit = next(spot for spot in match.spots if spot and spot[1] not in LENGTHS)
         known = ", ".join(filter(None, LENGTHS))
-        wrong = f"column {header.names[place]!r}: unknown unit {unit!r} of a length; known are {known}"
+        wrong = f"column {shown(header.names[place])}: unknown unit {shown(unit)} of a length; known are {known}"
         return columns._replace(unit=1.0, wrong=wrong)
     x, y, z = units
     return columns._replace(unit=x if x == y == z else (x, y, z))
@@ -286,7 +286,8 @@ def _rotation(header: Header, match: Match, row: Representation, given: Notation
         angle = at in row.angles
         if unit not in NO_UNIT and not (angle and unit in ANGLES):
             kind = "of an angle; known are deg, rad" if angle else "of a number that has none"
-            columns = columns._replace(wrong=f"column {header.names[match.place(at)]!r}: unknown unit {unit!r} {kind}")
+            name = shown(header.names[match.place(at)])
+            columns = columns._replace(wrong=f"column {name}: unknown unit {shown(unit)} {kind}")
         said.append(ANGLES.get(unit) if angle else None)
     units = {said[at] for at in row.angles if match.spots[at]}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
@@ -534,4 +535,4 @@ def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
             return list(range(low - 1, high))
         raise Misused(f"--columns: {word} is not within 1-{width}")
     near = did_you_mean(word, numbers)
-    raise Misused(f"--columns: no column {word!r}{near}; columns: {_listed(list(numbers) or [f'1-{width}'])}")
+    raise Misused(f"--columns: no column {shown(word)}{near}; columns: {_listed(list(numbers) or [f'1-{width}'])}")

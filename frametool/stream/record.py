@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, did_you_mean
+from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
@@ -108,7 +108,7 @@ def _nothing_in(document: Any) -> Misfit:
 
 def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
     """Build the error for keys that are nearly known."""
-    named = "; ".join(f"unknown key {key!r}{hint.replace('; ', ', ')}" for key, hint in near)
+    named = "; ".join(f"unknown key {shown(key)}{hint.replace('; ', ', ')}" for key, hint in near)
     choices = ", ".join(REPRESENTATIONS)
     return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (near[0][0],), key=True)
 
@@ -467,7 +467,7 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
             raise Misfit(f"{key} must be a frame's name, found nothing; {hint}", (*path, key))
         if text and found.text and text != found.text:
             where = ".".join(map(str, found.paths[0][-2:]))
-            raise Misfit(f"{key} says {text!r} and {where} says {found.text!r}; keep one", (*path, key))
+            raise Misfit(f"{key} says {shown(text)} and {where} says {shown(found.text)}; keep one", (*path, key))
         found = Name(found.text or text or None, (*found.paths, (*path, key)))
     return found
 

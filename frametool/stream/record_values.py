@@ -12,7 +12,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.json_writer import Verbatim
 from frametool.documents.nodes import parse_nodes
 from frametool.documents.source import Source, decode
-from frametool.errors import FormatError, FrametoolError, ValueInvalid, warn
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.tree_reader import tell
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats
@@ -121,7 +121,7 @@ def _answer(record: Record, request: Request, source: Source) -> Answer:
         parent, name = record.parent.text, record.name.text
         if request.rename is not None:
             if lost := lost_name(record, request):
-                warn(f"{source.name}: frame {lost!r} is left out: the frames of the result are not known")
+                warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
             parent, name = request.rename(parent, name)
         parts, _ = moved(record, _edge(record, request, source), record.values, request)
     except ValueInvalid as error:

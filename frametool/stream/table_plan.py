@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, alternatives
+from frametool.errors import FormatError, alternatives, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.stream.blocks import Plan
 from frametool.stream.faults import Misused
@@ -172,9 +172,9 @@ def _first_called(names: Sequence[str], table: Table) -> int | None:
 def _place(name: str, names: Sequence[str], source: str) -> int:
     """Return the place of a column; raises Misused for one that is not there, or twice."""
     if name not in names:
-        raise Misused(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
+        raise Misused(f"no column {shown(name)}{alternatives(name, names, 'columns')}", source=source, line=1)
     if names.count(name) > 1:
-        raise Misused(f"column {name!r} stands twice", source=source, line=1)
+        raise Misused(f"column {shown(name)} stands twice", source=source, line=1)
     return names.index(name)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ _MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
 _BARE_STAR = r"[-+]? ?\*"
 _UNITS = {"deg": "deg", "°": "deg", "rad": "rad"}
 _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
-LONGEST_SHOWN = 60
 
 
 class NotFinite(ValueInvalid):
@@ -97,14 +96,6 @@ def _degrees_of_pi(text: str, sign: str, factor: str | None, divisor: str | None
     if degrees == _INFINITE:
         raise NotFinite(f"{shown(text)} is not finite")
     return -degrees if sign == "-" else degrees
-
-
-def shown(text: str) -> str:
-    """Quote a text for a message: escaped, and cut to 60 characters, escapes included."""
-    kept = text[:LONGEST_SHOWN]
-    while len(repr(kept)) > LONGEST_SHOWN + 2:
-        kept = kept[:-1]
-    return repr(text) if kept == text else f"{kept!r}... ({len(text)} characters)"
 
 
 def explain_number(text: str) -> str:
