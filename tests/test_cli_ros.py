@@ -99,7 +99,9 @@ def test_echo_tells_of_times_without_data_and_goes_on(run: Run) -> None:
     found = run("echo", *BOTH, "map", "cam", "--start", "1699999999", "-f", "json", files=FILES)
     assert found.status == 3
     assert len(found.out.splitlines()) == 2
-    assert "2 times without data" in found.err
+    told = [json.loads(line) for line in found.err.splitlines()]
+    assert [each["error"] for each in told] == ["too_early", "times_skipped"]
+    assert (told[-1]["skipped"], told[-1]["asked"]) == (2, 4)
 
 
 @pytest.mark.parametrize("times", [("--start", "1800000000"), ("--stop", "0"), ("--start", "1", "--stop", "2")])

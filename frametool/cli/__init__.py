@@ -109,12 +109,12 @@ def _run(arguments: list[str]) -> int:
 
 def _usage(error: click.ClickException, arguments: list[str]) -> str:
     """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
-    from frametool.errors import SHOWN, quoted
+    from frametool.errors import SHOWN, shown
 
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
-        message = message.replace(repr(text), quoted(text)).replace(text, quoted(text)[1:-1])
+        message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
     if ctx is None or ctx.parent is None:

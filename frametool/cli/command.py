@@ -9,7 +9,7 @@ import click
 
 from frametool.cli.help import WithHelp
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid, quoted
+from frametool.errors import ValueInvalid, shown
 from frametool.formats import writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notation
@@ -62,7 +62,7 @@ class Utf8(Text):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse bytes that are no text."""
         if any("\ud800" <= each <= "\udfff" for each in str(value)):
-            self.fail(f"{quoted(value)} is not UTF-8 text", param, ctx)
+            self.fail(f"{shown(value)} is not UTF-8 text", param, ctx)
         return super().convert(value, param, ctx)
 
 

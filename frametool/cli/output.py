@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from frametool.cli.sink import writing
@@ -14,12 +15,15 @@ from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
+
+
+BATCH = 256  # poses
 
 
 class Output:
@@ -50,6 +54,24 @@ class Output:
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""
         self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))
+
+    def poses_as_they_come(self, results: Iterator[Result]) -> None:
+        """Write poses that have the same keys, in batches."""
+        self.pieces(self._batches(results))
+
+    def _batches(self, results: Iterator[Result]) -> Iterator[str]:
+        """Yield the text of some results after the other, short batches first.
+
+        In every form the text of several results begins with that of the first: what follows it is the batch's.
+        """
+        write_poses = self._module("frametool.view.pose_text").write_poses
+        size = 2
+        begin = list(islice(results, size))
+        yield write_poses(begin, self.style)
+        known = len(write_poses(begin[:1], self.style))
+        while batch := list(islice(results, size)):
+            yield write_poses([begin[0], *batch], self.style)[known:]
+            size = min(2 * size, BATCH)
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""

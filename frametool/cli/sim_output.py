@@ -15,14 +15,13 @@ from frametool.cli.command import TEXT, decorated
 from frametool.cli.sim_options import REACH
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.errors import FileProblem
+from frametool.errors import FileProblem, shown
 from frametool.formats import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.grammar.result import Style
 from frametool.sim.run_summary import RunSummary
 from frametool.sim.simulate import simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
-from frametool.text.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -10,7 +10,7 @@ import click
 
 from frametool.cli.command import Text, say_if_verbose
 from frametool.cli.poses import is_inline, source_of
-from frametool.errors import warn
+from frametool.errors import shown, warn
 from frametool.formats.load import load_sources
 from frametool.formats.recordings import Recording
 
@@ -83,6 +83,6 @@ FRAME = Frame()
 def frame_name(name: str, tree: FrameTree | TransformBuffer) -> str:
     """Return a frame's name without a leading `/`, which tf2 has given up, unless a frame is called so."""
     if name.startswith("/") and name not in tree.frames:
-        warn(f"frame {name!r}: the leading / is no part of a name and was left out")
+        warn(f"frame {shown(name)}: the leading / is no part of a name and was left out")
         return name[1:]
     return name

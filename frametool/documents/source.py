@@ -12,7 +12,7 @@ from bisect import bisect_right
 from io import BufferedReader
 from typing import NamedTuple
 
-from frametool.errors import FileProblem, FormatError
+from frametool.errors import FileProblem, FormatError, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
     except OSError as error:
         raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:
-        raise FileProblem(f"{name!r} is no file name: {error}") from None
+        raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 
 
 def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:

@@ -5,7 +5,7 @@ Knows nothing of text: whoever reads says where each edge stood.
 
 from __future__ import annotations
 
-from frametool.errors import BadTopology, FormatError, Tf2Warning, ValueInvalid, warn
+from frametool.errors import BadTopology, FormatError, Tf2Warning, ValueInvalid, shown, warn
 from frametool.frames.policy import Refused
 from frametool.frames.tree import FrameTree
 
@@ -27,17 +27,21 @@ if TYPE_CHECKING:
 
 
 class Rules:
-    """How moving frames are taken."""
+    """How frames are taken that move, and rotations that are none."""
 
-    __slots__ = ("keep_ns", "moving", "policy")
+    __slots__ = ("keep_ns", "moving", "normalize", "policy")
 
-    def __init__(self, *, moving: bool = False, policy: str = "frametool", keep_ns: int | None = None) -> None:
+    def __init__(
+        self, *, moving: bool = False, policy: str = "frametool", keep_ns: int | None = None, normalize: bool = False
+    ) -> None:
         """Keep the rules.
 
         moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still.
         policy, keep_ns: as TransformBuffer has them.
+        normalize: any non-zero quaternion and any matrix near a rotation is taken.
         """
         self.moving = moving
+        self.normalize = normalize
         self.policy = policy
         self.keep_ns = keep_ns
 
@@ -163,7 +167,7 @@ class Assembly:
             if each.child in standing:
                 raise self._placed(BadTopology("", rule="two-poses"), each.parent, each.child, each.later)
         for each in self._replaced[:most]:
-            what = f"frame {each.child!r} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
+            what = f"frame {shown(each.child)} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
             warn(f"{self.name}: {what}; the last one holds")
         if len(self._replaced) > most:
             warn(f"{self.name}: {len(self._replaced) - most} more stamps with two poses of one frame")
@@ -188,9 +192,10 @@ class Assembly:
         if error.rule not in ("cycle", "self") and known is not None and known[2] is not place:
             first, second = known[2].seen_from(place), place.seen_from(place)
             if known[0] != parent:
-                message = f"frame {child!r} has two parents: {known[0]!r} ({first}) and {parent!r} ({second})"
+                parents = f"{shown(known[0])} ({first}) and {shown(parent)} ({second})"
+                message = f"frame {shown(child)} has two parents: {parents}"
             elif error.rule == "two-poses":
-                message = f"frame {child!r} has two different poses in {parent!r}: {first} and {second}"
+                message = f"frame {shown(child)} has two different poses in {shown(parent)}: {first} and {second}"
             else:
                 message = f"{error}: {first} and {second}"
         return place.error(message, BadTopology)

@@ -22,7 +22,7 @@ import re
 from functools import cached_property
 
 from frametool.documents.source import UTF16
-from frametool.errors import FormatError
+from frametool.errors import FormatError, shown
 from frametool.formats import FORMATS, by_suffix, readers
 
 TYPE_CHECKING = False
@@ -158,7 +158,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "") -> tup
     if not begin.text.strip():
         raise FormatError("nothing in it", source=name or "stdin")
     raise FormatError(
-        f"cannot tell the form of {begin.first_line[:60]!r}; give --in {'|'.join(readers(*reads))}",
+        f"cannot tell the form of {shown(begin.first_line[:60])}; give --in {'|'.join(readers(*reads))}",
         source=name or "stdin",
         line=1,
     )

@@ -51,14 +51,17 @@ class Recording(InputFile):
         """Say what the file was taken for."""
         return f"{self.name}: {FORMATS[self.form].summary}"
 
-    def edges(self, report: Report = stop, *, tell: bool = True, raw: bool = False) -> Iterator[Edge]:
+    def edges(
+        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
+    ) -> Iterator[Edge]:
         """Yield the edges in the order they were written, then warn of what was odd.
 
         report: takes the errors, and reading goes on behind them where it can; without it the first one is raised.
         tell: without it what was odd is only kept, in `tally`.  raw: messages as tf2 receives them, unchecked.
+        normalize: take any non-zero quaternion and any matrix near a rotation.
         """
         try:
-            yield from import_module(FORMATS[self.form].reader).read(self, Options(self.tally, report, raw))
+            yield from import_module(FORMATS[self.form].reader).read(self, Options(self.tally, report, raw, normalize))
         finally:
             self.close()
         for told in self.tally.told() if tell else ():

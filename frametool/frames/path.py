@@ -5,7 +5,7 @@ Knows names and parents only. Trees that stand still and trees that move both as
 
 from __future__ import annotations
 
-from frametool.errors import BadTopology, NotConnected
+from frametool.errors import BadTopology, NotConnected, shown
 from frametool.geometry import rigid
 
 TYPE_CHECKING = False
@@ -49,8 +49,9 @@ def edges_between(target: str, source: str, parent_of: Callable[[str], str | Non
     source_line = to_root(source, parent_of)
     if target_line[-1] != source_line[-1]:
         raise NotConnected(
-            f"{target!r} and {source!r} are not connected: {target!r} hangs from root {target_line[-1]!r}, "
-            f"{source!r} from root {source_line[-1]!r}",
+            f"{shown(target)} and {shown(source)} are not connected: "
+            f"{shown(target)} hangs from root {shown(target_line[-1])}, "
+            f"{shown(source)} from root {shown(source_line[-1])}",
             target=target, source=source, target_root=target_line[-1], source_root=source_line[-1],
         )  # fmt: skip
     while target_line and source_line and target_line[-1] == source_line[-1]:

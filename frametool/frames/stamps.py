@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from operator import index
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -19,6 +19,10 @@ _NANOSECONDS = r"(?a)([-+]?\d{1,30})ns"
 FURTHEST_NS = 1 << 62  # differences of two such stamps fit into 64 bits; the year 2116
 
 
+class NotATime(ValueInvalid):
+    """Report a text that is written in no way that a time is."""
+
+
 def whole_stamp(stamp_ns: Any) -> int:
     """Check a stamp: an integer, never a float.
 
@@ -27,7 +31,7 @@ def whole_stamp(stamp_ns: Any) -> int:
     try:
         stamp = index(stamp_ns)
     except TypeError:
-        raise ValueInvalid(f"a stamp is integer nanoseconds, found {stamp_ns!r}") from None
+        raise ValueInvalid(f"a stamp is integer nanoseconds, found {shown(stamp_ns)}") from None
     if not -FURTHEST_NS < stamp < FURTHEST_NS:
         raise ValueInvalid(f"stamp {stamp} ns is beyond the year 2116; are these nanoseconds?")
     return stamp
@@ -42,14 +46,14 @@ def parse_stamp(text: str) -> int:
         return int(match[1])
     match = re.fullmatch(_SECONDS, text)
     if match is None or not (match[2] or match[3]) or len(text) > 60:
-        raise ValueInvalid(f"{text!r} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
+        raise NotATime(f"{shown(text)} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
     sign, whole, fraction, exponent = match[1], match[2], match[3] or "", int(match[4] or 0)
     shift = 9 - len(fraction) + exponent
     digits = int(whole + fraction)
     if shift < 0:
         digits, lost = divmod(digits, int(10**-shift))
         if lost:
-            raise ValueInvalid(f"{text!r} is finer than a nanosecond; round it")
+            raise ValueInvalid(f"{shown(text)} is finer than a nanosecond; round it")
         shift = 0
     stamp_ns = digits * int(10**shift)
     return -stamp_ns if sign == "-" else stamp_ns

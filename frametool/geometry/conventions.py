@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from frametool.errors import ValueInvalid, did_you_mean
+from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.rotation import Rotation
 
 HALF, ROOT = 0.5, sqrt(0.5)
@@ -46,5 +46,5 @@ def named_rotation(text: str) -> Rotation:
 def _named(name: str) -> Rotation:
     if name not in AXES:
         near = did_you_mean(name, AXES) or ";"
-        raise ValueInvalid(f"unknown axes {name!r}{near} axes: {', '.join(AXES)}")
+        raise ValueInvalid(f"unknown axes {shown(name)}{near} axes: {', '.join(AXES)}")
     return AXES[name][0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from frametool.errors import shown
 from frametool.grammar.readers import slash_note
 
 TYPE_CHECKING = False
@@ -101,7 +102,7 @@ class Tally:
         if self.noise:
             line, text = self.noise[0]
             count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
-            yield Remark(line, f"{count} printed between messages skipped: {text!r}", "noise")
+            yield Remark(line, f"{count} printed between messages skipped: {shown(text)}", "noise")
         if self.others:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
             yield Remark(1, f"messages without transforms were left out: {kinds}", "odd")
@@ -116,8 +117,10 @@ class Options(NamedTuple):
     tally: takes what is worth telling at the end
     report: takes the errors, and reading goes on behind them
     raw: messages are taken as tf2 receives them, unchecked
+    normalize: any non-zero quaternion and any matrix near a rotation is taken
     """
 
     tally: Tally
     report: Report = stop
     raw: bool = False
+    normalize: bool = False

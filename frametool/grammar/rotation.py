@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, overheard
+from frametool.errors import ValueInvalid, overheard, shown
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import (
     LIST,
@@ -178,9 +178,9 @@ def _read_one_by_one(
 def _unit_for(unit: str | None, text: str, form: Notation) -> str | None:
     """Refuse an angle whose own unit contradicts its key's."""
     if unit == "deg" and form.degrees is False and "pi" not in text:
-        raise ValueInvalid(f"{text!r} is in degrees, but {form.spec} says radians")
+        raise ValueInvalid(f"{shown(text)} is in degrees, but {form.spec} says radians")
     if form.degrees and unit is not None and (unit == "rad" or "pi" in text):
-        raise ValueInvalid(f"{text!r} is in radians, but {form.spec} says degrees")
+        raise ValueInvalid(f"{shown(text)} is in radians, but {form.spec} says degrees")
     return unit
 
 
@@ -233,8 +233,8 @@ def _take_parts(form: Notation, value: Any, parts: dict[str, int]) -> Spelled:
     """Take a mapping whose keys hold so many numbers each, beside `axes` where Euler axes are named."""
     named = form.representation.axes == NAMED_AXES
     if type(value) is not dict:
-        shown = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: a" for key, count in parts.items())
-        example = "axes: rzyx, " * named + shown
+        keys = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: a" for key, count in parts.items())
+        example = "axes: rzyx, " * named + keys
         raise Misfit(f"expected {{{example}}}, found {kind(value)}")
     expected = " and ".join([*["axes"] * named, *parts])
     if named:
@@ -242,7 +242,7 @@ def _take_parts(form: Notation, value: Any, parts: dict[str, int]) -> Spelled:
     known = {*parts, *(("axes", "order", "frame") if named else ())}
     if unknown := [key for key in value if key not in known]:
         hint = " (90deg has its unit)" if form.representation.angles and not named else ""
-        raise Misfit(f"unknown key {unknown[0]!r}; expected {expected}{hint}", (unknown[0],), key=True)
+        raise Misfit(f"unknown key {shown(unknown[0])}; expected {expected}{hint}", (unknown[0],), key=True)
     try:
         bound = _with_axes(form, value) if named else form
         held = [(key, value[key], count) for key, count in parts.items()]

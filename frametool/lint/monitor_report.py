@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from frametool.formats.recordings import Recording
 
 
-def monitor(files: Sequence[Recording], *ends: str) -> list[dict[str, Any]]:
+def monitor(files: Sequence[Recording], *ends: str, normalize: bool = False) -> list[dict[str, Any]]:
     """Describe every edge of some files; or, of `ends` (target, source), those between the two and their chain.
 
     Raises FormatError for files without transforms, UnknownFrame, NotConnected.
     """
     logs: dict[str, EdgeLog] = {}
     for file in files:
-        for edge in file.edges():
+        for edge in file.edges(normalize=normalize):
             if edge.parent is not None:
                 log = logs.get(edge.child) or logs.setdefault(edge.child, EdgeLog(edge.child))
                 log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from frametool.errors import shown
 from frametool.frames.edge_log import EdgeLog
 from frametool.frames.path import cycle_message
 from frametool.frames.stamps import BILLION, format_stamp
@@ -20,20 +21,20 @@ if TYPE_CHECKING:
 FLICKER = 3  # so many changes of parent are no picking up and putting down
 
 
-def check(files: Sequence[Recording]) -> list[Finding]:
+def check(files: Sequence[Recording], *, normalize: bool = False) -> list[Finding]:
     """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines."""
     findings: list[Finding] = []
-    findings += lint(_statements(files, findings))
+    findings += lint(_statements(files, findings, normalize=normalize))
     order = {file.name: index for index, file in enumerate(files)}
     return sorted(findings, key=lambda each: (order.get(each.source, 0), each.line, each.column))
 
 
-def _statements(files: Sequence[Recording], findings: list[Finding]) -> Iterator[Statement]:
+def _statements(files: Sequence[Recording], findings: list[Finding], *, normalize: bool) -> Iterator[Statement]:
     """Read all files; what cannot be read is found at once."""
     for file in files:
         before = len(findings)
         statement = None
-        for statement in read_all(file, findings.append):
+        for statement in read_all(file, findings.append, normalize=normalize):
             yield statement
         if statement is None and len(findings) == before:
             findings.append(Finding("empty", "no transforms in it", file.name, 1, 1))
@@ -95,13 +96,13 @@ def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
     children: dict[str, Child] = {}
     for number, seen in enumerate(everything):
         if seen.parent == seen.child:
-            yield seen.finding("self", f"frame {seen.child!r} is its own parent")
+            yield seen.finding("self", f"frame {shown(seen.child)} is its own parent")
             continue
         child = children.get(seen.child)
         if child is None:
             child = children[seen.child] = Child(seen, number)
         if seen.looks_w_first and (child.first is seen or not child.first.looks_w_first):
-            message = f"frame {seen.child!r} is turned by exactly 180 degrees about x; did you mean w first?"
+            message = f"frame {shown(seen.child)} is turned by exactly 180 degrees about x; did you mean w first?"
             yield seen.finding("w-first", message)
         child.add(seen, number)
     for child in children.values():
@@ -115,7 +116,7 @@ def _child(child: Child) -> Iterator[Finding]:
     name = child.first.child
     if child.stands is not None and child.moves:
         moving = next(each for each in (child.first, child.newest) if each.stamp_ns is not None)
-        yield moving.finding("static-and-moving", f"frame {name!r} moves, but stands still in {_at(child.stands)}")
+        yield moving.finding("static-and-moving", f"frame {shown(name)} moves, but stands still in {_at(child.stands)}")
     elif not child.moves:
         yield from _standing(child, name)
     else:
@@ -126,10 +127,10 @@ def _standing(child: Child, name: str) -> Iterator[Finding]:
     """Apply the rules about a frame that has one pose."""
     first = child.first
     if other := child.other_parent:
-        parents = f"{first.parent!r} ({_at(first)}) and {other.parent!r} ({_at(other)})"
-        yield other.finding("two-parents", f"frame {name!r} has two parents: {parents}")
+        parents = f"{shown(first.parent)} ({_at(first)}) and {shown(other.parent)} ({_at(other)})"
+        yield other.finding("two-parents", f"frame {shown(name)} has two parents: {parents}")
     elif other := child.other_pose:
-        message = f"frame {name!r} has two different poses in {first.parent!r}: {_at(first)} and {_at(other)}"
+        message = f"frame {shown(name)} has two different poses in {shown(first.parent)}: {_at(first)} and {_at(other)}"
         yield other.finding("two-poses", message)
 
 
@@ -138,27 +139,28 @@ def _moving(child: Child, name: str) -> Iterator[Finding]:
     if child.changes:
         yield _reparented(child, name)
     if child.again:
-        yield child.again[0].finding("repeated", f"frame {name!r}: the same sample again{_more(child.again)}")
+        yield child.again[0].finding("repeated", f"frame {shown(name)}: the same sample again{_more(child.again)}")
     if child.clashes:
         first = child.clashes[0]
         stamp = format_stamp(first.stamp_ns or 0)
         line = child.stamps[first.stamp_ns or 0][1]
         places = f"lines {line} and {first.line}"
-        message = f"frame {name!r} has two poses at {stamp}: {places}{_more(child.clashes)}"
+        message = f"frame {shown(name)} has two poses at {stamp}: {places}{_more(child.clashes)}"
         yield first.finding("repeated-stamp", message)
     if child.backward:
         first = child.backward[0]
-        message = f"frame {name!r}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
+        message = f"frame {shown(name)}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
         yield first.finding("backward", message + _more(child.backward))
     yield from _steps(child, name)
 
 
 def _reparented(child: Child, name: str) -> Finding:
     """Report a changing parent: of a frame that was picked up, or of publishers that disagree."""
-    parents = " -> ".join(repr(each.parent) for each in (child.first, *child.changes[:3]))
+    parents = " -> ".join(shown(each.parent) for each in (child.first, *child.changes[:3]))
     if len(child.changes) < FLICKER:
-        return child.changes[0].finding("reparented", f"frame {name!r} changes its parent: {parents}")
-    message = f"frame {name!r} changes its parent {len(child.changes)} times: {parents} ..; two publishers disagree"
+        return child.changes[0].finding("reparented", f"frame {shown(name)} changes its parent: {parents}")
+    times = f"{len(child.changes)} times: {parents} .."
+    message = f"frame {shown(name)} changes its parent {times}; two publishers disagree"
     return child.changes[0].finding("flicker", message)
 
 

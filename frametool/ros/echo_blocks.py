@@ -125,7 +125,8 @@ def _edge(texts: tuple[str, ...], tally: Tally, line: int) -> Edge | None:
 
 
 def unit_components(
-    tally: Tally, line: int, tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float
+    tally: Tally, line: int, tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float, *,
+    normalize: bool = False,
 ) -> Rigid | None:
     """Check the numbers of one transform as every door does; None for those that are refused there."""
     squared = x * x + y * y + z * z + w * w
@@ -134,8 +135,8 @@ def unit_components(
     if abs(squared - 1.0) <= quaternion.UNIT:
         return tx, ty, tz, x, y, z, w
     off = abs(squared**0.5 - 1.0)
-    if not off <= quaternion.TOLERATED:
+    if not off <= quaternion.TOLERATED and not (normalize and 0.0 < squared < INFINITE):
         return None
-    if off > quaternion.SILENT:
+    if off > quaternion.SILENT and not normalize:
         tally.rough.append(line)
     return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)

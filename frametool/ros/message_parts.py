@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from frametool.errors import shown
 from frametool.frames.stamps import BILLION
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation import read_rotation
@@ -22,7 +23,7 @@ def only(mapping: dict[str, Any], known: tuple[str, ...]) -> None:
     """Refuse keys that are not known."""
     for key in mapping:
         if key not in known:
-            raise Misfit(f"unknown key {key!r}; expected {', '.join(known)}", (key,), key=True)
+            raise Misfit(f"unknown key {shown(key)}; expected {', '.join(known)}", (key,), key=True)
 
 
 def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
@@ -73,7 +74,7 @@ def _whole(stamp: dict[str, Any], key: str) -> int:
 def whole_list(value: Any, what: str) -> list[Any]:
     """Take a value for a list that was printed whole; the tools cut long ones unless told otherwise."""
     if type(value) is str and re.fullmatch(_LEFT_OUT, value):
-        raise Misfit(f"the numbers are not there, only {value!r}: record without --no-arr (--noarr)")
+        raise Misfit(f"the numbers are not there, only {shown(value)}: record without --no-arr (--noarr)")
     if type(value) is not list:
         raise Misfit(f"expected {what}, found {kind(value)}")
     if "..." in value:

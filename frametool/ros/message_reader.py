@@ -62,7 +62,7 @@ def _message_edges(message: Message | FormatError, options: Options) -> Iterator
     numbers = _header_lines(message, len(found))
     still = messages.topic_of(message.value).endswith("tf_static")
     for (transform, path), line in zip(found, numbers, strict=True):
-        reading = Reading(message.source)
+        reading = Reading(message.source, normalize=options.normalize)
         try:
             parent, child, components, stamp_ns = _read(transform, reading, options, line)
         except Misfit as misfit:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from frametool.documents.chunks import lines
 from frametool.documents.source import Source
-from frametool.errors import FormatError, ValueInvalid
+from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
 from frametool.grammar.pose import Pose
@@ -93,7 +93,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         for number, line in enumerate(piece.text.split("\n"), piece.line):
             if not line.strip() or line.lstrip().startswith("#"):
                 continue
-            reading = Reading(Source(file.name, line))
+            reading = Reading(Source(file.name, line), normalize=options.normalize)
             try:
                 pose = read_call(line, reading)
             except ValueInvalid as error:
@@ -131,7 +131,7 @@ def _flags(words: Sequence[str]) -> dict[str, str]:
     for word in rest:
         name, equals, value = word.removeprefix("--").partition("=")
         if not word.startswith("--") or name not in FLAGS:
-            raise ValueInvalid(f"unknown argument {word!r}; the flags are --{', --'.join(FLAGS)}")
+            raise ValueInvalid(f"unknown argument {shown(word)}; the flags are --{', --'.join(FLAGS)}")
         found[name] = value if equals else next(rest, "")
         if not found[name]:
             raise ValueInvalid(f"not enough arguments for --{name}")
@@ -174,5 +174,5 @@ def _pose(
     if not parent or not child:
         raise ValueInvalid(f"an empty frame name; {CALL} takes {_FORMS}")
     if parent == child:
-        raise ValueInvalid(f"frame {child!r} is its own parent", rule="self")
+        raise ValueInvalid(f"frame {shown(child)} is its own parent", rule="self")
     return Pose((x, y, z), turned, child, parent)

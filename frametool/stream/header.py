@@ -10,14 +10,16 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, did_you_mean
+from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import NAMED, REPRESENTATIONS, notation
 from frametool.stream.faults import Misused
+from frametool.stream.row_layout import POINT, POSE, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.geometry.representations import Notation, Representation
+    from frametool.stream.request import Request
     from frametool.stream.row_layout import Unit
 
     Spot = tuple[int, str]  # a column's place, and the unit that its name says
@@ -208,7 +210,7 @@ def _position(header: Header, match: Match) -> Columns:
     if 0.0 in units:
         place, unit = next(spot for spot in match.spots if spot and spot[1] not in LENGTHS)
         known = ", ".join(filter(None, LENGTHS))
-        wrong = f"column {header.names[place]!r}: unknown unit {unit!r} of a length; known are {known}"
+        wrong = f"column {shown(header.names[place])}: unknown unit {shown(unit)} of a length; known are {known}"
         return columns._replace(unit=1.0, wrong=wrong)
     x, y, z = units
     return columns._replace(unit=x if x == y == z else (x, y, z))
@@ -284,7 +286,8 @@ def _rotation(header: Header, match: Match, row: Representation, given: Notation
         angle = at in row.angles
         if unit not in NO_UNIT and not (angle and unit in ANGLES):
             kind = "of an angle; known are deg, rad" if angle else "of a number that has none"
-            columns = columns._replace(wrong=f"column {header.names[match.place(at)]!r}: unknown unit {unit!r} {kind}")
+            name = shown(header.names[match.place(at)])
+            columns = columns._replace(wrong=f"column {name}: unknown unit {shown(unit)} {kind}")
         said.append(ANGLES.get(unit) if angle else None)
     units = {said[at] for at in row.angles if match.spots[at]}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
@@ -307,6 +310,28 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
     candidates = "; ".join(each.shown for each in (*positions, *rotations)[:MOST_SHOWN])
     found = candidates or f"none among {_listed(names)}"
     raise _refusal(f"columns of {wanted} are wanted, found {found}; choose with --columns", source)
+
+
+def plain_pose(names: Sequence[str]) -> PoseColumns:
+    """Find the one point or pose among names without affixes, if there is one.
+
+    Raises ValueInvalid for several rotations or positions, and for a rotation that is there by half.
+    """
+    header = Header(names)
+    bare = ("", "")
+    header.found = {word: {bare: spots[bare]} if bare in spots else {} for word, spots in header.found.items()}
+    positions, rotations = find_positions(header), find_rotations(header, None)
+    if len(rotations) > 1 or len(positions) > 1:
+        what = "rotation" if len(rotations) > 1 else "position"
+        shown = " and ".join(each.shown for each in (rotations if len(rotations) > 1 else positions))
+        raise ValueInvalid(f"expected one {what}, found {shown}")
+    rotation = rotations[0] if rotations else None
+    if rotation is None and (half := _half_rotation(header, None)):
+        raise ValueInvalid(half.replace("columns", "keys").replace("choose with --columns", "leave it out"))
+    position = positions[0] if positions and not (rotation and rotation.whole) else None
+    if position is None and rotation and not rotation.whole:
+        position = _half_position(header, rotation)
+    return PoseColumns(position, rotation)
 
 
 def _refusal(reason: str, source: str) -> FormatError:
@@ -410,6 +435,30 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
     return position.suffix == rotation.suffix, same
 
 
+def row_shape(pose: PoseColumns, request: Request) -> Shape:
+    """Say what the numbers of a pose's columns mean."""
+    position, rotation = pose
+    unit = position.unit if position else None
+    if rotation is None or rotation.notation is None:
+        moved = request.operation.moves and request.kind != POSE
+        return Shape((request.kind or POINT) if moved else POSE, unit)
+    if request.kind not in ("", POSE) and request.operation.moves:
+        raise Misused(
+            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.kind}; "
+            "name the three with --columns"
+        )
+    form = rotation.notation
+    angles = form.representation.angles
+    said = [request.in_degrees(form) if each is None else each for each in rotation.degrees]
+    degrees = any(said[at] for at in angles if at not in rotation.absent)
+    radians_at = tuple(at for at in angles if degrees and not said[at])
+    first = 0 if unit is None else len(XYZ)
+    absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
+    if rotation.whole:
+        return Shape(POSE, None, form, degrees, whole=True)
+    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent)
+
+
 def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notation | None) -> PoseColumns:
     """Take columns by name or by position from 1 (`2-8`): x y z, a rotation's, or first the one and then the other.
 
@@ -486,4 +535,4 @@ def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
             return list(range(low - 1, high))
         raise Misused(f"--columns: {word} is not within 1-{width}")
     near = did_you_mean(word, numbers)
-    raise Misused(f"--columns: no column {word!r}{near}; columns: {_listed(list(numbers) or [f'1-{width}'])}")
+    raise Misused(f"--columns: no column {shown(word)}{near}; columns: {_listed(list(numbers) or [f'1-{width}'])}")

@@ -23,6 +23,7 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 TURN = 6.283185307179586
 TO_DEGREES = 180.0 / 3.141592653589793
 FLAT = 1e-9  # radians, metres: what a number without a column may be
+LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
 Unit: TypeAlias = float | tuple[float, float, float]  # how many make a metre, where they differ of x, y, z each
 
 
@@ -72,11 +73,16 @@ class Shape(NamedTuple):
         return rotation + (self.unit is not None) * 3
 
     @property
+    def position_size(self) -> int:
+        """Count the numbers of the position in a row."""
+        return 0 if self.whole or self.unit is None else 3 - sum(place < 3 for place in self.absent)
+
+    @property
     def rotation_at(self) -> tuple[int, ...]:
         """Return where in a row the rotation's numbers stand."""
         if self.joined:
             return tuple(self.joined.split(range(self.own_size))[1])
-        return tuple(range((self.unit is not None) * 3 - sum(place < 3 for place in self.absent), self.own_size))
+        return tuple(range(self.position_size, self.own_size))
 
     def in_degrees(self, place: int) -> bool | None:
         """Tell whether a row's number is an angle in degrees; None if it is no angle."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, warn
+from frametool.errors import FormatError, shown, warn
 from frametool.stream.header import has_names_of_ours
 from frametool.stream.output_columns import NAMED
 from frametool.stream.rows import Block, Broken
@@ -123,7 +123,7 @@ def _names(cells: Sequence[bytes], source: str) -> tuple[str, ...]:
     """Return the names of columns; a quote within one opens nothing, which is said."""
     for cell in cells:
         if b'"' in cell and not cell.strip().startswith(b'"'):
-            warn(f"{source}:1: the quote in the name {_unquoted(cell)!r} opens nothing and is taken as it stands")
+            warn(f"{source}:1: the quote in the name {shown(_unquoted(cell))} opens nothing and is taken as it stands")
     return tuple(map(_unquoted, cells))
 
 

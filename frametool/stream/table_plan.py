@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, alternatives
+from frametool.errors import FormatError, alternatives, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.stream.blocks import Plan
 from frametool.stream.faults import Misused
-from frametool.stream.header import XYZ, PoseColumns, find_poses, named_pose
+from frametool.stream.header import XYZ, PoseColumns, find_poses, named_pose, row_shape
 from frametool.stream.output_columns import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
-from frametool.stream.row_layout import POINT, POSE, Shape, Target
+from frametool.stream.row_layout import POSE, Shape, Target
 from frametool.stream.table_names import rename_of
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
         raise FormatError(wrong, source=source, line=1)
-    shapes = tuple(_shape(pose, request) for pose in poses)
+    shapes = tuple(row_shape(pose, request) for pose in poses)
     target = _target(shapes, request)
     places = tuple(place for pose in poses for columns in pose if columns for place in columns.places)
     frames = _frame_columns(table, request, source)
@@ -106,30 +106,6 @@ def _is_whole(notations: Sequence[Notation]) -> bool:
     return len(notations) == 1 and notations[0].representation.whole is not None
 
 
-def _shape(pose: PoseColumns, request: Request) -> Shape:
-    """Say what the numbers of a pose's columns mean."""
-    position, rotation = pose
-    unit = position.unit if position else None
-    if rotation is None or rotation.notation is None:
-        moved = request.operation.moves and request.kind != POSE
-        return Shape((request.kind or POINT) if moved else POSE, unit)
-    if request.kind not in ("", POSE) and request.operation.moves:
-        raise Misused(
-            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.kind}; "
-            "name the three with --columns"
-        )
-    form = rotation.notation
-    angles = form.representation.angles
-    said = [request.in_degrees(form) if each is None else each for each in rotation.degrees]
-    degrees = any(said[at] for at in angles if at not in rotation.absent)
-    radians_at = tuple(at for at in angles if degrees and not said[at])
-    first = 0 if unit is None else len(XYZ)
-    absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
-    if rotation.whole:
-        return Shape(POSE, None, form, degrees, whole=True)
-    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent)
-
-
 def _target(shapes: Sequence[Shape], request: Request) -> Target:
     """Choose how results are written: as they were read unless told."""
     shape = shapes[0] if shapes else Shape(POSE)
@@ -196,9 +172,9 @@ def _first_called(names: Sequence[str], table: Table) -> int | None:
 def _place(name: str, names: Sequence[str], source: str) -> int:
     """Return the place of a column; raises Misused for one that is not there, or twice."""
     if name not in names:
-        raise Misused(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
+        raise Misused(f"no column {shown(name)}{alternatives(name, names, 'columns')}", source=source, line=1)
     if names.count(name) > 1:
-        raise Misused(f"column {name!r} stands twice", source=source, line=1)
+        raise Misused(f"column {shown(name)} stands twice", source=source, line=1)
     return names.index(name)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import frametool
-from frametool.errors import FrametoolWarning, Tf2Warning, heard_by, overheard, quoted, warn
+from frametool.errors import FrametoolWarning, Tf2Warning, heard_by, overheard, shown, warn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,8 +82,8 @@ def test_the_innermost_listener_hears_a_warning() -> None:
 @pytest.mark.parametrize(
     "text", ["", "a", "'", "\"'" * 40, "\x1b[31m" * 20, "x" * 60, "x" * 10**6, "\0" * 61, "\U0010ffff" * 30, "\udcff"]
 )
-def test_what_is_quoted_is_one_short_printable_line(text: str) -> None:
-    assert quoted(text).isprintable()
-    assert len(quoted(text)) <= 60
+def test_what_is_shown_is_one_short_printable_line(text: str) -> None:
+    assert shown(text).isprintable()
+    assert len(shown(text).removesuffix(f"... ({len(text)} characters)")) <= 60
     if len(repr(text)) <= 60:
-        assert quoted(text) == repr(text)
+        assert shown(text) == repr(text)

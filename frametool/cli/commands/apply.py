@@ -13,7 +13,7 @@ from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.documents.source import Source
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
@@ -217,7 +217,8 @@ def _settled(own: str | None, source: str | None) -> str | None:
     """Decide which frame a record is given in: where both it and the command say, they must agree."""
     if own and source is not None and own != source:
         raise ValueInvalid(
-            f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame"
+            f"a record is given in {shown(own)}, not in {shown(source)}; "
+            "leave SOURCE out to use each record's own frame"
         )
     return own or source
 

@@ -11,9 +11,9 @@ from frametool.cli.leader import leader_of
 from frametool.cli.sim_options import LAW, LEADER, MAX_ANGULAR, MAX_LINEAR, RATE, REACH, SEED, SPAWN, Duration
 from frametool.cli.sim_output import check_files, format_options, style_of, suffix_of
 from frametool.cli.sink import writing
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.sim.step_writer import table
-from frametool.text.numbers import parse_number, shown
+from frametool.text.numbers import parse_number
 
 MOST = 10_000  # values of one gain
 
