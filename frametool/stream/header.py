@@ -415,10 +415,12 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notati
 
     Raises Misused for names that are not there, or a count that says nothing.
     """
-    numbers = {name: place for place, name in reversed(list(enumerate(names or ())))}
+    numbers: dict[str, int] = {}
+    for place, name in enumerate(names or ()):
+        numbers.setdefault(name, place)
     places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
     header = Header(names or [f"column {place + 1}" for place in range(width)])
-    if twice := sorted({header.names[place] for place in places if places.count(place) > 1}):
+    if twice := sorted(header.names[place] for place, count in Counter(places).items() if count > 1):
         raise Misused(f"--columns: {', '.join(twice)} stands twice")
     count, rotation = _chosen_rotation(header, places, given)
     if count == len(places):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError
 from frametool.stream.blocks import Run, State
-from frametool.stream.faults import Fault
+from frametool.stream.faults import NULL, Fault
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.table import UNCLOSED, open_table, table_block
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
     from frametool.text.lines import Source
 
-DELIMITERS = {"csv": b",", "tsv": b"\t", "columns": b"", "tum": b""}
+DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b""}
 
 
 def run_table(
@@ -101,7 +101,7 @@ class TableWork:
         return done._replace(faults=[*done.faults, fault])
 
     def _done(self, text: bytes) -> Outcome:
-        block = table_block(self.table, self.layout, text, self.naming)
+        block = table_block(self.table, self.layout, text, self.naming, nulls=self.plan.on_error == NULL)
         run = Run(self.plan, block, self.state)
         faults = run.faults()
         notes = [RowNote.of_degrees(block.line_of(row), angle) for row, angle in run.doubted[:1]]
