@@ -143,9 +143,8 @@ def _stacked(lines: Sequence[NumberLine]) -> list[NumberLine]:
 
 def _number(value: float, style: Style) -> str:
     """Write a number for a person: some decimals in an overview, all digits of what was asked for, no minus zero."""
-    if style.precision is not None or style.full or len(style.notations) == 1:
-        text = style.number(value + 0.0)
-    else:
+    text = style.number(value + 0.0)
+    if style.precision is None and not style.full and len(style.notations) != 1:
         text = f"{value:.{DECIMALS}f}" if abs(value) < ENDLESS else f"{value:.{DECIMALS}e}"
     return text.removeprefix("-") if not float(text) else text
 
