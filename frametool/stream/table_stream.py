@@ -95,7 +95,7 @@ class TableWork:
     """Turn one block of a table after the other into its outcome; keeps what one block leaves for the next."""
 
     def __init__(self, table: Table, plan: Plan, layout: Layout, naming: Naming, unasked: Timed | None) -> None:
-        """Begin before the first row; `unasked` are the stamps that rows have and nobody asked for."""
+        """Take the plan of a table; `unasked` are the stamps that rows have and nobody asked for."""
         self.table = table
         self.plan = plan
         self.layout = layout
