@@ -65,6 +65,9 @@ FORMATS = {
     "tsv": Format(
         "tab-separated values with a header", (".tsv", ".tab"), reads=("rows",), signs=(("header", r".*\t"),)
     ),
+    "semicolon": Format(
+        "CSV with semicolons and a header", reads=("rows",), signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),)
+    ),
     "columns": Format("columns between blanks, # comments", reads=("rows",), signs=(("header", r"#|\s*\S+\s+\S"),)),
     "tum": Format("trajectory: t x y z qx qy qz qw", suffixes=(".tum",), reads=("rows",)),
     "echo": Format(

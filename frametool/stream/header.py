@@ -187,7 +187,7 @@ def has_names_of_ours(names: Iterable[str]) -> bool:
 
 def find_positions(header: Header) -> list[Columns]:
     """Return every three columns that can be a position."""
-    named = {(match.prefix, match.suffix) for match in _named_maps(header) if match.prefix or match.suffix}
+    named = {(match.prefix, match.suffix) for match in _named_maps(header)}
     turns: dict[int, set[int]] = {}
     for at, match in enumerate(match for row in REPRESENTATIONS.values() for match in header.match(row.columns)):
         for place in match.places:
@@ -224,7 +224,7 @@ def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> lis
     found += [
         _rotation(header, match, row, given)
         for row in rows if row.shape == NAMED
-        for match in _named_maps(header) if given is not None or match.prefix or match.suffix
+        for match in _named_maps(header, bare=given is not None)
     ]  # fmt: skip
     return _without_strays(found) or [each for row in rows for each in _standing_alone(row, header, given)]
 
@@ -238,11 +238,12 @@ def _searched(given: Notation | None) -> list[Representation]:
     return [row for at, row in enumerate(rows) if set(row.columns) not in [set(each.columns) for each in rows[:at]]]
 
 
-def _named_maps(header: Header) -> Iterator[Match]:
-    """Yield the columns called as the keys of a map: x y z w of a quaternion."""
+def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Match]:
+    """Yield the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
     for row in REPRESENTATIONS.values():
-        if row.shape == NAMED:
-            yield from header.match(row.names)
+        for match in header.match(row.names) if row.shape == NAMED else ():
+            if bare or match.prefix or match.suffix or len(header.names) == len(row.names):
+                yield match
 
 
 def _without_strays(found: list[Columns]) -> list[Columns]:
@@ -349,10 +350,12 @@ def _only_pose(
 ) -> PoseColumns:
     """Put the one position and the one rotation together; raise FormatError where a rotation is there by half."""
     rotation = rotations[0] if rotations else None
-    position = positions[0] if positions and not (rotation and rotation.whole) else None
+    taken = set(rotation.places) if rotation else set()
+    whole = rotation is not None and rotation.whole
+    position = positions[0] if positions and not whole and taken.isdisjoint(positions[0].places) else None
     if rotation is None and (half := _half_rotation(header, given)):
         raise _refusal(half, source)
-    if position is None and rotation and not rotation.whole:
+    if position is None and rotation and not whole:
         position = _half_position(header, rotation)
     if position is rotation is None:
         raise _refusal(
@@ -366,6 +369,9 @@ def _half_rotation(header: Header, given: Notation | None) -> str:
     for row in REPRESENTATIONS.values() if given is None else ():
         if not row.searched and (match := next(header.match(row.columns), None)):
             return f"columns {header.columns(match).shown} may be {row.name}; then add --from {row.spelling}"
+    if given is None and (match := next(_named_maps(header, bare=True), None)):
+        shown = header.columns(match).shown
+        return f"{shown} may be a quaternion or a point and a number; add --from xyzw, or --columns with the three"
     for row in _searched(given):
         for match in header.match_partly(row.columns):
             if len(match.places) > 1 or (row.alone and header.is_plain(match)):
@@ -464,10 +470,12 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notati
 
     Raises Misused for names that are not there, or a count that says nothing.
     """
-    numbers = {name: place for place, name in reversed(list(enumerate(names or ())))}
+    numbers: dict[str, int] = {}
+    for place, name in enumerate(names or ()):
+        numbers.setdefault(name, place)
     places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
     header = Header(names or [f"column {place + 1}" for place in range(width)])
-    if twice := sorted({header.names[place] for place in places if places.count(place) > 1}):
+    if twice := sorted(header.names[place] for place, count in Counter(places).items() if count > 1):
         raise Misused(f"--columns: {', '.join(twice)} stands twice")
     count, rotation = _chosen_rotation(header, places, given)
     if count == len(places):

@@ -180,7 +180,8 @@ class Splicer:
     def _members(self, first: int) -> list[tuple[Piece, ...]]:
         """Return one member for each key of a notation, and the flag of a lock."""
         notations = self.target.notations
-        style = Style("json", tuple(form for form, _ in notations), degrees=any(degrees for _, degrees in notations))
+        degrees = any(degrees for form, degrees in notations if form.degrees is None)  # what bare angles are
+        style = Style("json", tuple(form for form, _ in notations), degrees=degrees)
         position = SAMPLE[:3] if self.target.whole else None
         members = []
         for key, value in Result(Pose(position, SAMPLE)).mapping(style).items():
