@@ -11,7 +11,8 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
-from frametool.geometry.representations import NAMED, REPRESENTATIONS, notation
+from frametool.geometry.representations import NAMED, REPRESENTATIONS
+from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, Shape
 
@@ -293,9 +294,9 @@ def _rotation(header: Header, match: Match, row: Representation, given: Notation
     units = {said[at] for at in row.angles if match.spots[at]}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
     axes = f":{given.axes}" if given is not None and given.axes else ""
-    form = given if given is not None and row.angles and not suffix else notation(f"{row.name}{suffix}{axes}")
+    notation = given if given is not None and row.angles and not suffix else parse_notation(f"{row.name}{suffix}{axes}")
     absent = tuple(at for at, spot in enumerate(match.spots) if spot is None)
-    return columns._replace(notation=form, degrees=tuple(said), absent=absent)
+    return columns._replace(notation=notation, degrees=tuple(said), absent=absent)
 
 
 def find_poses(names: Sequence[str], given: Notation | None, count: int, source: str) -> list[PoseColumns]:

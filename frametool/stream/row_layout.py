@@ -173,8 +173,8 @@ class Target(NamedTuple):
         x, y, z, w = parts[3:7]
         unit = quaternion.unit(x, y, z, w, xp)
         written = [
-            form.from_quaternion(*unit, xp, degrees=degrees, keep_sign=self.keep_sign)
-            for form, degrees in self.notations
+            notation.from_quaternion(*unit, xp, degrees=degrees, keep_sign=self.keep_sign)
+            for notation, degrees in self.notations
         ]
         if self.whole and (whole := self.notations[0][0].representation.whole):
             return list(whole.join(parts[:3], written[0]))
@@ -188,7 +188,7 @@ class Target(NamedTuple):
         """Name the numbers of all notations as columns; of a whole pose all of them."""
         if self.whole and (whole := self.notations[0][0].representation.whole):
             return list(whole.columns)
-        return [name for form, degrees in self.notations for name in form.columns_in(degrees=degrees)]
+        return [name for notation, degrees in self.notations for name in notation.columns_in(degrees=degrees)]
 
     @property
     def size(self) -> int:
@@ -198,9 +198,9 @@ class Target(NamedTuple):
     def angle_columns(self) -> list[tuple[int, float]]:
         """Return which of the numbers are angles, each with the size of a full turn."""
         found, first = [], 0 if self.unit is None else 3
-        for form, degrees in self.notations:
-            found += [(first + index, 360.0 if degrees else TURN) for index in form.representation.angles]
-            first += len(form.representation.columns)
+        for notation, degrees in self.notations:
+            found += [(first + index, 360.0 if degrees else TURN) for index in notation.representation.angles]
+            first += len(notation.representation.columns)
         start = 0 if self.unit is None else 3
         return [
             (place - sum(each < place for each in self.absent), TURN if place - start in self.radians_at else period)
@@ -210,7 +210,7 @@ class Target(NamedTuple):
 
     def locked(self, parts: Components) -> Any:
         """Tell whether Euler angles among the notations are not unique; None where there are none."""
-        axes = next((axes for form, _ in self.notations if (axes := form.euler_axes)), None)
+        axes = next((axes for notation, _ in self.notations if (axes := notation.euler_axes)), None)
         if axes is None or len(parts) < 7:
             return None
         x, y, z, w = parts[3:7]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, alternatives, shown
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.blocks import Plan
 from frametool.stream.faults import Misused
 from frametool.stream.header import XYZ, PoseColumns, find_poses, named_pose, row_shape
@@ -115,16 +116,16 @@ def _target(shapes: Sequence[Shape], request: Request) -> Target:
     if request.notations or shape.notation is None:
         notations = request.notations
         if not notations and not _only_turns_around(request):
-            notations = (notation("quaternion"),)
-        forms = tuple((form, request.in_degrees(form)) for form in notations)
+            notations = (parse_notation("quaternion"),)
+        written = tuple((notation, request.in_degrees(notation)) for notation in notations)
         whole = placed and _is_whole(notations)
         unit = None if whole or not (placed or _shifts(request)) else shape.unit or 1.0
-        return Target(unit, forms, request.keep_sign, whole)
+        return Target(unit, written, request.keep_sign, whole)
     unit = None if shape.whole or not (placed or _shifts(request)) else shape.unit or 1.0
     first = len(XYZ) * (unit is not None and shape.unit is None)  # a position comes in front
     absent = tuple(first + at for at in shape.absent)
-    form = (shape.notation, shape.degrees)
-    return Target(unit, (form,), request.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
+    notation = (shape.notation, shape.degrees)
+    return Target(unit, (notation,), request.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
 
 
 def _only_turns_around(request: Request) -> bool:
@@ -231,7 +232,7 @@ def _in_place(pose: PoseColumns, shape: Shape, target: Target, request: Request)
 
 def _same(pose: PoseColumns, target: Target) -> bool:
     """Tell whether a rotation is written in the notation it was read in."""
-    return pose.rotation is not None and [form for form, _ in target.notations] == [pose.rotation.notation]
+    return pose.rotation is not None and [notation for notation, _ in target.notations] == [pose.rotation.notation]
 
 
 def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request) -> list[list[New]]:
