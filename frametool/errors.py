@@ -15,26 +15,47 @@ The library raises; only the edge of the command line turns an error into a line
 
 from __future__ import annotations
 
-import warnings
+from contextlib import contextmanager
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
     from typing import TypeVar
 
     Result = TypeVar("Result")
+    Listener = Callable[[str, str, "type[FrametoolWarning]"], None]
+
+SHOWN = 60  # characters of the input that a message quotes at most
 
 
 class FrametoolError(Exception):
-    """Any failure frametool reports; `exit_code` is the status its commands end with."""
+    """Any failure frametool reports.
+
+    exit_code: the status its commands end with
+    rule: the rule of `check` that is broken, if any
+    """
 
     exit_code = 1
+    rule = ""
+
+    def __init__(self, *message: object, **fields: object) -> None:
+        """Keep what the message says as fields too, for those who do not read sentences."""
+        super().__init__(*message)
+        self.fields = fields
+
+    @property
+    def kind(self) -> str:
+        """Return the name of the failure in machine output: `unknown_frame`."""
+        name = type(self).__name__
+        return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name)[1:]
+
+    def details(self) -> dict[str, object]:
+        """Return all there is to say beside the kind and the message."""
+        return self.fields
 
 
 class ValueInvalid(FrametoolError, ValueError):
-    """Report a number, rotation or name that cannot be used; `rule` is the rule of `check` that it breaks, if any."""
-
-    rule = ""
+    """Report a number, rotation or name that cannot be used."""
 
     def __init__(self, message: str, *, rule: str = "") -> None:
         """Keep the rule beside the message."""
@@ -48,22 +69,23 @@ class FormatError(FrametoolError, ValueError):
     def __init__(
         self, message: str, *, source: str = "", line: int = 0, column: int = 0, snippet: str = "", rule: str = "",
     ) -> None:  # fmt: skip
-        """Keep the place beside the message.
-
-        snippet: the source line with a caret below it.  rule: the rule of `check` that is broken, if any.
-        """
+        """Keep the place beside the message; `snippet` is the source line with a caret below it."""
         super().__init__(message)
+        self.rule = rule or self.rule
         self.message = message
         self.source = source
         self.line = line
         self.column = column
         self.snippet = snippet
-        self.rule = rule
 
     def __str__(self) -> str:
         """Return `source:line:column: message`, leaving out what is not known."""
-        place = [str(part) for part in (self.source, self.line, self.column) if part]
-        return ": ".join((":".join(place), self.message)) if place else self.message
+        place = ":".join(str(part) for part in self.details().values())
+        return f"{place}: {self.message}" if place else self.message
+
+    def details(self) -> dict[str, object]:
+        """Return the place as far as it is known."""
+        return {key: value for key in ("source", "line", "column") if (value := getattr(self, key))}
 
 
 class BadTopology(FormatError):
@@ -75,22 +97,25 @@ class LookupFailed(FrametoolError, LookupError):
 
     exit_code = 4
 
-    def __init__(self, message: str, **fields: object) -> None:
-        """Keep what the message says as fields too, for those who do not read sentences."""
-        super().__init__(message)
-        self.fields = fields
-
 
 class UnknownFrame(LookupFailed):
-    """Report a frame that is not in the tree, with the nearest names and those there are."""
+    """Report a frame that is not in the tree, with the nearest names and those there are.
+
+    short: the message without the list of frames
+    """
 
     def __init__(self, name: str, *, known: Iterable[str], where: str = "") -> None:
         """Compose the message from the name, the frames there are and the tree's name."""
         self.name = name
         self.known = tuple(known)
         place = f" in {where}" if where else ""
-        message = f"unknown frame {name!r}{place}{alternatives(name, self.known, 'frames')}"
-        super().__init__(message, frame=name, known=sorted(self.known)[:20])
+        near = did_you_mean(name, self.known)
+        self.short = f"unknown frame {quoted(name)}{place}{near}"
+        super().__init__(
+            f"{self.short}{'' if near else ';'} frames: {listing(self.known)}",
+            frame=name,
+            known=sorted(self.known)[:20],
+        )
 
 
 class NotConnected(LookupFailed):
@@ -123,15 +148,30 @@ class Tf2Warning(FrametoolWarning):
     """Mark what tf2 would have logged, in its words."""
 
 
-_listeners: list[list[tuple[str, str]]] = []
+_listeners: list[Listener] = []
 
 
-def warn(message: str, *, rule: str = "") -> None:
-    """Tell of something odd that does not stop the work; `rule` is the rule of `check` that finds it, if any."""
+def warn(message: str, *, rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
+    """Report something odd that does not stop the work: to whoever listens, else as a Python warning.
+
+    rule: the rule of `check` that finds it, if any
+    """
     if _listeners:
-        _listeners[-1].append((rule, message))
-    else:
-        warnings.warn(message, FrametoolWarning, stacklevel=3)
+        _listeners[-1](message, rule, kind)
+        return
+    import warnings
+
+    warnings.warn(message, kind, stacklevel=3)
+
+
+@contextmanager
+def heard_by(listener: Listener) -> Iterator[None]:
+    """Pass the warnings of a block to a listener; an outer one does not hear them."""
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.pop()
 
 
 def overheard(
@@ -139,11 +179,8 @@ def overheard(
 ) -> tuple[Result, list[tuple[str, str]]]:
     """Return what a function returns, and its warnings as (rule, message), for a reader to add the place."""
     warned: list[tuple[str, str]] = []
-    _listeners.append(warned)
-    try:
+    with heard_by(lambda message, rule, _: warned.append((rule, message))):
         return call(*arguments, **options), warned
-    finally:
-        _listeners.pop()
 
 
 def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
@@ -164,9 +201,22 @@ def listing(names: Iterable[str], most: int = 20) -> str:
     """Return the names sorted and joined by commas, cut after `most` of them."""
     ordered = sorted(names)
     more = f" and {len(ordered) - most} more" if len(ordered) > most else ""
-    return ", ".join(map(printable, ordered[:most])) + more
+    return ", ".join(quoted(name)[1:-1] for name in ordered[:most]) + more
 
 
 def printable(name: str) -> str:
     """Return a name as a terminal may show it: control characters as escapes, so that none can steer it."""
     return name if name.isprintable() else repr(name)[1:-1]
+
+
+def quoted(value: object) -> str:
+    """Return a value from the input for a message: on one line, within 60 characters, escapes and quotes included."""
+    text = value if isinstance(value, str) else repr(value)
+    show = repr if isinstance(value, str) else str
+    whole, size = show(text[:SHOWN]), SHOWN
+    if len(text) <= SHOWN and len(whole) <= SHOWN:
+        return whole
+    while len(whole) > SHOWN - 3:
+        size -= 1
+        whole = show(text[:size])
+    return f"{whole[:-1]}...{whole[-1]}" if show is repr else f"{whole}..."

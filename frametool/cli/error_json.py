@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
-
-from frametool.errors import FormatError, FrametoolError
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-_WORD = re.compile(r"(?<!^)(?=[A-Z])")
+    from frametool.errors import FrametoolError
 
 
 def wants_json(arguments: Sequence[str]) -> bool:
@@ -25,13 +22,4 @@ def as_json(error: FrametoolError) -> str:
     """Return the error's kind, its message and its fields."""
     from frametool.documents.json_writer import dump
 
-    kind = _WORD.sub("_", type(error).__name__).lower()
-    return dump({"error": kind, "message": str(error), **_fields(error)})
-
-
-def _fields(error: FrametoolError) -> dict[str, Any]:
-    """Return what an error's message is made of."""
-    if isinstance(error, FormatError):
-        return {key: value for key in ("source", "line", "column") if (value := getattr(error, key))}
-    fields: dict[str, Any] = getattr(error, "fields", {})
-    return fields
+    return dump({"error": error.kind, "message": str(error), **error.details()})

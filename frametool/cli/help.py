@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import click
 
+from frametool.cli.sink import writing
 
-def _show_help(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:  # click's signature
-    if wanted:
-        click.echo(ctx.get_help(), color=ctx.color)
+
+def show_help(ctx: click.Context) -> None:
+    """Print the help of a command."""
+    with writing(None) as write:
+        write(f"{ctx.get_help()}\n")
+
+
+def _help(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
+    if chosen:
+        show_help(ctx)
         ctx.exit()
 
 
 HELP_OPTION = click.Option(
-    ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_show_help, help="Show this message."
+    ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_help, help="Show this message."
 )
 
 

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from frametool.cli.output import Output
     from frametool.formats.recordings import Recording
     from frametool.formats.stamped_stream import Batch
-    from frametool.stream.faults import Policy
+    from frametool.stream.faults import BadRows
 
 
 def move_messages(
-    recording: Recording, kind: str | None, way: Way, output: Output, policy: Policy, *, normalize: bool
+    recording: Recording, kind: str | None, way: Way, output: Output, policy: BadRows, *, normalize: bool
 ) -> int:
     """Move messages, each from its own frame and at its own time; gives the exit status."""
     rows = 0
@@ -51,14 +51,14 @@ def _moved(batch: Batch, way: Way, output: Output) -> str | Fault:
             moved.append(each.moved(way.from_frame(each.frame, each.stamp_ns), way.target))
         except FrametoolError as error:
             key = ".".join(map(str, (*each.path, "header" if "header" in each.message else each.key)))
-            return Fault(message.line, key, str(error))
+            return Fault.of(message.line, key, error)
     try:
         return output.message(message, moved)
     except FrametoolError as error:
-        return Fault(message.line, "", str(error))
+        return Fault.of(message.line, "", error)
 
 
 def _fault(error: Fault | FormatError) -> Fault:
     if isinstance(error, Fault):
         return error
-    return Fault(error.line, str(error.column or ""), error.message)
+    return Fault(error.line, str(error.column or ""), error.message, kind=error.kind)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from frametool.cli.stderr import tell
-from frametool.errors import FileProblem, ValueInvalid
+from frametool.cli.sink import writing
+from frametool.cli.stderr import say
+from frametool.errors import ValueInvalid
 from frametool.formats import FORMATS, by_suffix, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
     from frametool.ros.message_stream import Message
     from frametool.ros.stamped import Stamped
-
-
-PIECE = 1 << 14  # characters
 
 
 class Output:
@@ -86,7 +83,7 @@ class Output:
     def tell_of_lock(self, poses: Sequence[Pose]) -> None:
         """Say of a single result that its Euler angles are not unique."""
         if len(poses) == 1 and any(is_locked(poses[0], form) for form in self.style.notations):
-            tell("frametool: note: gimbal lock: the angles are not unique; the third was set to 0")
+            say("note: gimbal lock: the angles are not unique; the third was set to 0")
 
     def points(self, records: Iterable[dict[str, Any]]) -> None:
         """Write points."""
@@ -133,54 +130,12 @@ class Output:
 
     def pieces(self, pieces: Iterable[str]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
-        if self.path is None or self.path == "-":
+        with writing(self.path, force=self.force) as write:
             for piece in pieces:
-                _to_stdout(piece)
-        else:
-            write_whole(self.path, "".join(pieces), force=self.force)
+                write(piece)
 
     def text(self, text: str) -> None:
-        """Write text to stdout, or to the file whole or not at all."""
-        if self.path is None or self.path == "-":
-            _to_stdout(text)
-        else:
-            write_whole(self.path, text, force=self.force)
+        """Write text."""
+        self.pieces([text])
 
 
-def _to_stdout(text: str) -> None:
-    """Write to stdout in pieces: where it has no buffer, Python passes over what a closed pipe took only in part."""
-    for start in range(0, len(text), PIECE):
-        sys.stdout.write(text[start : start + PIECE])
-
-
-def write_whole(path: str, text: str, *, force: bool = False) -> None:
-    """Write a file by way of a temporary one beside it, so that nobody ever sees half of it.
-
-    What is no regular file (a terminal, a pipe, /dev/null) is written to as it is; a link is followed; an old file's
-    mode is kept.  Raises FileProblem when it exists and `force` is not given, or cannot be written.
-    """
-    name, path = path, os.path.realpath(path)
-    temporary = f"{path}.{os.getpid()}.part"
-    try:
-        if os.path.exists(path) and not os.path.isfile(path):
-            with open(path, "w", encoding="utf-8", newline="") as stream:
-                stream.write(text)
-            return
-        mode = os.stat(path).st_mode & 0o7777 if os.path.lexists(path) else None
-        if mode is not None and not force:
-            _refuse_to_replace(name)
-        with open(temporary, "x", encoding="utf-8", newline="") as stream:
-            stream.write(text)
-        if mode is not None:
-            os.chmod(temporary, mode)
-        os.replace(temporary, path)
-    except FileProblem:
-        raise
-    except OSError as error:
-        if os.path.lexists(temporary):
-            os.unlink(temporary)
-        raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
-
-
-def _refuse_to_replace(path: str) -> None:
-    raise FileProblem(f"{path}: exists; give --force to replace it")

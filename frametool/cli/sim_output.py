@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-from codecs import getwriter
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, Number
+from frametool.cli.sink import is_special, refuse_existing, writing
+from frametool.cli.stderr import say
 from frametool.errors import FileProblem
 from frametool.frames.stamps import BILLION
 from frametool.sim.progress import Progress
@@ -19,10 +20,9 @@ from frametool.sim.simulate import simulate
 from frametool.sim.step_writer import EMITS, FORMS, Writer
 
 if TYPE_CHECKING:
-    from codecs import StreamWriter
     from collections.abc import Callable, Iterator
-    from typing import BinaryIO, TextIO
 
+    from frametool.cli.sink import Write
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import Step
     from frametool.view.drawing import Drawing
@@ -90,26 +90,25 @@ class Show:
     def play(self, scene: Scene) -> None:
         """Run a scene to its end and sum it up on stderr.
 
-        Raises click's Exit with status 130 after the summary when it was interrupted.
+        Raises KeyboardInterrupt after the summary if it was interrupted.
         """
         progress = Progress(scene, self.reach)
         drawing = self._drawing(scene)
         interrupted = False
-        with ExitStack() as stack:
-            watchers = [progress.watch, *self._watchers(scene, stack), *([drawing.watch] if drawing else [])]
-            try:
+        try:
+            with ExitStack() as stack:
+                watchers = [progress.watch, *self._watchers(scene, stack), *([drawing.watch] if drawing else [])]
                 for step in simulate(scene):
                     for watch in watchers:
                         watch(step)
-            except KeyboardInterrupt:
-                interrupted = True
-        sys.stdout.flush()
+        except KeyboardInterrupt:  # leaves no file: what it holds is not the whole run
+            interrupted = True
         for line in progress.lines():
-            tell(line)
+            say(line)
         if drawing:
             self._save(drawing)
         if interrupted:
-            raise click.exceptions.Exit(130)  # click ends the line of stderr at a KeyboardInterrupt
+            raise KeyboardInterrupt
 
     def _drawing(self, scene: Scene) -> Drawing | None:
         """Return what remembers the run for the plot, if there is to be one."""
@@ -129,27 +128,25 @@ class Show:
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
         else:
             yield Log().watch
-        if self.output is not None:
-            yield self._writing(getwriter("utf-8")(stack.enter_context(whole_file(self.output))), scene)
-        elif not (self.live and sys.stdout.isatty()):
-            yield self._writing(sys.stdout, scene)
+        if self.output is not None or not (self.live and sys.stdout.isatty()):
+            yield self._writing(stack.enter_context(writing(self.output, force=self.force)), scene)
 
     def _save(self, drawing: Drawing) -> None:
         """Write the plot in the form that its suffix names."""
         path = str(self.plot)
-        write_file(path, import_module(PLOTS[suffix_of(path)]).plot(drawing))
+        with writing(path, force=self.force) as write:
+            write(import_module(PLOTS[suffix_of(path)]).plot(drawing))
 
-    def _writing(self, stream: TextIO | StreamWriter, scene: Scene) -> Watch:
+    def _writing(self, write: Write, scene: Scene) -> Watch:
         """Return what writes a step's records, each at once, so that a reader at the other end of a pipe sees it."""
         several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
         writer = Writer(self.emit, self.form, self.number, leaders=self.leaders, labelled=several)
 
-        def write(step: Step) -> None:
+        def watch(step: Step) -> None:
             for text in writer.write(step):
-                stream.write(text)
-                stream.flush()
+                write(text)
 
-        return write
+        return watch
 
 
 class Pace:
@@ -179,10 +176,10 @@ class Log:
     def watch(self, step: Step) -> None:
         """Tell of one step."""
         for line in step.log:
-            tell(f"{step.t_ns / BILLION:.3f} s: {line}")
+            say(f"{step.t_ns / BILLION:.3f} s: {line}")
         for hit in step.walls:
             if hit.turtle not in self._at_wall:
-                tell(f"{step.t_ns / BILLION:.3f} s: {hit}")
+                say(f"{step.t_ns / BILLION:.3f} s: {hit}")
         if step.is_tick:
             self._at_wall = frozenset(hit.turtle for hit in step.walls)
 
@@ -210,41 +207,13 @@ def check_files(plot: str | None, output: str | None, *, force: bool) -> None:
     """
     if plot and suffix_of(plot) not in PLOTS:
         raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {plot!r}")
+    if plot and output and os.path.realpath(plot) == os.path.realpath(output) and not is_special(plot):
+        raise click.UsageError(f"--output and --plot are the same file: {plot}")
     for path in filter(None, (plot, output)):
-        if path != "-" and not force and os.path.lexists(path):
-            raise FileProblem(f"{path}: exists; give --force to replace it")
+        refuse_existing(path, force=force)
         if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
             raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     if plot and suffix_of(plot) == ".png":
         from frametool.view.plot_png import require_matplotlib
 
         require_matplotlib()
-
-
-def write_file(path: str, content: str | bytes) -> None:
-    """Write a file whole or not at all."""
-    with whole_file(path) as stream:
-        stream.write(content.encode() if isinstance(content, str) else content)
-
-
-def tell(line: str) -> None:
-    """Say something on stderr."""
-    print(f"frametool: {line}", file=sys.stderr)  # noqa: T201 - this is the talk beside the data
-
-
-@contextmanager
-def whole_file(path: str) -> Iterator[BinaryIO]:
-    """Yield a stream of bytes into a temporary file that takes its place when all went well, and vanishes otherwise.
-
-    Raises FileProblem.
-    """
-    temporary = f"{path}.{os.getpid()}.part"
-    try:
-        with open(temporary, "xb") as stream:
-            yield stream
-        os.replace(temporary, path)
-    except OSError as error:
-        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
-    finally:
-        if os.path.lexists(temporary):
-            os.unlink(temporary)

@@ -1,16 +1,50 @@
-"""Talk beside the data: lines on stderr, which nobody has to read."""
+"""Talk beside the data: the one way to stderr, which nobody has to read."""
 
 from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning
+
+if TYPE_CHECKING:
+    from typing import TextIO
 
 
 def tell(text: str) -> None:
-    """Say something on stderr; that it is closed or on a full disk does not change what the data is worth."""
+    """Write a line; that stderr is closed or on a full disk does not change what the data is worth."""
     if sys.stderr is None:
         return
     try:
         print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is where messages become text
     except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())  # what is still buffered must not raise again
+        discard(sys.stderr)
+
+
+def say(text: str) -> None:
+    """Write a line about the work, under the program's name."""
+    tell(f"frametool: {text}")
+
+
+def say_warning(message: str, _rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
+    """Write a warning; what tf2 would have logged stands there in its own words."""
+    tell(message if kind is Tf2Warning else f"frametool: warning: {message}")
+
+
+def say_error(error: FrametoolError, *, in_json: bool) -> None:
+    """Write an error: as a sentence with the source line, or as one object with the fields it is made of."""
+    if in_json:
+        from frametool.cli.error_json import as_json
+
+        tell(as_json(error))
+        return
+    snippet = getattr(error, "snippet", "")
+    say(f"{error}\n{snippet}" if snippet else str(error))
+
+
+def discard(stream: TextIO) -> None:
+    """Let what is still buffered vanish, so that it does not raise again when the process ends."""
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

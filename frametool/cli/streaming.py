@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from io import BufferedReader, FileIO
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, Notations, be_verbose
-from frametool.cli.stderr import tell
+from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD, Source, decode
 from frametool.errors import FileProblem
 from frametool.formats import FORMATS, readers
 from frametool.formats.detect import detect
-from frametool.stream.faults import MOST, ON_ERROR, STOP, Policy
+from frametool.stream.faults import MOST, ON_ERROR, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -91,6 +92,7 @@ class Stream:
         """Take the stream's options out of a command's."""
         self.options = {name: options.pop(name) for name in NAMES}
         self.given = one_notation(options.pop("given", None))
+        self._tell = partial(say_error, in_json=options.get("format_name") == "json")
         self.path: str | None = self.options["input_path"]
         if self.path == "-":
             self.path = None
@@ -122,7 +124,7 @@ class Stream:
             if form is None:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if self.options["verbose"] and known_by:
-                tell(f"frametool: {name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
+                say(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             if form in RECORDS and not as_spelled and (output.told or form) != form:
@@ -134,10 +136,9 @@ class Stream:
                 )
             return self._run(stream, form, self._completed(request, output, form), output)
 
-    def policy(self, name: str) -> Policy:
-        """Say what bad rows do."""
-        most = self.options["max_errors"]
-        return Policy(name, self.options["on_error"], most=most, tell=lambda text: tell(f"frametool: {text}"))
+    def policy(self, name: str) -> BadRows:
+        """Return what reports and counts the bad rows of a source."""
+        return BadRows(name, self.options["on_error"], most=self.options["max_errors"], tell=self._tell)
 
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
@@ -156,24 +157,19 @@ class Stream:
         )
 
     def _run(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        from contextlib import closing
+
+        from frametool.cli.sink import writing
         from frametool.stream.run import run
-        from frametool.stream.sink import Sink, die_of_closed_pipe
-        from frametool.view.progress import Progress
+        from frametool.view.progress import ProgressBar
 
         name = self.path or "stdin"
-        policy = self.policy(name)
-        progress = Progress(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"])
-        outcomes = self._outcomes(stream, form, request, name)
-        try:
-            with Sink(None if output.path == "-" else output.path, force=output.force) as sink:
-                return run(outcomes, sink.write, policy, progress.advance)
-        except BrokenPipeError:
-            outcomes.close()  # ends the processes of --jobs
-            die_of_closed_pipe()
-            raise
-        finally:
-            progress.stop()
-            outcomes.close()
+        with (
+            writing(output.path, force=output.force) as write,
+            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
+            closing(self._outcomes(stream, form, request, name)) as outcomes,  # ends the processes of --jobs
+        ):
+            return run(outcomes, write, self.policy(name), progress.advance)
 
     def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
         if form in RECORDS:
@@ -191,7 +187,7 @@ def _opened(path: str | None) -> BufferedReader:
         if sys.stdin is None:
             raise FileProblem("standard input is closed")
         if sys.stdin.isatty():
-            tell("frametool: reading from the terminal; end with Ctrl-D")
+            say("reading from the terminal; end with Ctrl-D")
         stream = sys.stdin.buffer
         return stream if isinstance(stream, BufferedReader) else BufferedReader(stream)  # type: ignore[arg-type]
     try:

@@ -10,6 +10,7 @@ import click
 
 from frametool.cli.command import VERBOSE, Text, be_verbose
 from frametool.cli.poses import is_inline, source_of
+from frametool.cli.stderr import say
 from frametool.errors import warn
 from frametool.formats.load import load_sources
 from frametool.formats.recordings import Recording
@@ -45,7 +46,7 @@ def announced(file: Recording) -> Recording:
     """Say what a file was taken for, if the command was asked to."""
     context = click.get_current_context(silent=True)
     if context is not None and context.meta.get(VERBOSE):
-        click.echo(f"frametool: {file.described}", err=True)
+        say(file.described)
     return file
 
 

@@ -5,7 +5,7 @@ Knows nothing of text: whoever reads says where each edge stood.
 
 from __future__ import annotations
 
-from frametool.errors import BadTopology, FormatError, ValueInvalid, warn
+from frametool.errors import BadTopology, FormatError, Tf2Warning, ValueInvalid, warn
 from frametool.frames.tree import FrameTree
 
 TYPE_CHECKING = False
@@ -202,9 +202,5 @@ class Assembly:
 
 def tell_rejected(lines: list[str]) -> None:
     """Tell what tf2 would have logged of a transform it drops."""
-    import warnings
-
-    from frametool.errors import Tf2Warning
-
     for line in lines:
-        warnings.warn(line, Tf2Warning, stacklevel=4)
+        warn(line, kind=Tf2Warning)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid
+from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, rigid
 from frametool.stream.faults import NULL, STOP, Fault
 from frametool.stream.row_layout import IDENTITY, POSE, TURN, pose_of
@@ -82,7 +82,7 @@ class Run:
         """Do all of it."""
         self.plan = plan
         self.block = block
-        self.reasons: dict[int, tuple[str, str]] = {}
+        self.reasons: dict[int, tuple[str, str | FrametoolError]] = {}
         self.mended: list[int] = []
         self.doubted: list[tuple[int, str]] = []
         self.count = len(block.places)
@@ -97,7 +97,7 @@ class Run:
         if plan.unwrap and len(self.rows):
             _unwrap(self.results, plan.targets[0].angle_columns(), state)
 
-    def _blame(self, row: int, column: str, reason: str) -> None:
+    def _blame(self, row: int, column: str, reason: str | FrametoolError) -> None:
         """Keep the first reason why a row is bad."""
         self.reasons.setdefault(row, (column, reason))
 
@@ -127,9 +127,10 @@ class Run:
         shapes = max(len(plan.shapes), 1)
         if plan.timed is not None and self.count:
             frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
+            edges = plan.edges or [None] * shapes
             return [
-                by_time(plan.timed, *each, self._blame, plan.frame_column)
-                for each in zip(block.stamps, frames, strict=True)
+                by_time(plan.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
+                for stamps, names, edge in zip(block.stamps, frames, edges, strict=True)
             ]
         if plan.edge_of is not None and self.count:
             return [by_frame(plan.edge_of, block.frames, self._blame, plan.frame_column)] * shapes
@@ -142,13 +143,16 @@ class Run:
         first = 0
         for shape, mover in zip(shapes, movers, strict=False):
             numbers = columns[first : first + shape.size]
+            own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
             if shape.kind != POSE:
-                moved.append(operation.point(shape.kind, shape.position(numbers), mover))
+                start = shape.position(own) if shape.unit is not None else tuple(own)
+                moved.append(operation.move(shape, (*start, *beside), mover))
             else:
-                pose = pose_of(shape.position(numbers), self._rotation(shape, numbers, first))
+                pose = pose_of(shape.position(own), self._rotation(shape, own, first))
                 poses.append(rigid.inverse(*pose) if shape.inverse else pose)
                 if len(self.plan.targets) > 1 or operation.of != "pair":
-                    moved.append(operation.pose(self._with_previous(poses.pop(), state), mover, arrays))
+                    done = operation.pose(self._with_previous(poses.pop(), state), mover, arrays)
+                    moved.append((*done, *operation.covariance(shape, beside, mover)))
             first += shape.size
         if poses or not shapes:
             moved.append(operation.pose(poses or [NOWHERE], movers[0], arrays))
@@ -165,7 +169,7 @@ class Run:
         given = [numbers[index] for index in shape.rotation_at]
         names = self.plan.names[first : first + shape.size]
         if shape.whole:
-            self._check_last_row(numbers[12:], names[12])
+            self._check_last_row(numbers[12:16], names[12])
         found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
         for row, reason in found.reasons.items():
             self._blame(row, names[shape.rotation_at[0]], reason)
@@ -184,9 +188,8 @@ class Run:
         numbers: list[Floats] = []
         locked = np.zeros(self.count, np.int64)
         for target, parts in zip(self.plan.targets, moved, strict=True):
-            pose = parts[:7] if len(parts) > 3 else parts
-            numbers += [*target.numbers(pose, arrays), *parts[7:]]
-            flags = target.locked(pose)
+            numbers += target.written(parts, arrays)
+            flags = target.locked(parts)
             if flags is not None:
                 locked |= flags
         results = np.empty((self.count, len(numbers)))
@@ -241,7 +244,7 @@ class Run:
 
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""
-        found = [Fault(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
+        found = [Fault.of(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
         return sorted(found + [Fault(each.line, each.column, each.reason) for each in self.block.broken])
 
 

@@ -1,10 +1,10 @@
-"""Bad rows: what is told about each, how many are told, and whether the run goes on."""
+"""Bad rows: what is reported about each, how many are reported, and whether the run goes on."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError
+from frametool.errors import FormatError, FrametoolError, UnknownFrame
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -16,63 +16,108 @@ DONE, BAD_DATA, ROWS_SKIPPED = 0, 1, 3
 
 
 class Fault(NamedTuple):
-    """One bad row: its line, the name of the column that is to blame ("" for the whole row), and why.
+    """One bad row.
 
+    line: counted as whoever keeps it says
+    column: the name or number of the column that is to blame, "" for the whole row
+    reason: why it is bad
     final: nothing behind it can be read
+    kind: the name of the failure in machine output
+    short: the reason without the list of what there is, where it has one
     """
 
     line: int
     column: str
     reason: str
     final: bool = False
+    kind: str = "bad_row"
+    short: str = ""
+
+    @classmethod
+    def of(cls, line: int, column: str, reason: str | FrametoolError) -> Fault:
+        """Make a fault of an error, or of a reason in words."""
+        if isinstance(reason, str):
+            return cls(line, column, reason)
+        short = reason.short if isinstance(reason, UnknownFrame) else ""
+        return cls(line, column, str(reason), kind=reason.kind, short=short)
 
 
-class Stopped(FormatError):
-    """Report the bad row that ended the run; the rows before it are out."""
+class BadRow(FormatError):
+    """Report a bad row; if it ended the run, the rows before it are out.
+
+    fate: what became of it: `row skipped`, `no result`, or "" if the run ended
+    """
+
+    def __init__(self, fault: Fault, reason: str, *, source: str, fate: str = "") -> None:
+        """Take place and kind of a fault; `reason` is its long or its short one."""
+        super().__init__(f"{reason} ({fate})" if fate else reason, source=source, line=fault.line)
+        self.fault = fault
+
+    @property
+    def kind(self) -> str:
+        """Return the name of the failure that made the row bad."""
+        return self.fault.kind
+
+    def details(self) -> dict[str, object]:
+        """Return the place, whose column has a name or a number."""
+        column = self.fault.column
+        return super().details() | ({"column": int(column) if column.isdecimal() else column} if column else {})
+
+
+class RowsSkipped(FrametoolError):
+    """Report how many rows of a run have no result."""
+
+    exit_code = ROWS_SKIPPED
 
 
 class Misused(FormatError):
-    """Report options that do not fit the columns of a table."""
+    """Report arguments or options that do not fit each other or the columns of a table."""
 
     exit_code = 2
 
 
-class Policy:
-    """Tell of faults as they come, count them, and say how the run ends."""
+class BadRows:
+    """Report bad rows as they come, count them, and say how the run ends.
 
-    def __init__(self, source: str, on_error: str = STOP, *, most: int = MOST, tell: Callable[[str], None]) -> None:
-        """Name the source as messages shall; at most `most` faults are told."""
+    source: as messages name it
+    on_error: STOP, SKIP or NULL
+    most: how many are reported
+    tell: what reports them
+    """
+
+    def __init__(
+        self, source: str, on_error: str = STOP, *, most: int = MOST, tell: Callable[[FrametoolError], None]
+    ) -> None:
+        """Create an empty count."""
         self.source = source
         self.on_error = on_error
         self.most = most
         self.tell = tell
         self.count = 0
-        self._frames_told = False  # the list of those there are is told once
+        self._has_listed = False  # the list of what there is stands in the first message only
+        self._fate = "row skipped" if on_error == SKIP else "no result"
 
     def take(self, faults: Iterable[Fault]) -> None:
-        """Tell of the faults of a block; raise Stopped at the first if that is the rule."""
+        """Report the faults of a block; raise BadRow at the first if that is the rule."""
         for fault in faults:
             self.count += 1
             if self.on_error == STOP or fault.final:
-                raise Stopped(self._message(fault))
+                raise BadRow(fault, self._reason(fault), source=self.source)
             if self.count <= self.most:
-                self.tell(f"{self._message(fault)} ({self._fate()})")
+                self.tell(BadRow(fault, self._reason(fault), source=self.source, fate=self._fate))
 
     def finish(self, rows: int) -> int:
-        """Tell the final count of a run of so many rows; give its exit status."""
+        """Report the final count of a run of so many rows; return its exit status."""
         if not self.count:
             return DONE
         verb = "skipped" if self.on_error == SKIP else "without result"
         more = f", {self.count - self.most} of them not shown" if self.count > self.most else ""
-        self.tell(f"{self.source}: {self.count} of {rows} rows {verb}{more}")
+        message = f"{self.source}: {self.count} of {rows} rows {verb}{more}"
+        self.tell(RowsSkipped(message, source=self.source, bad=self.count, rows=rows))
         return ROWS_SKIPPED
 
-    def _message(self, fault: Fault) -> str:
-        reason, frames, _ = fault.reason.partition(" frames: ")
-        if not frames or not self._frames_told:
-            self._frames_told, reason = self._frames_told or bool(frames), fault.reason
-        column = f"{fault.column}: " if fault.column else ""
-        return f"{self.source}:{fault.line}:{' ' * (not column)}{column}{reason.rstrip(';')}"
-
-    def _fate(self) -> str:
-        return "row skipped" if self.on_error == SKIP else "no result"
+    def _reason(self, fault: Fault) -> str:
+        if fault.short and self._has_listed:
+            return fault.short
+        self._has_listed = self._has_listed or bool(fault.short)
+        return fault.reason

@@ -4,15 +4,28 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.geometry import quaternion, rigid
-from frametool.stream.row_layout import VECTOR
+from frametool.geometry import quaternion, rigid, spatial
+from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Components, Namespace, Rigid
+    from frametool.geometry.types import Components, Namespace, Number, Rigid
+    from frametool.stream.row_layout import Shape
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
+
+
+def _turn(_x: Number, _y: Number, _z: Number, *numbers: Number) -> Components:
+    return quaternion.rotate(*numbers)
+
+
+MOVERS: dict[str, Callable[..., Components]] = {
+    POINT: rigid.apply,
+    VECTOR: _turn,
+    TWIST: spatial.move_twist,
+    WRENCH: spatial.move_wrench,
+}  # a pose is composed: `Operation.pose`
 
 
 class Operation(NamedTuple):
@@ -43,13 +56,23 @@ class Operation(NamedTuple):
         """Tell whether rows only change their notation."""
         return self.left is self.right is None and not self.inverse and not self.of
 
-    def point(self, kind: str, position: Components, edge: Rigid | None) -> Components:
-        """Move a point or a vector by `edge`, else by `left`."""
+    def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
+        """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
         mover = edge or self.left
         if mover is None:
-            return position
-        x, y, z = position
-        return quaternion.rotate(*mover[3:], x, y, z) if kind == VECTOR else rigid.apply(*mover, x, y, z)
+            return numbers
+        own = shape.own_size
+        moved: Components = MOVERS[shape.kind](*mover, *numbers[:own])
+        return (*moved, *self.covariance(shape, numbers[own:], mover))
+
+    def covariance(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
+        """Move the covariance of a pose or a twist by `edge`, else by `left`; nothing where there is none."""
+        mover = edge or self.left
+        if not shape.covariance or mover is None:
+            return numbers
+        if shape.kind == POSE:
+            return tuple(spatial.rotate_covariance(*mover[3:], numbers))
+        return tuple(spatial.move_twist_covariance(*mover, numbers))
 
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
         """Return the resulting pose, and what else is known about it."""

@@ -1,4 +1,7 @@
-"""Records in bulk: those written alike are cut by one expression, moved as arrays, and put together again."""
+"""Records in bulk: those written alike are cut by one expression, moved as arrays, and put together again.
+
+The same definition as for one record (`template.learn`), evaluated for many at once.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,10 @@ import numpy as np
 
 from frametool.stream.blocks import Plan, Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault
-from frametool.stream.record_stream import attempt, end_of_record, null_of
-from frametool.stream.rows import Block, written
-from frametool.stream.run import Outcome
+from frametool.stream.record_stream import attempt, null_of
+from frametool.stream.rows import Block, texts_as_rows, written
+from frametool.stream.run import Outcome, RowNote
+from frametool.stream.splitter import ARRAY, DOCUMENTS, LINES
 from frametool.stream.text_parts import In
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -20,198 +24,217 @@ if TYPE_CHECKING:
     import re
     from collections.abc import Sequence
 
-    from frametool.stream.record_stream import Splitter
     from frametool.stream.request import Request
-    from frametool.stream.template import Learned
-    from frametool.text.array_types import Ints
+    from frametool.stream.splitter import Part, Splitter
+    from frametool.stream.template import Template
+    from frametool.text.array_types import Bytes, Ints
 
-MOST_KINDS = 256  # kinds of records kept in mind
+MOST_TEMPLATES = 256  # kept in mind
 MOST_TRIED = 8  # of them tried on whole blocks
 MOST_LOOKED = 1 << 16  # bytes in which the first record of what is left is looked for
 WORTH_CUTTING = 1 << 12  # bytes
 
 
 class Cut(NamedTuple):
-    """Records of one kind found in a block: where each stretch of each begins and ends."""
+    """Records of one template found in a block: where each stretch of each begins and ends.
 
-    learned: Learned
+    The last two columns are what follows a record and what stands before it.
+    """
+
+    template: Template
     starts: Ints
     ends: Ints
 
 
-class Work:
-    """What is done to each block of records; remembers the kinds it has met."""
+class Found:
+    """What one block holds: records by template, and what passes or is wrong, by place."""
+
+    def __init__(self) -> None:
+        """Create an empty one."""
+        self.cuts: list[Cut] = []
+        self.singles: dict[Template, list[tuple[tuple[int, int], ...]]] = {}
+        self.odd: list[tuple[int, bytes]] = []
+        self.faults: list[tuple[int, Fault]] = []
+        self.closed = False
+
+
+class RecordBlocks:
+    """Process one block of records after the other; keeps the templates it has met."""
 
     def __init__(self, splitter: Splitter, form: str, request: Request, source: str) -> None:
-        """Begin knowing nothing."""
+        """Start without templates."""
         self.splitter = splitter
         self.form = form
         self.request = request
         self.source = source
         self.state = State()
-        self.kinds: list[Learned] = []
+        self.templates: list[Template] = []
 
     def __call__(self, text: bytes) -> Outcome:
         """Process one block."""
-        cuts: list[Cut] = []
+        found = Found()
         rest = [(0, len(text))]
-        if self.splitter.lines is not False or self.form == "yaml":
-            rest = self._cut(text, rest, self.kinds[-MOST_TRIED:][::-1], cuts)
-            rest = self._learn_and_cut(text, rest, cuts)
-        odd: list[tuple[int, bytes]] = []
-        faults: list[tuple[int, Fault]] = []
-        singles: dict[Learned, list[tuple[tuple[int, int], ...]]] = {}
+        if self.splitter.layout in (LINES, DOCUMENTS) and _is_text(text):
+            rest = self._cut(text, rest, self.templates[-MOST_TRIED:][::-1], found)
+            rest = self._learn_and_cut(text, rest, found)
         for start, end in rest:
-            self._rest(text, start, end, odd, faults, singles)
-        cuts += [_as_cut(learned, spans) for learned, spans in singles.items()]
-        cuts = _in_order(cuts) if self.request.in_order else cuts
-        return self._outcome(text, framed(text), cuts, odd, faults)
+            self._take_singly(text, start, end, found)
+        cuts = found.cuts + [_as_cut(template, spans) for template, spans in found.singles.items()]
+        found.cuts = _in_order(cuts) if self.request.in_order else cuts
+        return self._outcome(text, framed(text), found)
 
-    def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
-        """Learn the kinds of the first records that are left, a few, and cut by them too."""
+    def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], found: Found) -> list[tuple[int, int]]:
+        """Learn templates from the first records that are left, a few, and cut by them too."""
         for _ in range(MOST_TRIED):
-            spans = [
-                (start, span)
-                for start, end in rest[:1]
-                for span in self.splitter.records(text[start : min(end, start + MOST_LOOKED)])[:1]
-            ]
-            if len(rest) > 1 or not spans or not rest or rest[0][1] - rest[0][0] < WORTH_CUTTING:
+            if len(rest) != 1 or rest[0][1] - rest[0][0] < WORTH_CUTTING:
                 return rest
-            start, (begin, stop) = spans[0]
-            known = len(self.kinds)
-            line = text.count(b"\n", 0, start + begin)
-            record = text[start + begin : start + stop]
+            start, end = rest[0]
+            looked = text[start : min(end, start + MOST_LOOKED)]
+            parts = self.splitter.parts(looked).parts[:1]
+            if not parts or parts[0].problem:
+                return rest
+            record = looked[parts[0].start : parts[0].end]
+            known = len(self.templates)
             if self._match(record, 0, len(record)) is None:
-                problem = attempt(record, self.form, self.request, self.source, line, self._remember)
-                if isinstance(problem, Fault) or len(self.kinds) == known:
+                self._learn(looked, parts[0])
+                if len(self.templates) == known:
                     return rest
-            rest = self._cut(text, rest, self.kinds[-1:], cuts)
+            rest = self._cut(text, rest, self.templates[-1:], found)
         return rest
 
     def _cut(
-        self,
-        text: bytes,
-        rest: list[tuple[int, int]],
-        kinds: Sequence[Learned],
-        cuts: list[Cut],
+        self, text: bytes, rest: list[tuple[int, int]], templates: Sequence[Template], found: Found
     ) -> list[tuple[int, int]]:
-        """Cut what is left of a block by the kinds met before; give what is then left."""
-        for learned in kinds:
+        """Cut what is left of a block by templates; return what is then left."""
+        for template in templates:
             left = []
             for start, end in rest:
-                cut, gaps = _cut_chunk(learned, text[start:end], start)
+                cut, gaps = _cut_chunk(template, text[start:end], start)
                 if cut is not None:
-                    cuts.append(cut)
+                    found.cuts.append(cut)
                 left += gaps
             rest = left
         return rest
 
-    def _rest(
-        self,
-        text: bytes,
-        start: int,
-        end: int,
-        odd: list[tuple[int, bytes]],
-        faults: list[tuple[int, Fault]],
-        singles: dict[Learned, list[tuple[tuple[int, int], ...]]],
-    ) -> None:
-        """Take records one by one, learning new kinds; what stands between them passes."""
+    def _take_singly(self, text: bytes, start: int, end: int, found: Found) -> None:
+        """Take records one by one, learning new templates; what stands between them passes."""
         chunk = text[start:end]
-        at = 0
-        for begin, stop in self.splitter.records(chunk):
-            after = end_of_record(chunk, stop, self.form)
-            if begin > at:
-                odd.append((start + at, chunk[at:begin]))
-            at = after
-            match = self._match(chunk, begin, stop)
-            if match is None:
-                line = text.count(b"\n", 0, start + begin)
-                problem = attempt(chunk[begin:stop], self.form, self.request, self.source, line, self._remember)
-                if isinstance(problem, Fault):
-                    faults.append((start + begin, problem))
-                    if self.request.on_error == NULL:
-                        odd.append((start + begin, null_of(chunk[begin:stop]) + chunk[stop:after]))
-                    continue
-                match = self._match(chunk, begin, stop)
-            if match is None:
-                odd.append((start + begin, chunk[begin:after]))
-                continue
-            learned, found = match
-            spans = [*found.regs[1:], (stop, after)]
-            singles.setdefault(learned, []).append(tuple((a + start, b + start) for a, b in spans))
-        if at < len(chunk):
-            odd.append((start + at, chunk[at:]))
+        matches: dict[int, tuple[Template, re.Match[bytes]]] = {}
 
-    def _match(self, chunk: bytes, begin: int, stop: int) -> tuple[Learned, re.Match[bytes]] | None:
-        for learned in reversed(self.kinds):
-            found = learned.pattern.fullmatch(chunk, begin, stop)
+        def match(at: int) -> int | None:
+            """Match the template used last, which most records follow."""
+            hit = self.templates[-1].pattern.match(chunk, at) if self.templates and clean else None
+            if hit is None:
+                return None
+            matches[at] = self.templates[-1], hit
+            return hit.end()
+
+        clean = _is_text(chunk)
+        parts, found.closed = self.splitter.parts(chunk, match)
+        at = 0
+        for part in parts:
+            if part.begin > at:
+                found.odd.append((start + at, chunk[at : part.begin]))
+            at = part.after
+            hit = None if part.problem else matches.get(part.start) or self._match(chunk, part.start, part.end)
+            if hit is None:
+                problem = self._learn(chunk, part)
+                if isinstance(problem, Fault):
+                    line = text.count(b"\n", 0, start)
+                    found.faults.append((start + part.begin, problem._replace(line=problem.line + line)))
+                    if self.request.on_error == NULL and not part.outside:
+                        nulled = null_of(chunk[part.start : part.end], json=self.form == "json")
+                        row = chunk[part.begin : part.start] + nulled + chunk[part.end : part.after]
+                        found.odd.append((start + part.begin, row))
+                    continue
+                hit = None if problem is not None else self._match(chunk, part.start, part.end)
+            if hit is None:
+                found.odd.append((start + part.begin, chunk[part.begin : part.after]))
+                continue
+            template, groups = hit
+            spans = [*groups.regs[1:], (part.end, part.after), (part.begin, part.start)]
+            found.singles.setdefault(template, []).append(tuple((a + start, b + start) for a, b in spans))
+        if at < len(chunk):
+            found.odd.append((start + at, chunk[at:]))
+
+    def _match(self, chunk: bytes, begin: int, stop: int) -> tuple[Template, re.Match[bytes]] | None:
+        """Find the template that a record follows."""
+        if not _is_text(chunk[begin:stop]):
+            return None
+        for template in reversed(self.templates):
+            found = template.pattern.fullmatch(chunk, begin, stop)
             if found is not None:
-                return learned, found
+                return template, found
         return None
 
-    def _remember(self, learned: Learned) -> bytes:
-        """Keep a kind in mind, not too many."""
-        self.kinds = [*self.kinds[-MOST_KINDS + 1 :], learned]
-        return b""
+    def _learn(self, chunk: bytes, part: Part) -> Fault | bytes | None:
+        """Keep the template of a record in mind, not too many; return why it has none."""
+        learned = attempt(chunk, part, self.form, self.request, self.source)
+        if isinstance(learned, (Fault, bytes)):
+            return learned
+        self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], learned]
+        return None
 
-    def _outcome(
-        self,
-        text: bytes,
-        data: np.ndarray,
-        cuts: Sequence[Cut],
-        odd: list[tuple[int, bytes]],
-        faults: list[tuple[int, Fault]],
-    ) -> Outcome:
-        """Run every kind's records, and put all of it in order."""
-        groups, found, rows, mended = [], list(faults), len(faults), 0
-        doubted: list[tuple[int, str]] = []
-        end = min((place for place, _ in faults), default=None) if self.request.on_error == STOP else None
+    def _outcome(self, text: bytes, data: Bytes, found: Found) -> Outcome:
+        """Run every template's records, and put all of it in order."""
+        stops, skips = self.request.on_error == STOP, self.request.on_error != NULL
+        faults, odd, notes = list(found.faults), found.odd, []
         runs = []
-        for cut in cuts:
-            rows += len(cut.starts)
-            for run in self._runs(cut, data, text):
-                runs.append((run, cut))
-                mended += len(run.mended)
-                bad = [int(cut.starts[row, 0]) for row in run.reasons]
-                if self.request.on_error == NULL:
-                    odd += [(int(cut.starts[row, 0]), _null_row(cut, row, text)) for row in run.reasons]
-                found += [
-                    (int(cut.starts[row, 0]), Fault(run.block.line_of(row), *reason))
-                    for row, reason in run.reasons.items()
-                ]
-                doubted += [(run.block.line_of(row), angle) for row, angle in run.doubted[:1]]
-                if self.request.on_error == STOP and bad:
-                    end = min(bad) if end is None else min(end, *bad)
-        for run, _ in runs:
-            groups += run.groups(end)
+        for cut in found.cuts:
+            run = Run(self._plan(cut.template), self._block(cut, data, text), self.state)
+            runs.append(run)
+            bad = [(int(run.block.places[row]), row) for row in run.reasons]
+            faults += [(place, Fault.of(run.block.line_of(row), *run.reasons[row])) for place, row in bad]
+            odd += [] if skips else [(place, _null_row(cut, row, text)) for place, row in bad]
+            notes += [RowNote.of_degrees(run.block.line_of(row), angle) for row, angle in run.doubted[:1]]
+            notes += [RowNote.of_rounding(run.block.line_of(row)) for row in sorted(run.mended)[:1]]
+            if cut.template.unnamed and len(cut.starts):
+                notes.append(RowNote.of_lost_name(run.block.line_of(0), cut.template.unnamed))
+        end = min((place for place, _ in faults), default=None) if stops else None
+        groups = [group for run in runs for group in run.groups(end)]
+        kept = sum(len(run.rows) for run in runs) + (0 if skips else len(faults))
         odd = [(place, piece) for place, piece in odd if end is None or place < end]
         if odd:
-            from frametool.stream.rows import texts_as_rows
-
             groups.append(texts_as_rows(odd))
-        ordered = [fault for _, fault in sorted(found)]
-        return Outcome(written(groups), ordered, rows, text.count(b"\n"), mended, doubted, len(text))
+        rows = sum(len(cut.starts) for cut in found.cuts) + len(found.faults)
+        return Outcome(
+            written(groups),
+            [fault for _, fault in sorted(faults)],
+            rows,
+            text.count(b"\n"),
+            sum(len(run.mended) for run in runs),
+            sorted(notes),
+            len(text),
+            kept,
+            None if self.splitter.layout != ARRAY else not found.closed,
+        )
 
-    def _runs(self, cut: Cut, data: np.ndarray, text: bytes) -> list[Run]:
-        """Run the records of one kind."""
-        learned = cut.learned
+    def _block(self, cut: Cut, data: Bytes, text: bytes) -> Block:
+        """Describe the records of one template as rows."""
+        template = cut.template
         starts, ends = cut.starts + MARGIN, cut.ends + MARGIN
-        numbers = _numbers(learned, data, starts, ends)
         parts = [Spans(data, starts[:, index], ends[:, index]) for index in range(starts.shape[1])]
 
         def line_of(row: int) -> int:
-            return text.count(b"\n", 0, int(cut.starts[row, 0])) + learned.line
+            return text.count(b"\n", 0, int(cut.starts[row, 0])) + template.line
 
-        stamps = [without_quotes(parts[index]) for index in learned.stamps]
-        block = Block(numbers, parts, cut.starts[:, 0], line_of, stamps=stamps)
-        return [Run(self._plan(learned), block, self.state)]
+        stamps = [tuple(without_quotes(parts[index]) for index in each) for each in template.stamps]
+        numbers = _numbers(template, data, starts, ends)
+        return Block(numbers, parts, cut.starts[:, -1], line_of, stamps=stamps)
 
-    def _plan(self, learned: Learned) -> Plan:
+    def _plan(self, template: Template) -> Plan:
+        """Say what is done to the records of one template."""
         request = self.request
-        pieces = (*learned.pieces, In(len(learned.stretches)))
-        targets = tuple(entry.target for entry in learned.entries)
-        edges = tuple(entry.edge for entry in learned.entries)
-        plan = Plan(learned.shapes, targets, request.operation, pieces, learned.names, b"null", edges=edges)
+        after = len(template.stretches)
+        plan = Plan(
+            template.shapes,
+            tuple(entry.target for entry in template.entries),
+            request.operation,
+            (In(after + 1), *template.pieces, In(after)),
+            template.names,
+            b"null",
+            edges=tuple(entry.edge for entry in template.entries),
+        )
         return plan._replace(
             normalize=request.normalize,
             precision=request.precision,
@@ -219,14 +242,25 @@ class Work:
             unwrap=request.unwrap,
             yaml=self.form == "yaml",
             timed=request.timed,
-            sources=tuple(entry.holder.parent[0] for entry in learned.entries),
+            sources=tuple(entry.record.parent.text for entry in template.entries),
         )
 
 
-def _cut_chunk(learned: Learned, chunk: bytes, offset: int) -> tuple[Cut | None, list[tuple[int, int]]]:
+def _is_text(block: bytes) -> bool:
+    """Tell whether bytes are UTF-8: an expression for bytes would let others pass."""
+    if block.isascii():
+        return True
+    try:
+        block.decode()
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _cut_chunk(template: Template, chunk: bytes, offset: int) -> tuple[Cut | None, list[tuple[int, int]]]:
     """Cut a chunk of lines by one expression; give the records, and the gaps between them."""
-    stretches = len(learned.stretches) + 1
-    pieces = learned.block_pattern.split(chunk)
+    stretches = len(template.stretches) + 1
+    pieces = template.block_pattern.split(chunk)
     count = len(pieces) // (stretches + 1)
     if not count:
         return None, [(offset, offset + len(chunk))]
@@ -237,39 +271,42 @@ def _cut_chunk(learned: Learned, chunk: bytes, offset: int) -> tuple[Cut | None,
     gaps = [(int(starts[at]), int(ends[at])) for at in between[starts[between] < ends[between]]]
     rows = slice(0, count * (stretches + 1))
     shape = (count, stretches + 1)
-    return Cut(learned, starts[rows].reshape(shape)[:, 1:], ends[rows].reshape(shape)[:, 1:]), gaps
+    begins, stops = starts[rows].reshape(shape)[:, 1:], ends[rows].reshape(shape)[:, 1:]
+    first = begins[:, :1]  # nothing stands before a record
+    return Cut(template, np.concatenate([begins, first], axis=1), np.concatenate([stops, first], axis=1)), gaps
 
 
-def _as_cut(learned: Learned, spans: Sequence[tuple[tuple[int, int], ...]]) -> Cut:
+def _as_cut(template: Template, spans: Sequence[tuple[tuple[int, int], ...]]) -> Cut:
     found = np.fromiter(chain.from_iterable(chain.from_iterable(spans)), np.int64).reshape(len(spans), -1, 2)
-    return Cut(learned, np.ascontiguousarray(found[:, :, 0]), np.ascontiguousarray(found[:, :, 1]))
+    return Cut(template, np.ascontiguousarray(found[:, :, 0]), np.ascontiguousarray(found[:, :, 1]))
 
 
 def _in_order(cuts: Sequence[Cut]) -> list[Cut]:
-    """Part cuts of several kinds so that their records follow each other as in the text."""
+    """Part cuts of several sorts so that their records follow each other as in the text."""
     if not cuts:
         return []
-    kinds = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
+    sorts = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
     rows = np.concatenate([np.arange(len(cut.starts)) for cut in cuts])
     order = np.argsort(np.concatenate([cut.starts[:, 0] for cut in cuts]), kind="stable")
-    changes = np.flatnonzero(np.diff(kinds[order])) + 1
-    parts = [(cuts[kinds[part[0]]], rows[part]) for part in np.split(order, changes)]
-    return [Cut(cut.learned, cut.starts[part], cut.ends[part]) for cut, part in parts]
+    changes = np.flatnonzero(np.diff(sorts[order])) + 1
+    parts = [(cuts[sorts[part[0]]], rows[part]) for part in np.split(order, changes)]
+    return [Cut(cut.template, cut.starts[part], cut.ends[part]) for cut, part in parts]
 
 
 def _null_row(cut: Cut, row: int, text: bytes) -> bytes:
-    """Return what stands for a record without a result, with what parts it from the next."""
-    begin, end, after = int(cut.starts[row, 0]), int(cut.starts[row, -1]), int(cut.ends[row, -1])
-    return null_of(text[begin:end]) + text[end:after]
+    """Return what stands for a record without a result, with what goes with it."""
+    begin, start = int(cut.starts[row, -1]), int(cut.starts[row, 0])
+    end, after = int(cut.starts[row, -2]), int(cut.ends[row, -2])
+    return text[begin:start] + null_of(text[start:end], json=cut.template.json) + text[end:after]
 
 
-def _numbers(learned: Learned, data: np.ndarray, starts: Ints, ends: Ints) -> Spans:
-    """Return the spans of our numbers; those that a kind does not write as plain numbers are its own."""
+def _numbers(template: Template, data: Bytes, starts: Ints, ends: Ints) -> Spans:
+    """Return the spans of our numbers; those that a template does not write as plain numbers are its own."""
     rows = len(starts)
-    if learned.regular:
-        columns = list(learned.numbers)
+    if template.regular:
+        columns = list(template.numbers)
         return Spans(data, np.ascontiguousarray(starts[:, columns]), np.ascontiguousarray(ends[:, columns]))
-    texts = [repr(value).encode() for value in learned.values]
+    texts = [repr(value).encode() for value in template.values]
     own = framed(b" ".join(texts))
     lengths = np.array([len(text) for text in texts], np.int64)
     first = np.cumsum(lengths + 1) - lengths - 1 + MARGIN

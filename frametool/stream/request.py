@@ -16,15 +16,23 @@ if TYPE_CHECKING:
 
 
 class Request(NamedTuple):
-    """The wishes of one run.
+    """What one run does with its rows and how it writes the results.
 
-    poses: how many poses each row holds (0: rows only name frames)
-    kind: what rows are taken for ("" as they look); given: notation of their rotations; degrees: of bare angles
-    notations: those of the result (none: as read); columns: which are ours, one entry a pose
-    keep, prefix: results beside what they come from, under other names
-    frames: columns that name a row's frame, edge_of: the pose that moves from it; told: the frame results are in
-    way: the pose that moves a record given in a frame; timed: those that do so in time, in place of both
-    rename: a record's parent and name to those of its result
+    poses: how many poses each row holds; 0 where rows only name frames
+    kind: what rows are taken for; "" as they look
+    given: the notation of their rotations
+    degrees: whether bare angles are in degrees
+    notations: those of the result; none means as read
+    columns: which columns are ours, one entry a pose
+    keep, prefix: results stand beside what they come from, under other names
+    frames: columns that name a row's frame
+    edge_of: the pose that moves a row from the frame it names
+    told: the frame results are in
+    way: the pose that moves a record given in a frame
+    timed: the poses that do so at the row's own time
+    rename: turns a record's (parent, name) into those of its result
+    counters: a decimal `frame` is a counter, because no frame is called so
+    unwrap: angles go on beyond half a turn
     """
 
     operation: Operation = Operation()
@@ -45,6 +53,7 @@ class Request(NamedTuple):
     timed: Timed | None = None
     rename: Callable[[str | None, str | None], tuple[str | None, str | None]] | None = None
     told: str | None = None
+    counters: bool = True
     unwrap: bool = False
     on_error: str = STOP
 
@@ -52,6 +61,10 @@ class Request(NamedTuple):
     def in_order(self) -> bool:
         """Tell whether a row's result depends on the rows before it."""
         return self.unwrap or self.operation.of == "previous"
+
+    def counts(self, frame: str) -> bool:
+        """Tell whether what stands under `frame` is a counter rather than a frame's name."""
+        return self.counters and frame.isdecimal()
 
     def in_degrees(self, form: Notation) -> bool:
         """Tell whether a notation's angles are degrees: its own word wins."""

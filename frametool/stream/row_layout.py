@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Rigid
 
-POINT, VECTOR, POSE = "point", "vector", "pose"
+POINT, VECTOR, POSE, TWIST, WRENCH = "point", "vector", "pose", "twist", "wrench"
+SIX = (TWIST, WRENCH)  # two vectors, linear part first
+COVARIANCE = 36
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 TURN = 6.283185307179586
 
@@ -27,6 +29,7 @@ class Shape(NamedTuple):
 
     unit: how many of the position's numbers make a metre; None where there is no position
     inverse: what is written is the inverse
+    covariance: the 36 numbers of a covariance come last
     """
 
     kind: str
@@ -35,10 +38,18 @@ class Shape(NamedTuple):
     degrees: bool = False
     whole: bool = False
     inverse: bool = False
+    covariance: bool = False
 
     @property
     def size(self) -> int:
         """Count the numbers of a row."""
+        return self.own_size + COVARIANCE * self.covariance
+
+    @property
+    def own_size(self) -> int:
+        """Count the numbers of the thing itself, without its covariance."""
+        if self.kind in SIX:
+            return 6
         rotation = len(self.notation.representation.columns) if self.notation else 0
         return 16 if self.whole else rotation + (self.unit is not None) * 3
 
@@ -47,7 +58,7 @@ class Shape(NamedTuple):
         """Return the indices of the rotation's numbers."""
         if self.whole:
             return (0, 1, 2, 4, 5, 6, 8, 9, 10)
-        return tuple(range(0 if self.unit is None else 3, self.size))
+        return tuple(range(0 if self.unit is None else 3, self.own_size))
 
     @property
     def angles_at(self) -> tuple[int, ...]:
@@ -75,15 +86,29 @@ def axes_of(form: Notation) -> str | None:
 
 
 class Target(NamedTuple):
-    """How results are written: the unit of positions (None: not at all), notations with their unit of angles."""
+    """How results are written.
+
+    unit: of positions; None where none are written
+    notations: of rotations, each with the unit of its angles
+    whole: the 16 numbers of a homogeneous matrix
+    plain: the numbers of a twist or wrench as they are
+    """
 
     unit: float | None
     notations: tuple[tuple[Notation, bool], ...]
     keep_sign: bool = False
     whole: bool = False
+    plain: bool = False
+
+    def written(self, parts: Components, xp: Namespace) -> list[Any]:
+        """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
+        own = 6 if self.plain else 3 if len(parts) == 3 else 7
+        return [*self.numbers(parts[:own], xp), *parts[own:]]
 
     def numbers(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return the numbers of a result: the position, then each notation's; or the 16 of a whole matrix."""
+        if self.plain:
+            return list(parts)
         position = [] if self.unit is None else [part * self.unit if self.unit != 1.0 else part for part in parts[:3]]
         if len(parts) == 3 or not self.notations:
             return position
@@ -100,8 +125,8 @@ class Target(NamedTuple):
     @property
     def size(self) -> int:
         """Count the numbers of a result."""
-        if self.whole:
-            return 16
+        if self.whole or self.plain:
+            return 16 if self.whole else 6
         return (self.unit is not None) * 3 + sum(len(form.representation.columns) for form, _ in self.notations)
 
     def angle_columns(self) -> list[tuple[int, float]]:
@@ -115,7 +140,7 @@ class Target(NamedTuple):
     def locked(self, parts: Components) -> Any:
         """Tell whether Euler angles among the notations are not unique; None where there are none."""
         axes = next((axes for form, _ in self.notations if (axes := axes_of(form))), None)
-        if axes is None or len(parts) == 3:
+        if axes is None or len(parts) < 7:
             return None
         x, y, z, w = parts[3:7]
         return euler.locked(x, y, z, w, axes)

@@ -6,12 +6,11 @@ to that, row by row.
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FrametoolWarning, ValueInvalid
+from frametool.errors import ValueInvalid, overheard
 from frametool.geometry import arrays, floats, matrix, quaternion
 
 if TYPE_CHECKING:
@@ -111,14 +110,12 @@ def _settle_singly(
     reasons, mended = {}, []
     for row in doubtful.tolist():
         given = [float(number[row]) for number in numbers]
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", FrametoolWarning)
-            try:
-                after = form.checked_quaternion(given, floats, degrees=degrees, normalize=normalize)
-            except ValueInvalid as error:
-                reasons[row] = str(error)
-                after = (0.0, 0.0, 0.0, 1.0)
-        mended += [row] * bool(caught)
+        try:
+            after, warned = overheard(form.checked_quaternion, given, floats, degrees=degrees, normalize=normalize)
+        except ValueInvalid as error:
+            reasons[row] = str(error)
+            after, warned = (0.0, 0.0, 0.0, 1.0), []
+        mended += [row] * bool(warned)
         for part, value in zip(parts, after, strict=True):
             part[row] = value
     return Rotations(parts, reasons, np.union1d(found.mended, np.array(mended, np.int64)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from frametool.errors import FrametoolError
 from frametool.stream.row_layout import IDENTITY
-from frametool.stream.stamp_columns import parse_stamps
+from frametool.stream.stamp_columns import parse_header_stamps, parse_stamps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from frametool.text.array_types import Floats, Ints
     from frametool.text.spans import Spans
 
-    Blame = Callable[[int, str, str], None]
+    Blame = Callable[[int, str, str | FrametoolError], None]
 
 NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 
@@ -26,34 +26,37 @@ NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 def by_frame(edge_of: Callable[[str], Rigid], frames: Sequence[str], blame: Blame, column: str = "") -> Rigid:
     """Return the pose of each row by its frame's name; a row whose frame has none is bad."""
     table: list[Rigid] = []
-    known: dict[str, tuple[int, str]] = {}
+    known: dict[str, tuple[int, FrametoolError | None]] = {}
     for row, name in enumerate(frames):
         if name not in known:
-            edge, problem = _edge(edge_of, name)
-            known[name] = len(table), problem
+            edge, error = _edge(edge_of, name)
+            known[name] = len(table), error
             table.append(edge)
-        if known[name][1]:
-            blame(row, column, known[name][1])
+        if problem := known[name][1]:
+            blame(row, column, problem)
     chosen_rows = np.array([known[name][0] for name in frames], np.int64)
     return tuple(np.array(column)[chosen_rows] for column in zip(*table, strict=True))  # type: ignore[return-value]
 
 
-def _edge(edge_of: Callable[[str], Rigid], name: str) -> tuple[Rigid, str]:
+def _edge(edge_of: Callable[[str], Rigid], name: str) -> tuple[Rigid, FrametoolError | None]:
     """Return the edge of a frame, or why there is none."""
     try:
-        return edge_of(name), ""
+        return edge_of(name), None
     except FrametoolError as error:
-        return NOWHERE, str(error)
+        return NOWHERE, error
 
 
-def by_time(timed: Timed, stamps: Spans, frames: Sequence[str | None], blame: Blame, column: str = "") -> Rigid:
+def by_time(
+    timed: Timed, stamps: tuple[Spans, ...], frames: Sequence[str | None], blame: Blame, column: str = ""
+) -> Rigid:
     """Return the pose of each row at its stamp; a row without a stamp or without data then is bad.
 
-    frames: one a row, or one for all (None: the one SOURCE); column: the one that names them.
+    stamps: one for each row, or its seconds and nanoseconds
+    frames: one a row, or one for all (None: the one SOURCE); column: the one that names them
     """
-    times, reasons = parse_stamps(stamps, in_ns=timed.in_ns)
+    times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=timed.in_ns)
     for row, reason in reasons.items():
-        blame(row, timed.name, reason)
+        blame(row, timed.column, reason)
     poses = np.full((7, len(times)), np.nan)
     for frame, rows in _by_frame(frames, np.delete(np.arange(len(times)), list(reasons))):
         _fill(poses, timed, frame, rows, times, blame, column)
@@ -75,15 +78,15 @@ def _fill(poses: Floats, timed: Timed, frame: str | None, rows: Ints, times: Int
         poses[:, rows] = timed.many(frame, times[rows])
     except FrametoolError as error:
         for row in rows.tolist():
-            blame(row, column, str(error))
+            blame(row, column, error)
     else:
         for row in rows[np.isnan(poses[6, rows])].tolist():
-            blame(row, timed.name, _reason(timed, frame, int(times[row])))
+            blame(row, timed.column, _reason(timed, frame, int(times[row])))
 
 
-def _reason(timed: Timed, frame: str | None, stamp_ns: int) -> str:
+def _reason(timed: Timed, frame: str | None, stamp_ns: int) -> str | FrametoolError:
     try:
         timed.one(frame, stamp_ns)
     except FrametoolError as error:
-        return str(error)
+        return error
     return "no data"

@@ -34,10 +34,14 @@ class Broken(NamedTuple):
 class Block(NamedTuple):
     """What a format found in a block of text.
 
-    numbers: (n, c) the cells with our numbers; parts: spans (n,) that pieces refer to
-    places: (n,) where each row stands among all that the block holds; line_of: the line of a row, from 0
-    odd: place and text of what passes as it is; broken: rows that have no numbers
-    frames: the name of the frame each row is given in, if rows say so; stamps: spans (n,), one for each shape
+    numbers: (n, c) the cells with our numbers
+    parts: spans (n,) that pieces refer to
+    places: (n,) where each row stands among all that the block holds
+    line_of: the line of a row, from 0
+    odd: place and text of what passes as it is
+    broken: rows that have no numbers
+    frames: the name of the frame each row is given in, if rows say so
+    stamps: for each shape the spans (n,) of its stamp: one, or seconds and nanoseconds; none where it has none
     """
 
     numbers: Spans
@@ -47,7 +51,7 @@ class Block(NamedTuple):
     odd: Sequence[tuple[int, bytes]] = ()
     broken: Sequence[Broken] = ()
     frames: Sequence[str] = ()
-    stamps: Sequence[Spans] = ()
+    stamps: Sequence[tuple[Spans, ...]] = ()
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:

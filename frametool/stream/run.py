@@ -1,4 +1,4 @@
-"""A whole stream: blocks in, outcomes out in order, faults told after the good rows before them are out."""
+"""A whole stream: blocks in, outcomes out in order, faults reported after the good rows before them are out."""
 
 from __future__ import annotations
 
@@ -9,48 +9,84 @@ from frametool.errors import warn
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.stream.faults import Fault, Policy
+    from frametool.stream.faults import BadRows, Fault
 
 MOST_WAITING = 2  # blocks a process may have ahead: memory stays flat
 
 
+class RowNote(NamedTuple):
+    """Something worth telling about a row: its line from 0, what it is about, and the sentence."""
+
+    line: int
+    about: str
+    sentence: str
+
+    @classmethod
+    def of_degrees(cls, line: int, angle: str) -> RowNote:
+        """Wonder about an angle beyond a full turn."""
+        remedy = "degrees? give --deg, or name the columns _deg"
+        return cls(line, "degrees", f"{angle} is more than a full turn in radians; {remedy}")
+
+    @classmethod
+    def of_rounding(cls, line: int) -> RowNote:
+        """Tell that a rotation had to be normalised."""
+        return cls(line, "rounded", "the rotation is off by more than 1e-6 and was normalised")
+
+    @classmethod
+    def of_lost_name(cls, line: int, name: str) -> RowNote:
+        """Tell that a frame is not named any more."""
+        return cls(line, "unnamed", f"frame {name!r} is left out: the frames of the result are not known")
+
+
 class Outcome(NamedTuple):
-    """What became of a block: its text, faults by line from 0, how many rows and lines it had, what is worth a word."""
+    """What became of a block.
+
+    text: what is written
+    faults: the bad rows, by line from 0
+    rows, lines, size: how many rows, lines and bytes the block had
+    mended: how many rotations were off and normalised
+    notes: what is worth telling
+    kept: how many rows are in the text
+    is_open: whether an array goes on behind the block; None for what is no array
+    """
 
     text: bytes
     faults: Sequence[Fault] = ()
     rows: int = 0
     lines: int = 0
     mended: int = 0
-    doubted: Sequence[tuple[int, str]] = ()
+    notes: Sequence[RowNote] = ()
     size: int = 0
+    kept: int = 0
+    is_open: bool | None = None
 
 
 def run(
-    outcomes: Iterable[Outcome], write: Callable[[bytes], None], policy: Policy, advance: Callable[[int, int], None]
+    outcomes: Iterable[Outcome], write: Callable[[bytes], None], bad: BadRows, advance: Callable[[int, int], None]
 ) -> int:
-    """Write what becomes of each block, tell of its faults, and give the exit status.
+    """Write what becomes of each block, report its faults, and return the exit status.
 
-    advance: is told rows and bytes done after each block.  Raises Stopped at the first fault if that is the rule.
+    advance: is told rows and bytes done after each block.  Raises BadRow at the first fault if that is the rule.
     """
-    line, rows, mended, doubted = 1, 0, 0, False
+    line, rows, mended = 1, 0, 0
+    told: set[str] = set()
     for outcome in outcomes:
         if outcome.text:
             write(outcome.text)
         advance(outcome.rows, outcome.size)
-        if outcome.doubted and not doubted:
-            doubted = True
-            _wonder(policy.source, line, outcome.doubted[0])
-        policy.take(fault._replace(line=fault.line + line) for fault in outcome.faults)
+        faults = [fault._replace(line=fault.line + line) for fault in outcome.faults]
+        for note in outcome.notes:  # in the order of the lines
+            if note.about in told:
+                continue
+            told.add(note.about)
+            bad.take(fault for fault in faults if fault.line < line + note.line)
+            faults = [fault for fault in faults if fault.line >= line + note.line]
+            warn(f"{bad.source}:{line + note.line}: {note.sentence}")
+        bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
-    if mended:
-        warn(f"{policy.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
-    return policy.finish(rows)
-
-
-def _wonder(source: str, line: int, doubted: tuple[int, str]) -> None:
-    remedy = "degrees? give --deg, or name the columns _deg"
-    warn(f"{source}:{line + doubted[0]}: {doubted[1]} is more than a full turn in radians; {remedy}")
+    if mended > 1:
+        warn(f"{bad.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
+    return bad.finish(rows)
 
 
 def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:

@@ -3,63 +3,109 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FrametoolError, ValueInvalid
+from frametool.errors import FrametoolError, ValueInvalid, overheard
 from frametool.geometry import floats, rigid
-from frametool.stream.row_layout import IDENTITY, POSE, pose_of
-from frametool.stream.stamp_source import read_stamp
+from frametool.stream.row_layout import IDENTITY, POSE, TURN, pose_of
+from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.stream.text_parts import Const, In, Out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Components, Rigid
+    from frametool.geometry.types import Components, Quaternion, Rigid
     from frametool.stream.request import Request
-    from frametool.stream.template import Entry, Learned
+    from frametool.stream.row_layout import Shape
+    from frametool.stream.template import Entry, Template
 
 
-def result_of(record: Learned, request: Request) -> str:
+class Rendered(NamedTuple):
+    """The text of a result, and what is odd about the numbers it comes from."""
+
+    text: str
+    mended: bool = False
+    doubt: str = ""
+
+
+def result_of(template: Template, request: Request) -> Rendered:
     """Return the text of a record's result; raises ValueInvalid for what is no rotation, or too large."""
     numbers: list[float] = []
-    locked = False
+    locked = mended = False
+    doubt = ""
     first = 0
-    for entry, edge in zip(record.entries, _edges(record, request), strict=True):
-        count = len(entry.holder.values)
-        parts = _moved(entry, edge, record.values[first : first + count], request)
-        pose = parts[:7] if len(parts) > 3 else parts
-        numbers += [*entry.target.numbers(pose, floats), *parts[7:]]
-        locked = locked or bool(entry.target.locked(pose))
-        first += count
+    for entry, edge in zip(template.entries, _edges(template, request), strict=True):
+        shape = entry.record.shape
+        values = template.values[first : first + shape.size]
+        parts, odd = _moved(entry, edge, values, request)
+        numbers += entry.target.written(parts, floats)
+        locked = locked or bool(entry.target.locked(parts))
+        mended = mended or odd
+        doubt = doubt or doubtful_angle(shape, values)
+        first += shape.size
     if not all(map(isfinite, numbers)):
         raise ValueInvalid("the result is not finite: the numbers are too large")
-    write = number_writer(request.precision, yaml=not record.json)
-    return _text(record, [write(number) for number in numbers], locked=locked)
+    write = number_writer(request.precision, yaml=not template.json)
+    return Rendered(_text(template, [write(number) for number in numbers], locked=locked), mended, doubt)
 
 
-def _edges(record: Learned, request: Request) -> list[Rigid | None]:
-    """Return the poses that move the entries, at their own times if they have such."""
-    timed, segments = request.timed, record.segments()
-    if timed is None:
-        return [entry.edge for entry in record.entries]
-    try:
-        stamps = [read_stamp(segments[index], in_ns=timed.in_ns) for index in record.stamps]
-        return [timed.pose(entry.holder.parent[0], at) for entry, at in zip(record.entries, stamps, strict=True)]
-    except FrametoolError as error:
-        error.column_name = timed.name  # type: ignore[attr-defined]
-        raise
+def _edges(template: Template, request: Request) -> list[Rigid | None]:
+    """Return the poses that move the records, at their own times if they have such."""
+    timed, segments = request.timed, template.segments()
+    edges = []
+    for entry, stamps in zip(template.entries, template.stamps, strict=True):
+        if timed is None or not stamps:
+            edges.append(entry.edge)
+            continue
+        texts = [segments[index] for index in stamps]
+        try:
+            at = read_header_stamp(*texts) if len(texts) == 2 else read_stamp(texts[0], in_ns=timed.in_ns)
+            edges.append(timed.pose(entry.record.parent.text, at))
+        except FrametoolError as error:
+            error.column_name = timed.column  # type: ignore[attr-defined]
+            raise
+    return edges
 
 
-def _moved(entry: Entry, edge: Rigid | None, values: Sequence[float], request: Request) -> Components:
-    shape = entry.holder.shape
+def _moved(entry: Entry, edge: Rigid | None, values: Sequence[float], request: Request) -> tuple[Components, bool]:
+    """Apply the operation to one record; return also whether its rotation had to be normalised."""
+    shape = entry.record.shape
+    own = values[: shape.own_size]
     if shape.kind != POSE:
-        return request.operation.point(shape.kind, shape.position(values), edge)
-    rotation: Components = IDENTITY
-    if shape.notation is not None:
-        given = shape.rotation(values)
-        rotation = shape.notation.checked_quaternion(given, floats, degrees=shape.degrees, normalize=request.normalize)
-    pose: Rigid = pose_of(shape.position(values), rotation)
-    return request.operation.pose([rigid.inverse(*pose) if shape.inverse else pose], edge, floats)
+        start = shape.position(own) if shape.unit is not None else tuple(own)
+        return request.operation.move(shape, (*start, *values[shape.own_size :]), edge), False
+    rotation, mended = checked_rotation(shape, own, request)
+    pose: Rigid = pose_of(shape.position(own), rotation)
+    moved = request.operation.pose([rigid.inverse(*pose) if entry.record.inverse else pose], edge, floats)
+    beside = request.operation.covariance(shape, tuple(values[shape.own_size :]), edge)
+    return (*moved, *beside), mended
+
+
+def checked_rotation(shape: Shape, values: Sequence[float], request: Request) -> tuple[Quaternion, bool]:
+    """Return the quaternion of a record's numbers, and whether it had to be normalised beyond silence."""
+    if shape.notation is None:
+        return IDENTITY, False
+    if shape.whole and tuple(values[12:]) != (0.0, 0.0, 0.0, 1.0):
+        found = " ".join(f"{value:g}" for value in values[12:])
+        raise ValueInvalid(f"the last row of a 4x4 pose is 0 0 0 1, found {found}")
+    rotation, odd = overheard(
+        shape.notation.checked_quaternion,
+        shape.rotation(values),
+        floats,
+        degrees=shape.degrees,
+        normalize=request.normalize,
+    )
+    return rotation, bool(odd)
+
+
+def doubtful_angle(shape: Shape, values: Sequence[float]) -> str:
+    """Name a bare angle beyond a full turn; "" where there is none."""
+    form = shape.notation
+    if form is None or shape.degrees or form.degrees is not None or form.representation.name == "rotvec":
+        return ""
+    given = shape.rotation(values)
+    beyond = [given[index] for index in form.representation.angles if abs(given[index]) > TURN]
+    return f"{form.spec} {beyond[0]:g}" if beyond else ""
 
 
 def number_writer(precision: int | None, *, yaml: bool) -> Callable[[float], str]:
@@ -76,10 +122,11 @@ def number_writer(precision: int | None, *, yaml: bool) -> Callable[[float], str
     return write
 
 
-def _text(record: Learned, numbers: Sequence[str], *, locked: bool) -> str:
-    segments = record.segments()
+def _text(template: Template, numbers: Sequence[str], *, locked: bool) -> str:
+    """Put the text of the result together."""
+    segments = template.segments()
     text = ""
-    for piece in record.pieces:
+    for piece in template.pieces:
         if isinstance(piece, In):
             text += segments[piece.part]
         elif isinstance(piece, Out):

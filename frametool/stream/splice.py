@@ -8,24 +8,29 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.geometry.representations import notation
+from frametool.documents.yaml_writer import quoted
+from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
-from frametool.stream.find_poses import XYZ
-from frametool.stream.row_layout import POSE, Target, axes_of
+from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
+from frametool.stream.record import PARENT_KEYS, POINT_KEYS, XYZ
+from frametool.stream.row_layout import POSE, SIX, Target, axes_of
 from frametool.stream.text_parts import Const, IfLocked, Out
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.nodes import Node
-    from frametool.stream.find_poses import Holder
+    from frametool.stream.record import Name, Record
     from frametool.stream.request import Request
     from frametool.stream.text_parts import Piece
 
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 MARK = "\0"
 SAMPLE = (0.5, 0.5, 0.5, 0.5)
+OURS = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *XYZ, "linear", "angular", "force", "torque")).union(
+    *({column, f"{column}_deg", f"{column}_rad"} for row in REPRESENTATIONS.values() for column in row.columns)
+)
 
 
 class Edit(NamedTuple):
@@ -36,9 +41,11 @@ class Edit(NamedTuple):
     pieces: tuple[Piece, ...]
 
 
-def target_of(holder: Holder, request: Request) -> Target:
-    """Settle how a record's result is written: as it was read unless told; a product always has both parts."""
-    shape, operation = holder.shape, request.operation
+def target_of(record: Record, request: Request) -> Target:
+    """Choose the keys of a result: those of the record, or `--to`; products always write position and rotation."""
+    shape, operation = record.shape, request.operation
+    if shape.kind in SIX:
+        return Target(None, (), plain=True)
     if shape.kind != POSE:
         return Target(shape.unit, ())
     forms = request.notations or ((shape.notation,) if shape.notation else ())
@@ -47,7 +54,9 @@ def target_of(holder: Holder, request: Request) -> Target:
     if not forms and product:
         forms = (notation("quaternion"),)
     placed = shape.whole or shape.unit is not None or product
-    told = [(form, shape.degrees if not request.notations else request.in_degrees(form)) for form in forms]
+    keys = [form.representation.name for form in forms]
+    together = sorted(forms, key=lambda form: keys.index(form.representation.name))  # two conventions share a key
+    told = [(form, request.in_degrees(form) if request.notations else shape.degrees) for form in together]
     whole = (
         placed
         and len(forms) == 1
@@ -58,42 +67,63 @@ def target_of(holder: Holder, request: Request) -> Target:
     return Target(unit, tuple(told), request.keep_sign, whole)
 
 
-class Editor:
-    """The edits of one holder in a record; `first` numbers the results from there."""
+def null_edits(node: Node) -> list[Edit]:
+    """Put null in the place of every number that is ours, wherever in a record it stands; the rest stays."""
+    if type(node.value) is list:
+        return [edit for item in node.value for edit in null_edits(item)]
+    if type(node.value) is not dict:
+        return []
+    found = []
+    for key, (_, value) in node.value.items():
+        if key in OURS:
+            found.append(Edit(value.start, value.end, (Const(b"null"),)))
+        else:
+            found += null_edits(value)
+    return found
+
+
+class Splicer:
+    """The edits of one record; `first` is the index of its first number among all results of the text."""
 
     def __init__(
-        self, text: str, root: Node, holder: Holder, target: Target, request: Request, *, json: bool, first: int
+        self, text: str, root: Node, record: Record, target: Target, request: Request, *, json: bool, first: int
     ) -> None:
-        """Know the text and what is wanted."""
+        """Find the record's mapping and its numbers among the nodes of the text."""
         self.text = text
         self.root = root
-        self.node = root.at(holder.path)
-        self.holder = holder
+        self.node = root.at(record.path)
+        self.record = record
         self.target = target
         self.request = request
         self.json = json
         self.first = first
         self.edits: list[Edit] = []
         self.dropped: set[str] = set()
-        self.slots: list[Node | None] = [None if path is None else root.at(path) for path in holder.numbers]
+        self.slots: list[Node | None] = [None if path is None else root.at(path) for path in record.numbers]
 
     def run(self) -> list[Edit]:
         """Return the edits, in no order."""
+        shape = self.record.shape
         if type(self.node.value) is not dict:
             return self._numbers(range(len(self.slots)), 0) if self._same_rotation() else self._rewritten()
         self._names()
+        if shape.covariance:
+            self._numbers(range(shape.own_size, shape.size), self.target.size)
+        if shape.kind in SIX:
+            self._numbers(range(6), 0)
+            return self.edits
         self._position()
-        if self.holder.shape.kind == POSE:
+        if shape.kind == POSE:
             self._rotation()
-            self.dropped.update({*STALE, "inverse", *self.holder.others} - set(self.holder.flat))
+            self.dropped.update({*STALE, "inverse", *self.record.others} - set(self.record.flat))
         self._leave_out()
         return self.edits
 
     def _same_rotation(self) -> bool:
         """Tell whether the rotation is written as it was read, number by number."""
-        shape, target = self.holder.shape, self.target
+        shape, target = self.record.shape, self.target
         same = [(shape.notation, shape.degrees)] == list(target.notations) if shape.notation else not target.notations
-        return same and shape.whole == target.whole and not self.holder.inverse
+        return same and shape.whole == target.whole and not self.record.inverse
 
     def _numbers(self, slots: Sequence[int], first: int) -> list[Edit]:
         """Put numbers of the result where the slots are."""
@@ -108,10 +138,10 @@ class Editor:
 
     def _position(self) -> None:
         """Write the position where it stands, or as a member of its own; a whole matrix takes it in."""
-        key, target = self.holder.key, self.target
-        if self.holder.shape.unit is None:
+        key, target = self.record.key, self.target
+        if self.record.shape.unit is None:
             if target.unit is not None:
-                anchor = self.node.value[self.holder.rotation][0] if self.holder.rotation else self._first_key()
+                anchor = self.node.value[self.record.rotation][0] if self.record.rotation else self._first_key()
                 self._insert_before(anchor, self._member({"xyz": list(SAMPLE[:3])}, 0))
             return
         if target.unit is None:
@@ -124,46 +154,41 @@ class Editor:
     def _position_stays(self) -> bool:
         """Tell whether only the notation of the rotation changes: then the position keeps its text."""
         request = self.request
-        moves = request.operation.moves or request.way is not None or request.timed is not None
-        return request.operation.changes_nothing and not moves and not self.holder.inverse
+        return request.operation.changes_nothing and not request.operation.moves and not self.record.inverse
 
     def _rotation(self) -> None:
         """Write the rotation where it stands, or its members anew."""
         first = 0 if self.target.unit is None else 3
-        slots = range(0 if self.holder.shape.unit is None else 3, len(self.slots))
-        rotation = self.holder.rotation
+        slots = range(0 if self.record.shape.unit is None else 3, len(self.slots))
+        rotation = self.record.rotation
         members = self._members(first)
         if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
             self._numbers(slots, first)
             members = []
         elif rotation:
             self._replace(self.node.value[rotation], members.pop(0) if members else ())
-            self.dropped.update(set(self.holder.flat) - {rotation})
+            self.dropped.update({"angles", *self.record.flat} - {rotation})
         count = (
             first + sum(len(form.representation.columns) for form, _ in self.target.notations) + self.target.whole * 7
         )
         members += self._extras(count)
-        after = self.node.value[rotation or self.holder.key][1] if (rotation or self.holder.key) else self._last_value()
+        after = self.node.value[rotation or self.record.key][1] if (rotation or self.record.key) else self._last_value()
         for member in members:
             self._insert_after(after, member)
 
     def _members(self, first: int) -> list[tuple[Piece, ...]]:
-        """Return one member for each notation, and the flag of a lock."""
+        """Return one member for each key of a notation, and the flag of a lock."""
+        notations = self.target.notations
+        style = Style("json", tuple(form for form, _ in notations), degrees=any(degrees for _, degrees in notations))
+        position = SAMPLE[:3] if self.target.whole else None
         members = []
-        for form, degrees in self.target.notations:
-            position = SAMPLE[:3] if self.target.whole else None
-            style = Style("json", (form,), degrees=degrees)
-            entry = Result(Pose(position, SAMPLE)).mapping(style)
-            entry.pop("gimbal_lock", None)
-            entry.pop("xyz", None)
-            members.append(self._member(entry, first))
-            first += len(form.representation.columns)
-        if any(axes_of(form) for form, _ in self.target.notations):
-            members.append(
-                tuple(
-                    IfLocked(piece.text) for piece in self._member({"gimbal_lock": True}, 0) if isinstance(piece, Const)
-                )
-            )
+        for key, value in Result(Pose(position, SAMPLE)).mapping(style).items():
+            if key not in ("gimbal_lock", "xyz"):
+                members.append(self._member({key: value}, first))
+                first += sum(isinstance(piece, Out) for piece in members[-1])
+        if any(axes_of(form) for form, _ in notations):
+            flag = self._member({"gimbal_lock": True}, 0)
+            members.append(tuple(IfLocked(piece.text) for piece in flag if isinstance(piece, Const)))
         return members
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
@@ -171,39 +196,49 @@ class Editor:
 
     def _names(self) -> None:
         """Rename the frames as the operation does."""
-        request, holder = self.request, self.holder
-        name, parent = holder.name[0], holder.parent[0]
-        if request.rename is not None:
-            parent, name = request.rename(parent, name)
-        elif request.operation.moves:
-            parent = request.told
+        if self.request.rename is None:
+            return
+        record = self.record
+        parent, name = self.request.rename(record.parent.text, record.name.text)
         if self._has_swapped(name, parent):
             return
-        first = self._first_key()
-        keys = ("name", "parent") if holder.shape.kind == POSE else ("name", "frame")
-        for key, new, (old, path) in zip(keys, (name, parent), (holder.name, holder.parent), strict=True):
-            if new == old:
-                continue
-            if old is None:
-                self._insert_before(first, self._member({key: new}, 0))
-            elif new is None and path[:-1] == holder.path:
-                self.dropped.add(key)
+        self._name(record.name, name, "name")
+        self._name(record.parent, parent, "parent" if record.shape.kind == POSE else "frame")
+
+    def _name(self, old: Name, new: str | None, key: str) -> None:
+        """Write a frame's name where the record says it, or as a member of its own."""
+        if new == old.text:
+            return
+        if not old.paths:
+            self._insert_before(self._first_key(), self._member({key: new}, 0))
+        for path in old.paths:
+            if new is None and path[:-1] == self.record.path and path[-1] in ("name", *PARENT_KEYS):
+                self.dropped.add(str(path[-1]))
             else:
                 node = self.root.at(path)
-                self.edits.append(Edit(node.start, node.end, (Const(self._text(new or "").encode()),)))
+                self.edits.append(Edit(node.start, node.end, (Const(self._quoted_as(node, new or "").encode()),)))
+
+    def _quoted_as(self, node: Node, name: str) -> str:
+        """Write a frame's name with the quotes that the one before it had."""
+        if node.quote == "'":
+            return "'" + name.replace("'", "''") + "'"
+        if node.quote != '"' or not node.value:
+            return self._text(name) if name or self.json else "''"
+        from frametool.documents.json_writer import dump
+
+        return dump(name)
 
     def _has_swapped(self, name: str | None, parent: str | None) -> bool:
         """Call the one frame there is by the other key, where that is all that changes."""
-        old, new = (self.holder.name[0], self.holder.parent[0]), (name, parent)
-        if new != old[::-1] or None not in new or new == old:
+        before, given = self.record.name, self.record.parent
+        if (name, parent) != (given.text, before.text) or (name is None) == (parent is None):
             return False
-        key = "name" if old[1] is None else "parent"
-        if key not in self.node.value:
+        old, key = (before, "parent") if given.text is None else (given, "name")
+        only = not (before.paths and given.paths)
+        if not only or len(old.paths) != 1 or old.paths[0][-1] not in ("name", "parent"):
             return False
-        node = self.node.value[key][0]
-        self.edits.append(
-            Edit(node.start, node.end, (Const(self._text("parent" if key == "name" else "name").encode()),))
-        )
+        node = self.node.value[old.paths[0][-1]][0]
+        self.edits.append(Edit(node.start, node.end, (Const(self._text(key).encode()),)))
         return True
 
     def _text(self, value: str) -> str:
@@ -217,6 +252,8 @@ class Editor:
             from frametool.documents.json_writer import dump
 
             return dump(value, number) if value is not True else "true"
+        if type(value) is str:
+            return quoted(value)
         from frametool.documents.yaml_writer import dump as dump_yaml
 
         return dump_yaml(value, number)
@@ -269,14 +306,12 @@ class Editor:
     def _leave_out(self) -> None:
         """Leave members out, with what parts them from their neighbours."""
         members = list(self.node.value.items())
-        kept = [index for index, (key, _) in enumerate(members) if key not in self.dropped]
+        follows = False  # whether a member that stays comes before
         for index, (key, (key_node, value)) in enumerate(members):
             if key not in self.dropped:
-                continue
-            before = [each for each in kept if each < index]
-            if before:
-                start = members[index - 1][1][1].end
-                self.edits.append(Edit(start, value.end, ()))
+                follows = True
+            elif follows:
+                self.edits.append(Edit(members[index - 1][1][1].end, value.end, ()))
             else:
                 end = members[index + 1][1][0].start if index + 1 < len(members) else value.end
                 self.edits.append(Edit(key_node.start, end, ()))

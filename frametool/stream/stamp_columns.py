@@ -8,7 +8,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
-from frametool.stream.stamp_source import read_stamp
+from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
 from frametool.text.parse import LOWEST, trimmed
 from frametool.text.spans import windows
@@ -36,6 +36,20 @@ def parse_stamps(cells: Spans, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
         try:
             stamps[row] = read_stamp(cells.text(row).decode("utf-8", "replace"), in_ns=in_ns)
         except ValueInvalid as error:
+            reasons[row] = str(error)
+    return stamps, reasons
+
+
+def parse_header_stamps(seconds: Spans, nanoseconds: Spans) -> tuple[Ints, dict[int, str]]:
+    """Read the two whole numbers of stamps (n,) as nanoseconds; otherwise as `parse_stamps`."""
+    whole, sure = _parse_plain(seconds.data, *trimmed(*seconds), in_ns=True)
+    below, fine = _parse_plain(nanoseconds.data, *trimmed(*nanoseconds), in_ns=True)
+    stamps = whole * BILLION + below
+    reasons = {}
+    for row in np.flatnonzero(~(sure & fine & (whole < _MOST_SECONDS))).tolist():
+        try:
+            stamps[row] = read_header_stamp(seconds.text(row).decode(), nanoseconds.text(row).decode())
+        except (ValueInvalid, OverflowError) as error:
             reasons[row] = str(error)
     return stamps, reasons
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean
-from frametool.frames.stamps import parse_stamp
+from frametool.frames.stamps import BILLION, parse_stamp
 from frametool.grammar.readers import Misfit, kind
 
 if TYPE_CHECKING:
@@ -18,25 +18,45 @@ NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names the
 LARGEST = (1 << 63) - 1
 
 
-class Timed(NamedTuple):
-    """Which column or key holds the stamps, and the poses that move from a frame (None: the one SOURCE).
+HEADER = "header.stamp"
 
-    many: columns of poses at an array of nanoseconds, nan where there is no data; one: a pose, or the reason raised
+
+class Timed(NamedTuple):
+    """Where the stamps of rows stand, and the poses that move from a frame (None: the one SOURCE) at such times.
+
+    name: the column or key of the stamps; "" for the stamp in the header of each message
+    many: columns of poses at an array of nanoseconds, nan where there is no data
+    one: a pose at one time, or the reason raised
+    moves: tells whether what lies between a frame and the target depends on the time
     """
 
     name: str
     many: Callable[[str | None, Any], Components]
     one: Callable[[str | None, int], Rigid]
+    moves: Callable[[str | None], bool] = bool
 
     @property
     def in_ns(self) -> bool:
         """Tell whether the name says that stamps are integer nanoseconds."""
         return self.name.endswith("_ns") or self.name in NANOSECONDS
 
+    @property
+    def column(self) -> str:
+        """Name the column or key for messages."""
+        return self.name or HEADER
+
     def pose(self, frame: str | None, stamp_ns: int) -> Rigid:
         """Return the pose at one time, to the bit as `many` does; raises FrametoolError where there is none."""
         tx, ty, tz, x, y, z, w = (float(column[0]) for column in self.many(frame, [stamp_ns]))
         return (tx, ty, tz, x, y, z, w) if w == w else self.one(frame, stamp_ns)  # noqa: PLR0124 - nan is not itself
+
+
+def read_header_stamp(seconds: str, nanoseconds: str) -> int:
+    """Read the two numbers of a header's stamp as nanoseconds; raises ValueInvalid."""
+    whole, below = (text.strip(" \t\"'") for text in (seconds, nanoseconds))
+    if not (whole.lstrip("+-").isdecimal() and below.isdecimal()):
+        raise ValueInvalid(f"a stamp is two whole numbers, found {whole!r} and {below!r}")
+    return int(whole) * BILLION + int(below)
 
 
 def read_stamp(text: str, *, in_ns: bool) -> int:

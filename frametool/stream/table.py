@@ -131,7 +131,7 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
     if layout.frames:
         named = [_texts(cells, place) for place in layout.frames]
         frames = ["\0".join(names) for names in zip(*named, strict=True)]
-    stamps = [] if layout.time is None else [without_quotes(cells.column(layout.time))]
+    stamps = [] if layout.time is None else [(without_quotes(cells.column(layout.time)),)]
     odd, broken = [], []
     if len(cells.rows) < len(cells.counts):
         for line in cells.odd_lines().tolist():

@@ -9,7 +9,7 @@ from frametool.errors import FormatError
 from frametool.stream.blocks import Run, State
 from frametool.stream.faults import Fault
 from frametool.stream.rows import written
-from frametool.stream.run import Outcome, mapped
+from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.table import UNCLOSED, open_table, table_block
 from frametool.stream.table_plan import TUM, plan_table
 from frametool.text.cells import is_torn, torn_record, whole_records
@@ -107,8 +107,15 @@ class Work:
         block = table_block(self.table, self.layout, text)
         run = Run(self.plan, block, self.state)
         faults = run.faults()
-        doubted = [(block.line_of(row), angle) for row, angle in run.doubted[:1]]
+        notes = [RowNote.of_degrees(block.line_of(row), angle) for row, angle in run.doubted[:1]]
+        notes += [RowNote.of_rounding(block.line_of(row)) for row in sorted(run.mended)[:1]]
         rows = len(block.places) + len(block.broken)
         return Outcome(
-            written(run.groups(run.first_fault())), faults, rows, text.count(b"\n"), len(run.mended), doubted, len(text)
+            written(run.groups(run.first_fault())),
+            faults,
+            rows,
+            text.count(b"\n"),
+            len(run.mended),
+            sorted(notes),
+            len(text),
         )

@@ -1,6 +1,6 @@
 """What is learned from one record and holds for all that are written alike: what its numbers mean, what changes.
 
-Records are alike if they differ only in our numbers and in scalars that merely pass; then one regular expression
+Records are alike if they differ only in our numbers and in scalars that cannot matter; then one regular expression
 cuts them all into the same stretches, and nothing has to be parsed again.
 """
 
@@ -8,85 +8,97 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.document import Document, format_error, parse_documents
 from frametool.documents.json_reader import strict_json
-from frametool.documents.nodes import parse_nodes
+from frametool.documents.nodes import Node, parse_nodes
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
+from frametool.grammar.pose import POSE_KEYS
 from frametool.grammar.readers import Misfit, NotARotation, Reading
-from frametool.stream.find_poses import find_holders
-from frametool.stream.splice import Editor, target_of
+from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
+from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_records
+from frametool.stream.splice import OURS, Splicer, target_of
 from frametool.stream.stamp_source import stamp_path
 from frametool.stream.text_parts import In, Out
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.documents.nodes import Node
     from frametool.geometry.types import Rigid
-    from frametool.stream.find_poses import Holder
+    from frametool.grammar.readers import Path
+    from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape, Target
     from frametool.stream.splice import Edit
     from frametool.stream.text_parts import Piece
 
-# what may be a number; reading it decides
-JSON_NUMBER = r"-?(?!0[0-9])[0-9][-+.0-9eE]*+"
+# what a number looks like: JSON's is exact, YAML's is judged when it is read
+JSON_NUMBER = r"-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+"
 YAML_NUMBER = r"[-+.]?[0-9][-+.0-9eE]*+"
 JSON_TEXT = r'"[^"\\\x00-\x1f]*(?:\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4})[^"\\\x00-\x1f]*)*"'
 # what may stand for a scalar that passes, by its quotes: never anything that could be read as more than one scalar
 YAML_PLAIN = r"(?:-(?! )|[A-Za-z0-9_./+])(?:[\w./+-]| (?=[\w./+(-])|:(?=[\w/]))*"
 FREE = {
     (True, True): JSON_TEXT,
-    (True, False): r"(?:-?(?!0[0-9])[0-9]++(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+|true|false|null)",
+    (True, False): rf"(?:{JSON_NUMBER}|true|false|null)",
     (False, True): r'"[^"\\\x00-\x1f]*"',
     (False, False): YAML_PLAIN,
 }
 SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
+# scalars under these keys decide what a record is, wherever in it they stand ..
+DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
+# .. and these in the mappings that hold the record
+_WORDS = frozenset(word.partition("_deg")[0].partition("_rad")[0] for word in (*OURS, *POSE_KEYS, "theta"))
 
 
 class Entry(NamedTuple):
-    """One point or pose of a record: what it is, how its result is written, and its mover, or its stamp."""
+    """One record of a text: what it is, how its result is written, the pose that moves it or its stamp."""
 
-    holder: Holder
+    record: Record
     target: Target
     edge: Rigid | None
-    stamp: tuple[str | int, ...] | None = None
+    stamp: tuple[Path, ...] = ()
 
 
-class Learned:
-    """A record, and what holds for all that are alike.
+class Template:
+    """The text of records, and what holds for all that are written alike.
 
-    segments: the stretches of its text; numbers: those that hold our numbers, in order; stamps: those of each entry's
-    stamp; pieces: of the result
+    stretches: where each part of the text stands
+    numbers: the stretches that hold our numbers, in order
+    stamps: the stretches of each entry's stamp
+    pieces: what the result is made of
+    unnamed: a frame that the result cannot name any more; "" if there is none
     """
 
     def __init__(
-        self, text: str, entries: Sequence[Entry], nodes: Sequence[Node], edits: Sequence[Edit], *, json: bool
+        self, text: str, entries: Sequence[Entry], root: Node, edits: Sequence[Edit], request: Request, *, json: bool
     ) -> None:
-        """Cut the text where numbers and edits are."""
+        """Cut the text where numbers, stamps and edits are."""
         self.text = text
         self.entries = tuple(entries)
         self.json = json
-        self._nodes = nodes
-        slots = _slots(entries, nodes)
-        stamps = [_span(nodes, entry.stamp) for entry in entries if entry.stamp is not None]
+        self.unnamed = next((lost for entry in entries if (lost := _lost_name(entry.record, request))), "")
+        self._root = root
+        self._request = request
+        slots = [_inside(root, path) for entry in entries for path in entry.record.numbers]
+        stamps = [[_span(root, path) for path in entry.stamp] for entry in entries]
         number = re.compile(JSON_NUMBER if json else YAML_NUMBER)
         self.regular = all(slot is not None and number.fullmatch(text, *slot) for slot in slots)
-        self.values = tuple(value for entry in entries for value in entry.holder.values)
-        cuts = sorted({slot for slot in (*slots, *stamps) if slot is not None})
-        self.stretches, self.pieces = _cut(text, cuts, edits)
-        self.numbers = tuple(self.stretches.index(slot) for slot in slots if slot is not None)
-        self.stamps = tuple(self.stretches.index(stamp) for stamp in stamps)
+        self.values = tuple(value for entry in entries for value in entry.record.values)
+        cuts = sorted({*(slot for slot in slots if slot is not None), *(span for spans in stamps for span in spans)})
+        self.stretches, self.pieces = _cut(len(text), cuts, edits)
+        at = {stretch: index for index, stretch in enumerate(self.stretches)}
+        self.numbers = tuple(at[slot] for slot in slots if slot is not None)
+        self.stamps = tuple(tuple(at[span] for span in spans) for spans in stamps)
         first = min((slot[0] for slot in slots if slot is not None), default=0)
         self.line = text.count("\n", 0, first)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """Return what the numbers mean."""
-        return tuple(entry.holder.shape for entry in self.entries)
+        return tuple(entry.record.shape._replace(inverse=entry.record.inverse) for entry in self.entries)
 
     @cached_property
     def pattern(self) -> re.Pattern[bytes]:
@@ -104,7 +116,7 @@ class Learned:
     def names(self) -> tuple[str, ...]:
         """Name the numbers by the keys that lead to them."""
         return tuple(
-            ".".join(map(str, path[1:])) if path else "" for entry in self.entries for path in entry.holder.numbers
+            ".".join(map(str, path[1:])) if path else "" for entry in self.entries for path in entry.record.numbers
         )
 
     def segments(self) -> list[str]:
@@ -116,127 +128,109 @@ class Learned:
         """Return the regular expression, one group a stretch, that all records match that are alike."""
         number = JSON_NUMBER if self.json else YAML_NUMBER
         ours = set(self.numbers)
-        fixed = _fixed_places(self.entries, self._nodes)
-        free = [leaf for node in self._nodes for leaf in node.leaves() if (leaf.start, leaf.end) not in fixed]
-        groups = [
-            f"({number})" if index in ours and self.regular else f"({self._open(start, end, free)})"
-            for index, (start, end) in enumerate(self.stretches)
-        ]
+        free = iter(self._free_leaves())
+        leaf = next(free, None)
+        groups = []
+        for index, (start, end) in enumerate(self.stretches):
+            if index in ours and self.regular:
+                groups.append(f"({number})")
+                continue
+            parts, at = [], start
+            while leaf is not None and leaf[0].end <= end:
+                node, pattern = leaf
+                if node.start >= at and re.fullmatch(pattern, self.text[node.start : node.end], re.ASCII):
+                    parts += [re.escape(self.text[at : node.start]), pattern]
+                    at = node.end
+                leaf = next(free, None)
+            groups.append("".join(["(", *parts, re.escape(self.text[at:end]), ")"]))
         return "".join(groups).encode()
 
-    def _open(self, start: int, end: int, free: Sequence[Node]) -> str:
-        """Write a stretch as an expression in which scalars that pass may differ."""
-        parts, at = [], start
-        for leaf in free:
-            pattern = self._pattern(leaf)
-            if (
-                leaf.start < at
-                or leaf.end > end
-                or not re.fullmatch(pattern, self.text[leaf.start : leaf.end], re.ASCII)
-            ):
+    def _free_leaves(self) -> Iterator[tuple[Node, str]]:
+        """Yield the scalars that decide nothing, in order, each with the expression of what it may be."""
+        around = {entry.record.path[:depth] for entry in self.entries for depth in range(len(entry.record.path) + 1)}
+        around |= {(*path, "header") for path in around}
+        fixed = {path for entry in self.entries for path in entry.record.numbers}
+        for path, leaf in _leaves(self._root, ()):
+            depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
+            key = str(path[depth - 1]) if depth else ""
+            if key == "frame" and self._request.counts(leaf.value):
+                yield leaf, f"{leaf.quote}[0-9]++{leaf.quote}"
+            elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _may_matter(key)):
                 continue
-            parts += [re.escape(self.text[at : leaf.start]), pattern]
-            at = leaf.end
-        return "".join([*parts, re.escape(self.text[at:end])])
-
-    def _pattern(self, leaf: Node) -> str:
-        return SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
+            else:
+                yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
 
 
-def _slots(entries: Sequence[Entry], nodes: Sequence[Node]) -> list[tuple[int, int] | None]:
-    """Return where each of our numbers stands, without its quotes; None for one that is not written."""
-    found: list[tuple[int, int] | None] = []
-    for entry in entries:
-        for path in entry.holder.numbers:
-            node = _node(nodes, path) if path is not None else None
-            found.append(None if node is None else (node.start + bool(node.quote), node.end - bool(node.quote)))
-    return found
+def _lost_name(record: Record, request: Request) -> str:
+    """Name a frame that the record names and its result cannot, because the operation does not know the other one."""
+    if request.rename is None:
+        return ""
+    before = record.parent.text or record.name.text or ""
+    return before if request.rename(record.parent.text, record.name.text) == (None, None) else ""
 
 
-def _span(nodes: Sequence[Node], path: tuple[str | int, ...]) -> tuple[int, int]:
+def _may_matter(key: str) -> bool:
+    """Tell whether a scalar under this key, beside our numbers, may be one of them or change what they mean."""
+    return re.split(r"[^a-z0-9_]|_(?:deg|rad|mm)", key.casefold(), maxsplit=1)[0] in _WORDS
+
+
+def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
+    """Yield the scalars that are values, in the order of the text, with their paths."""
+    if type(node.value) is dict:
+        for key, (_, value) in node.value.items():
+            yield from _leaves(value, (*path, key))
+    elif type(node.value) is list:
+        for index, value in enumerate(node.value):
+            yield from _leaves(value, (*path, index))
+    else:
+        yield path, node
+
+
+def _inside(root: Node, path: Path | None) -> tuple[int, int] | None:
+    """Return where a number stands, without its quotes; None for one that is not written."""
+    if path is None:
+        return None
+    node = root.at(path)
+    return node.start + bool(node.quote), node.end - bool(node.quote)
+
+
+def _span(root: Node, path: Path) -> tuple[int, int]:
     """Return where a scalar stands, with its quotes."""
-    node = _node(nodes, path)
+    node = root.at(path)
     return node.start, node.end
 
 
-def _node(nodes: Sequence[Node], path: tuple[str | int, ...]) -> Node:
-    return nodes[int(path[0])].at(path[1:])
-
-
-def _fixed_places(entries: Sequence[Entry], nodes: Sequence[Node]) -> set[tuple[int, int]]:
-    """Return the places of scalars that must be the same: our numbers, names of frames, what says units and axes."""
-    fixed = {
-        (node.start, node.end)
-        for entry in entries
-        for path in entry.holder.numbers
-        if path is not None
-        for node in (_node(nodes, path),)
-    }
-    for entry in entries:
-        holder = entry.holder
-        for _, path in (holder.name, holder.parent):
-            try:
-                node = _node(nodes, path)
-            except (KeyError, IndexError):
-                continue
-            fixed.add((node.start, node.end))
-        node = _node(nodes, holder.path)
-        if type(node.value) is dict:
-            for key in ("angles", "inverse", holder.rotation, *holder.others):
-                if key in node.value:
-                    fixed.update((leaf.start, leaf.end) for leaf in node.value[key][1].leaves())
-    return fixed
-
-
 def _cut(
-    text: str, slots: Sequence[tuple[int, int]], edits: Sequence[Edit]
+    length: int, cuts: Sequence[tuple[int, int]], edits: Iterable[Edit]
 ) -> tuple[list[tuple[int, int]], list[Piece]]:
-    """Cut the text into stretches, each number one of its own; give them with the pieces of the result."""
+    """Cut a text into stretches, each number one of its own; return them with the pieces of the result."""
     stretches: list[tuple[int, int]] = []
     pieces: list[Piece] = []
+    slots = list(reversed(cuts))
+
+    def walk(start: int, end: int, *, shown: bool) -> None:
+        """Add the stretches from start to end; they are pieces of the result if they are shown."""
+        while start < end:
+            slot = slots[-1] if slots and slots[-1][1] <= end else None
+            stop = end if slot is None else slot[0] if slot[0] > start else slots.pop()[1]
+            stretches.append((start, stop))
+            if shown:
+                pieces.append(In(len(stretches) - 1))
+            start = stop
+
     at = 0
     for edit in sorted(edits, key=lambda each: (each.start, each.end)):
         start = max(edit.start, at)
-        _pass(stretches, pieces, slots, at, start, shown=True)
+        walk(at, start, shown=True)
         pieces += edit.pieces
-        _pass(stretches, pieces, slots, start, max(edit.end, start), shown=False)
+        walk(start, max(edit.end, start), shown=False)
         at = max(edit.end, start)
-    _pass(stretches, pieces, slots, at, len(text), shown=True)
-    return stretches, _joined(pieces)
+    walk(at, length, shown=True)
+    return stretches, [piece for piece in pieces if not isinstance(piece, Out) or piece.last > piece.first]
 
 
-def _pass(
-    stretches: list[tuple[int, int]],
-    pieces: list[Piece],
-    slots: Sequence[tuple[int, int]],
-    start: int,
-    end: int,
-    *,
-    shown: bool,
-) -> None:
-    """Add the stretches from start to end, numbers singly; they are pieces of the result if they are shown."""
-    for slot in slots:
-        if start <= slot[0] and slot[1] <= end:
-            if slot[0] > start:
-                _add(stretches, pieces, (start, slot[0]), shown=shown)
-            _add(stretches, pieces, slot, shown=shown)
-            start = slot[1]
-    if end > start:
-        _add(stretches, pieces, (start, end), shown=shown)
-
-
-def _add(stretches: list[tuple[int, int]], pieces: list[Piece], stretch: tuple[int, int], *, shown: bool) -> None:
-    stretches.append(stretch)
-    if shown:
-        pieces.append(In(len(stretches) - 1))
-
-
-def _joined(pieces: list[Piece]) -> list[Piece]:
-    return [piece for piece in pieces if not isinstance(piece, Out) or piece.last > piece.first]
-
-
-def learn(text: str, request: Request, *, json: bool, source: str, line: int) -> Learned | None:
-    """Learn from one record; None if there is nothing in it.
+def learn(text: str, request: Request, *, json: bool, source: str, line: int) -> Template | None:
+    """Learn from the text of one record; None if there is nothing in it.
 
     line: of the record's first character, from 1.  Raises FormatError with the place.
     """
@@ -249,8 +243,24 @@ def learn(text: str, request: Request, *, json: bool, source: str, line: int) ->
         raise
     if not entries:
         return None
-    nodes = parse_nodes(text)
-    return Learned(text, entries, nodes, _edits(text, entries, nodes, request, json=json), json=json)
+    root = Node(0, len(text), parse_nodes(text))
+    return Template(text, entries, root, _edits(text, entries, root, request, json=json), request, json=json)
+
+
+def nulled(text: str, *, json: bool) -> str | None:
+    """Return the text of a record with null in the place of our numbers; None if it has none that can be found."""
+    from frametool.stream.splice import null_edits
+
+    try:
+        _json_documents(Source("", text)) if json else parse_documents(text, "")
+        edits = null_edits(Node(0, len(text), parse_nodes(text)))
+    except FormatError:
+        return None
+    if not edits:
+        return None
+    segments, pieces = _cut(len(text), (), edits)
+    shown = (text[slice(*segments[each.part])] if isinstance(each, In) else "null" for each in pieces)
+    return "".join(shown)
 
 
 def _json_documents(source: Source) -> list[Document]:
@@ -260,54 +270,42 @@ def _json_documents(source: Source) -> list[Document]:
     return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
 
 
-def _entries(document: Any, request: Request, source: Source) -> list[Entry]:
+def _entries(document: Document, request: Request, source: Source) -> list[Entry]:
+    """Read the records of a document, and say how each is moved."""
     reading = Reading(source, degrees=request.degrees, normalize=request.normalize)
     try:
-        holders = list(find_holders(document.value, request, reading))
-        made = []
-        for holder in holders:
-            placed = _below_document(holder, document.index)
-            timed = request.timed
-            stamp = (document.index, *stamp_path(document.value, holder.path, timed.name)) if timed else None
-            edge = request.way(placed.parent[0]) if request.way and not timed else None
-            if request.way is None and request.rename:
-                request.rename(placed.parent[0], placed.name[0])
-            made.append(Entry(placed, target_of(placed, request), edge, stamp))
+        records = list(find_records(document.value, request, reading, (document.index,)))
+        made = [_entry(document, record, request) for record in records]
     except Misfit as misfit:
-        error = format_error(source, (document.index, *misfit.path), str(misfit), key=misfit.key)
+        error = format_error(source, misfit.path, str(misfit), key=misfit.key)
         error.__cause__ = misfit if isinstance(misfit, NotARotation) else None
-        error.column_name = ".".join(map(str, misfit.path))  # type: ignore[attr-defined]
+        error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
         raise error from misfit
     return made
 
 
-def _below_document(holder: Holder, index: int) -> Holder:
-    """Let a holder's paths begin at the document's number."""
-    return holder._replace(
-        path=(index, *holder.path),
-        shape=holder.shape._replace(inverse=holder.inverse),
-        numbers=tuple(None if path is None else (index, *path) for path in holder.numbers),
-        name=(holder.name[0], (index, *holder.name[1])),
-        parent=(holder.parent[0], (index, *holder.parent[1])),
-    )
+def _entry(document: Document, record: Record, request: Request) -> Entry:
+    """Find the pose that moves a record, or the stamp at which it is looked up; check the frames it names."""
+    stamp: tuple[Path, ...] = ()
+    edge = None
+    timed = request.timed
+    if timed is not None and timed.name:
+        stamp = ((document.index, *stamp_path(document.value, record.path[1:], timed.name)),)
+    elif timed is not None and record.stamp and timed.moves(record.parent.text):
+        stamp = record.stamp
+    elif request.way is not None:
+        edge = request.way(record.parent.text)
+    if request.rename is not None:
+        request.rename(record.parent.text, record.name.text)
+    return Entry(record, target_of(record, request), edge, stamp)
 
 
-def _edits(text: str, entries: Sequence[Entry], nodes: Sequence[Node], request: Request, *, json: bool) -> list[Edit]:
+def _edits(text: str, entries: Sequence[Entry], root: Node, request: Request, *, json: bool) -> list[Edit]:
     edits: list[Edit] = []
     first = 0
     for entry in entries:
-        index = int(entry.holder.path[0])
-        holder = _above_document(entry.holder)
-        edits += Editor(text, nodes[index], holder, entry.target, request, json=json, first=first).run()
-        first += entry.target.size + len(request.operation.extras) * (entry.holder.shape.kind == "pose")
+        shape = entry.record.shape
+        edits += Splicer(text, root, entry.record, entry.target, request, json=json, first=first).run()
+        first += entry.target.size + len(request.operation.extras) * (shape.kind == "pose")
+        first += (shape.size - shape.own_size) * shape.covariance
     return edits
-
-
-def _above_document(holder: Holder) -> Holder:
-    """Let a holder's paths begin below its document."""
-    return holder._replace(
-        path=holder.path[1:],
-        numbers=tuple(None if path is None else path[1:] for path in holder.numbers),
-        name=(holder.name[0], holder.name[1][1:]),
-        parent=(holder.parent[0], holder.parent[1][1:]),
-    )

@@ -4,39 +4,51 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import Any
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from typing import Self
 
 PATIENCE = 2.0  # seconds before anything is shown
 
 
-class Progress:
-    """Shows itself only if stderr is a terminal and the job takes longer than two seconds."""
+class ProgressBar:
+    """Show how far a job is, if stderr is a terminal and the job takes longer than two seconds."""
 
     def __init__(self, total: int | None, *, quiet: bool) -> None:
-        """Know the bytes there are in all, or None."""
+        """Start the clock; `total` is the number of bytes, if it is known."""
         self.total = total
         self.rows = self.size = 0
         self._hidden = quiet or sys.stderr is None or not sys.stderr.isatty()
         self._start = time.monotonic()
         self._bar: Any = None
 
+    def __enter__(self) -> Self:
+        """Wait for the first block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Clear the line."""
+        if self._bar is not None:
+            with suppress(OSError):  # a terminal that has gone does not change what the data is worth
+                self._bar.stop()
+
     def advance(self, rows: int, size: int) -> None:
         """Count what was done."""
         self.rows += rows
         self.size += size
-        if self._hidden or time.monotonic() - self._start < PATIENCE:
+        seconds = time.monotonic() - self._start
+        if self._hidden or seconds < PATIENCE:
             return
         if self._bar is None:
             self._bar = _bar(self.total)
             self._bar.start()
             self._task = self._bar.add_task("", total=self.total, rows="0", rate="")
-        rate = self.rows / (time.monotonic() - self._start)
-        self._bar.update(self._task, completed=self.size, rows=f"{self.rows:,}", rate=f"{rate:,.0f}")
-
-    def stop(self) -> None:
-        """Take the line away."""
-        if self._bar is not None:
-            self._bar.stop()
+        with suppress(OSError):
+            self._bar.update(
+                self._task, completed=self.size, rows=f"{self.rows:,}", rate=f"{self.rows / seconds:,.0f}"
+            )
 
 
 def _bar(total: int | None) -> Any:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from frametool.errors import FrametoolError
 from frametool.formats import readers
 from frametool.geometry.representations import notation
-from frametool.stream.faults import Policy
+from frametool.stream.faults import BadRows
 from frametool.stream.operation import Operation
 from frametool.stream.record_stream import run_records
 from frametool.stream.request import Request
@@ -16,7 +16,7 @@ from frametool.stream.run import run
 from frametool.stream.table_stream import run_table
 
 QUARTER = (1.0, 2.0, 3.0, 0.0, 0.0, 0.7071067811865476, 0.7071067811865476)
-MOVE = Request(Operation(left=QUARTER, moves=True), way=lambda _own: QUARTER)
+MOVE = Request(Operation(left=QUARTER, moves=True), way=lambda _own: QUARTER, rename=lambda _parent, name: (None, name))
 INVERT = Request(Operation(inverse=True))
 
 
@@ -35,13 +35,13 @@ def flow(
 ) -> Flow:
     out = io.BytesIO()
     told: list[str] = []
-    policy = Policy("in", request.on_error, tell=told.append)
+    bad = BadRows("in", request.on_error, tell=lambda error: told.append(str(error)))
     try:
         if form in readers("records"):
             outcomes = run_records(io.BytesIO(text), form, request, source="in", size=size, jobs=jobs)
         else:
             outcomes = run_table(io.BytesIO(text), form, request, source="in", header=header, size=size, jobs=jobs)
-        status = run(outcomes, lambda block: [out.write(block)].clear(), policy, lambda _rows, _size: None)
+        status = run(outcomes, lambda block: [out.write(block)].clear(), bad, lambda _rows, _size: None)
     except FrametoolError as error:
         told.append(str(error))
         status = error.exit_code

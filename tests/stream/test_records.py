@@ -5,6 +5,7 @@ import json
 import pytest
 from flow import INVERT, MOVE, Flow, convert, flow
 
+from frametool.errors import FrametoolWarning
 from frametool.stream.operation import Operation
 from frametool.stream.request import Request
 
@@ -23,7 +24,7 @@ def check(form: str, record: str, wanted: str, request: Request) -> None:
     ("record", "wanted"),
     [
         ('{"x":1,"y":2,"z":3,"k":[1, {"a":null}],"n":"é\\u00e9"}\n', '{"x":-1.0,"y":3.0,"z":6.0,"k":[1, {"a":null}],"n":"é\\u00e9"}\n'),
-        ('{ "point" : [1, 2,3], "frame": "a" }\n', '{ "point" : [-1.0, 3.0,6.0] }\n'),
+        ('{ "point" : [1, 2,3], "frame": 7 }\n', '{ "point" : [-1.0, 3.0,6.0], "frame": 7 }\n'),
         ('{"header": {"seq": 1}, "point": {"x": 1, "y": 2, "z": 3}}\r\n', '{"header": {"seq": 1}, "point": {"x": -1.0, "y": 3.0, "z": 6.0}}\r\n'),
         ('{"vector": [1, 0, 0], "1e3": 1e3}\n', '{"vector": [0.0, 1.0, 0.0], "1e3": 1e3}\n'),
         ('{"xyz_mm": [1000, 2000, 3000]}\n', '{"xyz_mm": [-1000.0, 3000.0, 6000.0]}\n'),
@@ -56,7 +57,7 @@ def test_ros_messages_are_moved_where_they_hold_their_pose() -> None:
         "pose:\n  position:\n    x: 1.0\n    y: 2.0\n    z: 3.0\n"
         "  orientation:\n    x: 0.0\n    y: 0.0\n    z: 0.0\n    w: 1.0\n---\n"
     )
-    request = MOVE._replace(told="map")
+    request = MOVE._replace(rename=lambda _parent, name: ("map", name))
     wanted = (
         record.replace("odom", "map")
         .replace("x: 1.0", "x: -1.0")
@@ -150,3 +151,12 @@ def test_a_bad_document_leaves_the_others_alone() -> None:
     result: Flow = flow(text, MOVE._replace(on_error="skip"), "yaml")
     assert (result.status, result.text.count(b"xyz")) == (3, 6)
     assert result.told[0].startswith("in:")
+
+
+@pytest.mark.parametrize("count", [1, 3, MANY])
+@pytest.mark.filterwarnings("default::frametool.errors.FrametoolWarning")
+def test_a_frame_that_the_result_does_not_know_is_left_out_and_told_once(count: int) -> None:
+    with pytest.warns(FrametoolWarning, match="in:1: frame 'a' is left out") as told:
+        found = flow(b'{ "point" : [1, 2,3], "frame": "a" }\n' * count, MOVE, "json")
+    assert found.text == b'{ "point" : [-1.0, 3.0,6.0] }\n' * count
+    assert len(told) == 1

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING
 
 import click
 
 from frametool.cli.command import FILE, Command
+from frametool.cli.sink import writing
+from frametool.cli.stderr import say
 from frametool.cli.trees import opened, verbose_option
 from frametool.lint.findings import RULES, WRITERS, Finding
 from frametool.lint.reading import read_all
@@ -55,7 +56,8 @@ def command(files: Sequence[str], form: str, strict: bool) -> int:
     findings += lint(_everything(recordings, findings))
     order = {recording.name: index for index, recording in enumerate(recordings)}
     findings.sort(key=lambda each: (order.get(each.source, 0), each.line, each.column))
-    sys.stdout.write(WRITERS[form](findings))
+    with writing(None) as write:
+        write(WRITERS[form](findings))
     return FAILED if _fails(findings, strict=strict) else 0
 
 
@@ -75,5 +77,5 @@ def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:
     counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
     said = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
     if said:
-        click.echo(f"frametool: {said}", err=True)
+        say(said)
     return bool(counts["error"] or (strict and counts["warning"]))

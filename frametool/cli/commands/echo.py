@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import FILE, Command, result_options, rotation_options
 from frametool.cli.output import Output
+from frametool.cli.stderr import say
 from frametool.cli.times import Time, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
 from frametool.errors import NoDataAt
@@ -134,7 +134,7 @@ def _told(failures: list[NoDataAt]) -> int:
     """Tell of the times without data; the status says that some are missing."""
     if not failures:
         return 0
-    print(f"frametool: {failures[0]}", file=sys.stderr)  # noqa: T201 - the first one stands for all
+    say(str(failures[0]))  # the first one stands for all
     if len(failures) > 1:
-        print(f"frametool: {len(failures)} times without data", file=sys.stderr)  # noqa: T201 - talk
+        say(f"{len(failures)} times without data")
     return SKIPPED

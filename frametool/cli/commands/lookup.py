@@ -10,6 +10,7 @@ import click
 from frametool.cli.command import FILE, Command, result_options, rotation_options
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
+from frametool.cli.stderr import tell
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, read_times, rules, rules_options, times_option
 from frametool.cli.trees import FRAME, frame_name, load_tree
@@ -134,7 +135,7 @@ def _tell_skipped(
         try:
             frames.lookup(*ends, at)
         except LookupFailed as error:
-            click.echo(as_json(error) if in_json else f"frametool: {error} (skipped)", err=True)
+            tell(as_json(error) if in_json else f"frametool: {error} (skipped)")
     total = f"{len(skipped)} of {asked} times skipped"
     whole = {"error": "times_skipped", "message": total, "skipped": len(skipped), "asked": asked}
-    click.echo(dump(whole) if in_json else f"frametool: {total}", err=True)
+    tell(dump(whole) if in_json else f"frametool: {total}")

@@ -9,7 +9,8 @@ import click
 from frametool.cli.command import TEXT, Command
 from frametool.cli.commands.sim_follow import Duration, duration_ns
 from frametool.cli.poses import source_of, usage_if_inline
-from frametool.cli.sim_output import Show, play_options, tell
+from frametool.cli.sim_output import Show, play_options
+from frametool.cli.stderr import say
 from frametool.errors import FormatError
 from frametool.frames.stamps import BILLION
 from frametool.sim.scene_file import read_scene
@@ -61,4 +62,4 @@ def _warn_of_late(scene: Scene) -> None:
     if late := [call for call in scene.calls if call.t_ns >= last_ns]:
         end = f"{scene.duration_ns / BILLION:g} s"
         more = f", nor do {len(late) - 1} more" if late[1:] else ""
-        tell(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")
+        say(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import click
@@ -10,7 +9,8 @@ import click
 from frametool.cli.command import TEXT, Command, Text
 from frametool.cli.commands.sim_follow import NUMBER, Duration, Spawn
 from frametool.cli.leader import leader_of
-from frametool.cli.sim_output import check_files, form_of, number_writer, suffix_of, write_file
+from frametool.cli.sim_output import check_files, form_of, number_writer, suffix_of
+from frametool.cli.sink import writing
 from frametool.errors import ValueInvalid
 from frametool.sim.controllers import LAWS
 from frametool.sim.step_writer import FORMS, table
@@ -91,11 +91,10 @@ def command(
         raise click.UsageError(str(error)) from None
     records = list(rows(gain_linear, gain_angular, many))
     text = table(records, form_of(format_name, output), number_writer(precision))
-    if output in (None, "-"):
-        sys.stdout.write(text)
-    else:
-        write_file(str(output), text)
+    with writing(output, force=force) as write:
+        write(text)
     if plot:
         from frametool.view import heat_map
 
-        write_file(plot, heat_map.plot(gain_linear, gain_angular, many, suffix_of(plot)))
+        with writing(plot, force=force) as write:
+            write(heat_map.plot(gain_linear, gain_angular, many, suffix_of(plot)))

@@ -1,0 +1,101 @@
+"""The group of all commands: each is imported when it is called; help and completion come from the table."""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+import click
+
+from frametool import __version__
+from frametool.cli import COMMANDS
+from frametool.cli.help import WithHelp
+from frametool.cli.sink import writing
+from frametool.errors import alternatives
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
+HELP = """The calculator for rigid-body frames.
+
+\b
+  frametool lookup robot.yaml map camera_optical
+  frametool convert --from rpy_deg --to quaternion 0 0 90
+  frametool compose '{xyz: [1, 2, 3]}' '{rpy_deg: [0, 0, 90]}'
+
+Arguments are in the order TARGET SOURCE; the answer is the pose of SOURCE in TARGET, which maps points in SOURCE to
+points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
+"""
+COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which click's scripts ask for completions
+
+
+class Group(WithHelp, click.Group):
+    """The commands of a table, each imported when it is called and not before."""
+
+    table = COMMANDS
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Name the commands, in the table's order."""
+        return list(self.table)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import one command."""
+        if cmd_name not in self.table:
+            return None
+        found: click.Command = import_module(self.table[cmd_name][0]).command
+        return found
+
+    def resolve_command(
+        self,
+        ctx: click.Context,
+        args: list[str],
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, or say which ones there are."""
+        if args and args[0] not in self.table:
+            raise click.UsageError(f"no command {args[0]!r}{alternatives(args[0], self.table, 'commands')}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands from the table, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, summary) for name, (_, summary) in self.table.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete command names from the table."""
+        from click.shell_completion import CompletionItem
+
+        named = [CompletionItem(name, help=row[1]) for name, row in self.table.items() if name.startswith(incomplete)]
+        return named + click.Command.shell_complete(self, ctx, incomplete)
+
+
+def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
+    """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
+    if chosen:
+        with writing(None) as write:
+            write(f"frametool {__version__}\n")
+        ctx.exit()
+
+
+@click.command(cls=Group, help=HELP, no_args_is_help=True)
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, help="Show the version and exit.",
+              callback=_show_version)  # fmt: skip
+def group() -> None:
+    """Hold the commands."""
+
+
+def called(arguments: list[str]) -> int:
+    """Call a command and return its status.
+
+    Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
+    """
+    if instruction := os.environ.get(COMPLETION):
+        from click.shell_completion import shell_complete
+
+        return shell_complete(group, {}, "frametool", COMPLETION, instruction)
+    try:
+        with group.make_context("frametool", arguments) as ctx:
+            status = group.invoke(ctx)
+    except click.exceptions.Exit as end:
+        status = end.exit_code
+    return status if isinstance(status, int) else 0

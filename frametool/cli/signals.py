@@ -1,0 +1,85 @@
+"""Signals that end a run: one handler turns them into exceptions, so that every `with` cleans up behind itself."""
+
+from __future__ import annotations
+
+import os
+import signal
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import FrameType
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Terminated(BaseException):
+    """Report the signal that asks the process to end."""
+
+    def __init__(self, number: int) -> None:
+        """Keep the signal's number."""
+        super().__init__(number)
+        self.number = number
+
+
+class _Signals:
+    """What the handler knows: whether a line is being written, and whether Ctrl-C came meanwhile."""
+
+    writing = False
+    interrupted = False
+
+    def end(self, number: int, _frame: FrameType | None) -> None:
+        """Raise what ends the run; the first Ctrl-C waits until the line that is being written is out."""
+        if number != signal.SIGINT:
+            for each in ENDING:
+                signal.signal(each, signal.SIG_IGN)  # `timeout` sends it twice: nothing cuts the cleaning short
+            raise Terminated(number)
+        if self.interrupted or not self.writing:
+            raise KeyboardInterrupt
+        self.interrupted = True
+
+
+_signals = _Signals()
+
+
+def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
+    """Run the program with its signals taken over; one that is ignored, as SIGHUP under nohup, stays ignored."""
+    caught = [each for each in ENDING if signal.getsignal(each) not in (signal.SIG_IGN, None)]
+    try:
+        for number in caught:
+            signal.signal(number, _signals.end)
+        return run(arguments)
+    except Terminated as error:
+        return die_of(error.number)
+    finally:
+        for number in caught:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def leave_signals() -> None:
+    """Let Ctrl-C pass and SIGTERM and SIGHUP end the process at once: for workers, whom their parent looks after."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def whole_lines() -> Iterator[None]:
+    """Hold Ctrl-C back until a block of lines is written."""
+    _signals.writing = True
+    try:
+        yield
+    finally:
+        _signals.writing = False
+    if _signals.interrupted:
+        _signals.interrupted = False
+        raise KeyboardInterrupt
+
+
+def die_of(number: int) -> int:
+    """End as a program that does not catch the signal, so that the caller sees what happened."""
+    signal.signal(number, signal.SIG_DFL)
+    os.kill(os.getpid(), number)
+    return 128 + number  # where the signal is blocked: what a shell would say

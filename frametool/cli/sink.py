@@ -1,0 +1,131 @@
+"""Where results go: standard output, whole lines at a time, or a file that is there whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import sys
+from contextlib import contextmanager, suppress
+from itertools import count
+from typing import TYPE_CHECKING, BinaryIO
+
+from frametool.cli.signals import whole_lines
+from frametool.errors import FileProblem, printable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    Write = Callable[[str | bytes], None]
+
+LONGEST_NAME = 255  # bytes, on nearly every file system
+_OWN_STREAM = re.compile(r"/dev/(?:(stdout)|(stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
+
+
+@contextmanager
+def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
+    """Open a place for results and yield what writes to it; each piece of text is out when the call returns.
+
+    path: None or `-` is standard output.  A pipe, a device or one of the process's own streams is written to as it
+    is.  Anything else is written to `NAME.PID.part` beside the file (the file itself, if the path is a link), which
+    takes the file's place, mode and owner when the block ends without an error and is removed otherwise; only
+    `kill -9` leaves it behind.
+    Raises FileProblem if the file exists and `force` is not given, or cannot be written; BrokenPipeError if the reader
+    of a pipe is gone.
+    """
+    if path is None or path == "-":
+        yield _writer(sys.stdout.buffer, "standard output")
+    elif (number := _own_stream(path)) is not None or is_special(path):
+        with _problems_of(path):
+            special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
+        with special:
+            yield _writer(special, path)
+    else:
+        with _replacing(path, force=force) as part:
+            yield _writer(part, path)
+
+
+def refuse_existing(path: str | None, *, force: bool) -> None:
+    """Raise FileProblem for a file that `writing` would refuse to replace."""
+    if path is not None and path != "-" and not force and os.path.exists(path) and not is_special(path):
+        raise FileProblem(f"{printable(path)}: exists; give --force to replace it")
+
+
+def is_special(path: str) -> bool:
+    """Tell whether a path leads to something that is no plain file: a device, a pipe, a folder, an own stream."""
+    return _own_stream(path) is not None or (os.path.exists(path) and not os.path.isfile(path))
+
+
+def _own_stream(path: str) -> int | None:
+    """Return the descriptor that a path such as /dev/stdout stands for."""
+    found = _OWN_STREAM.fullmatch(path)
+    if not found:
+        return None
+    out, err, *numbers = found.groups()
+    return 1 if out else 2 if err else int(next(filter(None, numbers)))
+
+
+def _writer(stream: BinaryIO, name: str) -> Write:
+    def write(piece: str | bytes) -> None:
+        view = memoryview(piece.encode() if isinstance(piece, str) else piece)
+        with _problems_of(name), whole_lines():
+            while view:  # an unbuffered stream may take a part
+                view = view[stream.write(view) :]
+            stream.flush()
+
+    return write
+
+
+@contextmanager
+def _problems_of(name: str) -> Iterator[None]:
+    """Name the place in what the system reports of it; a reader that is gone is no problem of ours."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise FileProblem(f"{printable(name)}: {(error.strerror or str(error)).lower()}") from None
+
+
+@contextmanager
+def _replacing(path: str, *, force: bool) -> Iterator[BinaryIO]:
+    """Yield a stream into a part file that takes the place of `path` if all goes well."""
+    place = os.path.realpath(path)
+    refuse_existing(path, force=force)
+    with _problems_of(path):
+        stream = _part_beside(place, 0o600 if os.path.exists(place) else 0o666)
+    try:
+        with stream:
+            yield stream
+        refuse_existing(path, force=force)  # it may have come meanwhile
+        with _problems_of(path):
+            _take_over(stream.name, place)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(stream.name)
+        raise
+
+
+def _part_beside(place: str, mode: int) -> BinaryIO:
+    """Create a part file that nobody else uses; its name is cut where the system's longest name would not hold it."""
+
+    def opener(path: str, flags: int) -> int:
+        return os.open(path, flags, mode)
+
+    folder, name = os.path.split(place)
+    for attempt in count():
+        suffix = f".{os.getpid()}{f'-{attempt}' if attempt else ''}.part"
+        begin = os.fsencode(name)[: LONGEST_NAME - len(suffix)].decode(errors="ignore")
+        with suppress(FileExistsError):
+            return open(os.path.join(folder, begin + suffix), "xb", buffering=0, opener=opener)
+    raise AssertionError(place)
+
+
+def _take_over(part: str, place: str) -> None:
+    """Put a part file in its place, with the mode and, where the system lets us, the owner of the file before."""
+    with suppress(FileNotFoundError):
+        before = os.stat(place)
+        with suppress(OSError):
+            os.chown(part, before.st_uid, before.st_gid)
+        os.chmod(part, stat.S_IMODE(before.st_mode))
+    os.replace(part, place)

@@ -1,0 +1,431 @@
+"""Records: the points, vectors, poses, twists and wrenches of a document, and where their numbers and names stand.
+
+    {"id": 7, "frame": "lidar", "point": [1, 2, 3]}
+    {"header": {"frame_id": "map"}, "pose": {"position": {"x": ..}, "orientation": {"x": ..}}}    as in ROS messages
+    {"x": 1, "y": 2, "z": 3, "qx": 0, "qy": 0, "qz": 0, "qw": 1}                                  as columns of tables
+
+Arguments, files, streams and messages are read by this one definition; keys that are not named here pass.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import did_you_mean
+from frametool.geometry.representations import REPRESENTATIONS
+from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position
+from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
+from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, rotation_of, shape_of
+from frametool.ros.message_parts import read_stamp, whole_list
+from frametool.stream.row_layout import COVARIANCE, POINT, POSE, TWIST, VECTOR, WRENCH, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.grammar.readers import Path
+    from frametool.stream.header import Columns
+    from frametool.stream.request import Request
+
+POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
+INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "msg", "message")
+PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque")}
+PARENT_KEYS = ("parent", "frame", "frame_id", "parent_frame_id")  # the frame a record is given in
+NAME_KEYS = ("name", "child_frame_id")  # what a pose is the pose of
+XYZ = ("x", "y", "z")
+
+
+class Name(NamedTuple):
+    """A frame's name and the paths at which a record says it; the name is None where it is missing or empty."""
+
+    text: str | None = None
+    paths: tuple[Path, ...] = ()
+
+
+class Record(NamedTuple):
+    """One point, vector, pose, twist or wrench: what its numbers mean, where they stand, which frames it names.
+
+    path: of the mapping or list that holds the numbers
+    numbers: the path of each; None for a number that is not written and counts as 0
+    values: the numbers, in the order of `shape`
+    key: the key of the position, "" for bare x, y, z
+    rotation: the key of the rotation; others: further keys that say the same rotation
+    flat: keys that hold one number of the rotation each; `rotation` is then the first of them
+    stamp: the paths of seconds and nanoseconds in its header
+    """
+
+    path: Path
+    shape: Shape
+    numbers: tuple[Path | None, ...] = ()
+    values: tuple[float, ...] = ()
+    key: str = ""
+    rotation: str = ""
+    others: tuple[str, ...] = ()
+    flat: tuple[str, ...] = ()
+    name: Name = Name()
+    parent: Name = Name()
+    inverse: bool = False
+    stamp: tuple[Path, ...] = ()
+
+
+def find_records(document: Any, request: Request, reading: Reading, path: Path = ()) -> Iterator[Record]:
+    """Yield the records of a document in order; `path` leads to it and begins all paths.
+
+    Raises Misfit, with the path, for a document without records and for a record that cannot be read.
+    """
+    try:
+        found = list(_search(document, (), ()))
+        if not found:
+            raise _nothing_in(document)
+    except Misfit as misfit:
+        raise misfit.below(*path) from None
+    for inner, outer in found:
+        yield _record(document, inner, outer, request, reading, path)
+
+
+def _nothing_in(document: Any) -> Misfit:
+    """Build the error for a document in which no record was found."""
+    if type(document) is not dict:
+        if type(document) is list and document:
+            return _bare_numbers(document)
+        return Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(document)}")
+    wanted = (*POINT_KEYS, *ROTATION_KEYS)
+    near = [(key, found) for key in document if key not in POSE_KEYS and (found := did_you_mean(key, wanted))]
+    if near:
+        return _unknown(near)
+    keys = f"the keys {', '.join(map(repr, document))}"
+    wanted_here = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
+    return Misfit(f"expected {wanted_here}, found {keys}")
+
+
+def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
+    """Build the error for keys that are nearly known."""
+    named = "; ".join(f"unknown key {key!r}{hint.replace('; ', ', ')}" for key, hint in near)
+    choices = ", ".join(REPRESENTATIONS)
+    return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (near[0][0],), key=True)
+
+
+def _bare_numbers(value: list[Any]) -> Misfit:
+    """Build the error for a list that may be anything."""
+    return Misfit(
+        f"a bare list of {len(value)} numbers does not say what it is; write {{rpy_deg: [..]}}, {{xyzw: [..]}}, .."
+    )
+
+
+def _search(value: Any, path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[Path, tuple[Path, ...]]]:
+    """Yield the paths of what holds numbers, each with those of the mappings around it."""
+    if type(value) is list and value and not any(type(item) in (dict, list) for item in value):
+        yield path, outer
+    elif type(value) is list:
+        if len(value) in (3, 4) and all(type(row) is list for row in value):
+            yield path, outer
+            return
+        for index, item in enumerate(value):
+            yield from _search(item, (*path, index), outer)
+    elif type(value) is dict:
+        if _holds_numbers(value):
+            _refuse_several(value, ["the record's own keys"], path)
+            yield path, outer
+        else:
+            yield from _search_inside(value, path, outer)
+
+
+def _search_inside(
+    value: dict[str, Any], path: Path, outer: tuple[Path, ...]
+) -> Iterator[tuple[Path, tuple[Path, ...]]]:
+    """Yield what the known keys of a message hold; of an Odometry only the pose is given in the header's frame."""
+    found = {
+        key: held
+        for key in INNER
+        if type(value.get(key)) in (dict, list) and (held := list(_search(value[key], (*path, key), (*outer, path))))
+    }
+    if "pose" in found:
+        found.pop("twist", None)
+    if found:
+        _refuse_several(value, list(found), path)
+    for held in found.values():
+        yield from held
+
+
+def _holds_numbers(value: dict[str, Any]) -> bool:
+    """Tell whether a mapping itself is a record rather than a message around one."""
+    return _is_holder(value) or set(XYZ) <= set(value) or _parts_of(value) is not None
+
+
+def _is_holder(value: dict[str, Any]) -> bool:
+    return any(_holds(key, each) for key, each in value.items())
+
+
+def _parts_of(value: dict[str, Any]) -> str | None:
+    """Name the kind whose two vectors a mapping has, as a Twist or a Wrench has."""
+    return next((name for name, parts in PARTS.items() if all(type(value.get(part)) is dict for part in parts)), None)
+
+
+def _refuse_several(value: dict[str, Any], found: list[str], path: Path) -> None:
+    """Stop where a mapping holds more than one pose: which is meant nobody can tell."""
+    ours = {*POINT_KEYS, *ROTATION_KEYS, *found, "twist"}
+    more = [key for key, each in value.items() if type(each) is dict and key not in ours and _is_holder(each)]
+    if len(found) + len(more) > 1:
+        raise Misfit(f"expected one point or pose in a record, found several: {', '.join([*found, *more])}", path)
+
+
+def _holds(key: str, value: Any) -> bool:
+    return (_is_rotation(key, value) or key in POINT_KEYS) and not (key == "point" and type(value) is str)
+
+
+def _is_rotation(key: str, value: Any) -> bool:
+    return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
+
+
+def _record(
+    document: Any, path: Path, outer: tuple[Path, ...], request: Request, reading: Reading, above: Path
+) -> Record:
+    """Read one record, with all its paths below `above`."""
+    value = value_at(document, path)
+    reading.here = here = (*above, *path)
+    try:
+        if type(value) is list:
+            return _bare_list(value, here, reading, request)
+        record = _mapping(value, here, reading, request)
+    except Misfit as misfit:
+        raise misfit.below(*here) from None
+    try:
+        record = _with_covariance(record, document, path, above, request)
+        return _with_names(record, document, path, outer, above, request)
+    except Misfit as misfit:
+        raise misfit.below(*above) from None
+
+
+def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request) -> Record:
+    """Read [x, y, z], or the rows of a matrix."""
+    if type(value[0]) is list:
+        return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading, request)
+    if len(value) != 3 or not request.operation.moves:
+        raise _bare_numbers(value)
+    numbers = tuple((*path, *each) for each in INDICES[:3])
+    return Record(path, Shape(request.kind or POINT), numbers, read_position(value, 1.0))
+
+
+def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Request) -> Record:
+    """Read what a mapping says: its position, then its rotation; or the two vectors of a twist or a wrench."""
+    if (parts := _parts_of(value)) is not None and not _is_holder(value):
+        return _two_vectors(value, parts, path, request)
+    positions = [key for key in value if key in POINT_KEYS and _holds(key, value[key])]
+    rotations = [key for key, each in value.items() if _is_rotation(key, each)]
+    flat = _flat_rotation(value, rotations) if request.kind in ("", POSE) else None
+    if len(positions) > 1 and not _is_pose(positions, rotations or flat):
+        raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
+    _refuse_typos(value, rotations=bool(rotations or flat), position=bool(positions))
+    key = positions[0] if positions else ""
+    record = Record(path, Shape(_kind(key, rotations or flat or (), request), None), key=key)
+    if positions:
+        record = _with_position(record, value[key], (key,), POINT_KEYS[key], partial="header" not in value)
+    elif set(XYZ) <= set(value):
+        _refuse_bare_quaternion(value)
+        record = _with_position(record, {name: value[name] for name in XYZ}, (), 1.0, partial=False)
+    reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else request.degrees
+    if flat is not None:
+        record = _with_flat_rotation(value, flat, record, reading, request)
+    elif rotations:
+        within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
+        record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
+        record = record._replace(others=tuple(rotations[1:]))
+    _refuse_disagreement(value, positions, rotations, reading)
+    return record._replace(inverse=_is_inverse(value))
+
+
+def _is_pose(positions: Sequence[str], rotation: object) -> bool:
+    """Tell whether several positions may say the same thing twice, as the grammar of poses allows."""
+    return bool(rotation) and POSITION_KEYS.keys() >= set(positions)
+
+
+def _is_inverse(value: dict[str, Any]) -> bool:
+    flag = value.get("inverse", "false")
+    if flag not in ("true", "false"):
+        raise Misfit(f"inverse must be true or false, found {kind(flag)}", ("inverse",))
+    return bool(flag == "true")
+
+
+def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request) -> Record:
+    """Read a twist or a wrench."""
+    if request.kind not in ("", name) or not request.operation.moves:
+        raise Misfit(f"a {name} cannot be taken for a {request.kind or POSE}")
+    numbers = [number for part in PARTS[name] for number in within((part,), read_numbers, value[part], XYZ)]
+    paths = tuple((*path, part, axis) for part in PARTS[name] for axis in XYZ)
+    return Record(path, Shape(name, None), paths, tuple(numbers))
+
+
+def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> None:
+    """Stop at a key that is nearly that of a rotation or a position, where no other says it."""
+    wanted = [*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)]
+    known = {*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS}
+    near = [
+        (key, hint)
+        for key in value
+        if wanted and key not in known and (hint := did_you_mean(key, wanted, cutoff=0.75))
+    ]
+    if near:
+        raise _unknown(near)
+
+
+def _refuse_disagreement(
+    value: dict[str, Any], positions: Sequence[str], rotations: Sequence[str], reading: Reading
+) -> None:
+    """Stop where several positions or rotations of one entry do not say the same."""
+    if len(rotations) > 1 or len(positions) > 1:
+        from frametool.grammar.pose import read_pose
+
+        read_pose({key: value[key] for key in value if key in (*positions, *rotations)}, reading)
+
+
+def _flat_rotation(value: dict[str, Any], rotations: list[str]) -> Columns | None:
+    """Find a rotation among the keys by the names that columns have: qx qy qz qw, roll_deg pitch_deg yaw_deg, ..
+
+    Raises Misfit if there are two, or one beside a key that holds a whole rotation.
+    """
+    from frametool.stream.header import find_rotations
+
+    names = [key for key, each in value.items() if type(each) not in (dict, list)]
+    found = [each for each in find_rotations(names, None) if not each.prefix and not each.suffix and not each.whole]
+    if found and len(found) + len(rotations) > 1:
+        shown = " and ".join([*(each.shown for each in found), *rotations])
+        raise Misfit(f"expected one rotation, found {shown}", (found[0].names[0],), key=True)
+    return found[0] if found else None
+
+
+def _refuse_bare_quaternion(value: dict[str, Any]) -> None:
+    """Stop at x, y, z beside w."""
+    if "w" in value:
+        message = "x, y, z beside w may be a quaternion or a point; write {quaternion: {..}} or {point: [..], w: ..}"
+        raise Misfit(message, ("w",), key=True)
+
+
+def _with_flat_rotation(
+    value: dict[str, Any], columns: Columns, record: Record, reading: Reading, request: Request
+) -> Record:
+    """Add a rotation whose numbers are members of the record itself."""
+    form, names, texts = columns.form, columns.names, [value[name] for name in columns.names]
+    if form is None or request.poses != 1:
+        raise Misfit("a record holds one pose; two in a row are for tables")
+    places = [(name,) for name in names]
+    try:
+        rotation_of(form, texts, places, reading)
+    except NotARotation as misfit:
+        raise misfit if misfit.path else misfit.below(names[0]) from None
+    values, degrees = read_components(form, texts, places, reading)
+    numbers = (*record.numbers, *((*record.path, name) for name in names))
+    shape = record.shape._replace(kind=POSE, notation=form, degrees=degrees)
+    first = next(key for key in value if key in names)
+    return record._replace(
+        shape=shape, numbers=numbers, values=(*record.values, *values), rotation=first, flat=tuple(names)
+    )
+
+
+def _kind(key: str, rotations: Sequence[object], request: Request) -> str:
+    """Decide what a mapping is: with a rotation a pose, else a point or a vector, or what --as says."""
+    if request.kind in PARTS:
+        raise Misfit(f"a {request.kind} has {' and '.join(PARTS[request.kind])}, two vectors {{x:, y:, z:}}")
+    if rotations or request.kind == POSE or not request.operation.moves:
+        if rotations and request.kind not in ("", POSE):
+            raise Misfit(f"a record has a rotation and cannot be taken for a {request.kind}")
+        return POSE
+    return request.kind or (VECTOR if key == "vector" else POINT)
+
+
+def _with_position(record: Record, value: Any, below: Path, metre: float, *, partial: bool) -> Record:
+    """Add the position: a list, or a map in which, if it may be partial, what is missing is 0."""
+    x, y, z = within(below, read_numbers, value, XYZ, partial=partial)
+    steps = INDICES[:3] if type(value) is list else tuple((name,) for name in XYZ)
+    paths = tuple((*record.path, *below, *step) if type(value) is list or step[0] in value else None for step in steps)
+    return record._replace(shape=record.shape._replace(unit=round(1.0 / metre, 6)), numbers=paths, values=(x, y, z))
+
+
+def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
+    """Add the rotation's numbers."""
+    form, texts, places = shape_of(key, value)
+    whole = len(texts) == 16
+    if whole and record.shape.unit is not None:
+        raise Misfit("a 4x4 matrix is the whole pose; leave xyz out, or write the 3x3 rotation", below)
+    if request.poses != 1:
+        raise Misfit("a record holds one pose; two in a row are for tables")
+    values, degrees = read_components(form, texts, places, Reading(reading.source, degrees=reading.degrees))
+    paths = tuple(_path_if_there(value, (*record.path, *below), place) for place in places[: len(texts)])
+    if degrees != (reading.degrees if form.degrees is None else form.degrees):
+        paths = (None,) * len(paths)  # the numbers say another unit than their key: the member is written anew
+    shape = record.shape._replace(kind=POSE, notation=form, degrees=degrees, whole=whole)
+    return record._replace(shape=shape, numbers=record.numbers + paths, values=(*record.values, *values), rotation=key)
+
+
+def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
+    try:
+        value_at(value, place)
+    except (KeyError, IndexError, TypeError):
+        return None
+    return (*path, *place)
+
+
+def _with_covariance(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
+    """Add the 36 numbers that a message has beside a pose or a twist, if records are moved."""
+    beside = (*path[:-1], "covariance")
+    around = value_at(document, path[:-1]) if path[-1:] == (record.shape.kind,) else None
+    if type(around) is not dict or "covariance" not in around or request.operation.changes_nothing:
+        return record
+    if not request.operation.moves:
+        raise Misfit("the covariance would be wrong afterwards; leave it out, or move the message with apply", beside)
+    values = within(beside, whole_list, around["covariance"], "36 numbers")
+    names = [f"c{row}{column}" for row in range(6) for column in range(6)]
+    numbers = within(beside, read_numbers, values, names)
+    paths = tuple((*above, *beside, place) for place in range(COVARIANCE))
+    shape = record.shape._replace(covariance=True)
+    return record._replace(shape=shape, numbers=(*record.numbers, *paths), values=(*record.values, *numbers))
+
+
+def _with_names(
+    record: Record, document: Any, path: Path, outer: tuple[Path, ...], above: Path, request: Request
+) -> Record:
+    """Add the frames that the record and the message around it name, and the stamp of its header."""
+    parent, name, stamp = Name(), Name(), record.stamp
+    for around in (path, *reversed(outer)):
+        value = value_at(document, around)
+        if type(value) is not dict:
+            continue
+        parent = _named(value, PARENT_KEYS, (*above, *around), parent, request)
+        if record.shape.kind == POSE or around == path:
+            name = _named(value, NAME_KEYS, (*above, *around), name, request)
+        header = value.get("header")
+        if type(header) is dict:
+            inside = (*around, "header")
+            parent = _named(header, ("frame_id",), (*above, *inside), parent, request)
+            if not stamp and "stamp" in header:
+                stamp = _stamp_paths(header["stamp"], (*inside, "stamp"), above)
+    return record._replace(parent=parent, name=name, stamp=stamp)
+
+
+def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, request: Request) -> Name:
+    """Add the keys of a mapping that name a frame; raise Misfit where two of them name different ones."""
+    for key in keys:
+        text = value.get(key)
+        if key not in value or type(text) in (dict, list) or (key == "frame" and text and request.counts(text)):
+            continue
+        if not text and key in ("name", "parent", "frame"):
+            hint = f"leave {key} out or quote the name"
+            raise Misfit(f"{key} must be a frame's name, found nothing; {hint}", (*path, key))
+        if text and found.text and text != found.text:
+            where = ".".join(map(str, found.paths[0][-2:]))
+            raise Misfit(f"{key} says {text!r} and {where} says {found.text!r}; keep one", (*path, key))
+        found = Name(found.text or text or None, (*found.paths, (*path, key)))
+    return found
+
+
+def _stamp_paths(value: Any, path: Path, above: Path) -> tuple[Path, ...]:
+    """Check a header's stamp and return the paths of its seconds and nanoseconds."""
+    within(path, read_stamp, value)
+    seconds = next(key for key in value if key.startswith("s"))
+    below = next(key for key in value if key.startswith("n"))
+    return (*above, *path, seconds), (*above, *path, below)
+
+
+def value_at(value: Any, path: Path) -> Any:
+    """Follow a path of keys and indices down."""
+    for step in path:
+        value = value[step]
+    return value

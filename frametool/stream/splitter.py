@@ -1,0 +1,237 @@
+"""Where the records of a text stand: YAML documents, JSON lines, JSON values over several lines, arrays of them.
+
+Knows the syntax around records and none of their meaning.  What is no record is a part of its own with the problem
+it has, so that nothing passes unseen; after it the next record is looked for where a line or an object begins.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.text.lines import whole_lines
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+DOCUMENTS, LINES, VALUES, ARRAY = "documents", "lines", "values", "array"
+MARK = b"\xef\xbb\xbf"
+MUCH = 1 << 20  # bytes of one unfinished value from which it is looked at only when twice as much has come
+
+_SEPARATOR = re.compile(rb"^(?:---|\ttotal count: ?\d+---)[ \t]*\r?\n", re.MULTILINE)  # the last: ros2's note of a loss
+_NO_DOCUMENT = re.compile(rb"(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|---)\s*)?")
+_LINE = re.compile(rb"[^\n]*\n|[^\n]+\Z")
+_SEVERAL = re.compile(rb"[}\]]\s*,?\s*[{\[]|\}\s*,?\s*[^\s,}\]]")
+_AFTER = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
+_GAP = re.compile(rb"\s*(,?)\s*")
+_OPENING = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[")
+_WORD_AT_END = re.compile(r"[\w.+-]*\s*\Z")  # such as the 1e of 1e-05
+_NEXT = re.compile(rb"\n[ \t]*,?[ \t]*(?=[{\[])|\}[ \t]*,?[ \t]*(?=\{)")
+
+
+class Part(NamedTuple):
+    """A record in a text, and what goes with it.
+
+    begin: where the comma or blanks before it begin, if they vanish with it
+    start, end: the record itself
+    after: where what follows it ends, if that vanishes with it
+    problem: why it is no record; "" where reading it decides
+    outside: it stands where not even null can be written
+    """
+
+    begin: int
+    start: int
+    end: int
+    after: int
+    problem: str = ""
+    outside: bool = False
+
+
+class Parts(NamedTuple):
+    """The records of a block; `closed` where an array ends in it."""
+
+    parts: list[Part]
+    closed: bool = False
+
+
+class Splitter:
+    """Cut a stream into records; `layout` is "" until the first line of JSON has been seen."""
+
+    def __init__(self, form: str) -> None:
+        """Take `json` or `yaml`."""
+        self.layout = DOCUMENTS if form == "yaml" else ""
+        self._looked = 0
+
+    def whole(self, text: bytes) -> int:
+        """Return how many bytes of what has come are whole records; called with more until some are."""
+        if self.layout == DOCUMENTS:
+            return self._whole_documents(text)
+        self.layout = self.layout or _layout_of(text, final=False)
+        if self.layout in ("", LINES):
+            return whole_lines(text) if self.layout else 0
+        if MUCH < len(text) < 2 * self._looked:
+            return 0
+        ends = [part.end for part in self._values(text, final=False).parts]
+        self._looked = 0 if ends else len(text)
+        return ends[-1] if ends else 0
+
+    def _whole_documents(self, text: bytes) -> int:
+        """Return the end of the last separator; what has been looked at is not looked at again."""
+        ends = [found.end() for found in _SEPARATOR.finditer(text, text.rfind(b"\n", 0, self._looked) + 1)]
+        self._looked = 0 if ends else len(text)
+        return ends[-1] if ends else 0
+
+    def parts(self, text: bytes, match: Callable[[int], int | None] | None = None) -> Parts:
+        """Return the records of a block of whole records, or of the rest of a stream.
+
+        match: gives the end of a record that is known to begin at a place.
+        """
+        if self.layout == DOCUMENTS:
+            return Parts(list(_documents(text)))
+        self.layout = self.layout or _layout_of(text, final=True)
+        if self.layout == LINES:
+            return Parts([part for line in _LINE.finditer(text) for part in self._line(text, *line.span())])
+        return self._values(text, final=True, match=match)
+
+    def _line(self, text: bytes, start: int, end: int) -> list[Part]:
+        """Return the record of a line, or several."""
+        line = text[start:end]
+        body = line.strip(b" \t\r\n,").removeprefix(MARK)
+        if not body:
+            return []
+        begin = start + line.find(body)
+        if not _SEVERAL.search(body):
+            return [_with_separator(text, begin, begin + len(body))]
+        found = _scanned(body, 0, array=False, final=True, match=None).parts
+        return [_with_separator(text, begin + each.start, begin + each.end, each.problem) for each in found]
+
+    def _values(self, text: bytes, *, final: bool, match: Callable[[int], int | None] | None = None) -> Parts:
+        """Scan JSON values one after the other, in an array with commas between them."""
+        opening = _OPENING.match(text) if self.layout == ARRAY else None
+        start = opening.end() if opening else 3 if text.startswith(MARK) else 0
+        found = _scanned(text, start, array=self.layout == ARRAY, final=final, match=match, first=bool(opening))
+        if self.layout == ARRAY:
+            return found
+        return Parts([_with_separator(text, each.start, each.end, each.problem) for each in found.parts])
+
+
+def _with_separator(text: bytes, start: int, end: int, problem: str = "") -> Part:
+    """Let what follows a record on its line go with it."""
+    after = _AFTER.match(text, end)
+    return Part(start, start, end, after.end() if after else end, problem)
+
+
+def _layout_of(text: bytes, *, final: bool) -> str:
+    """Tell how JSON is laid out by its first line; "" where that has not come yet."""
+    body = text.removeprefix(MARK).lstrip()
+    if body.startswith(b"["):
+        following = body[1:].lstrip(b" \t\r")[:1]
+        if following in (b"{", b"]", b"\n", b""):
+            return ARRAY if following or final else ""
+    end = body.find(b"\n")
+    if not body or (end < 0 and not final):
+        return ""
+    line = (body if end < 0 else body[:end]).decode("latin-1")
+    _, problem = _value(line.rstrip(" \t\r,"), 0)
+    return VALUES if problem is None else LINES
+
+
+def _value(text: str, at: int) -> tuple[int, str | None]:
+    """Return the end of the JSON value at a place and ""; or where it goes wrong and why: None if it is cut off."""
+    try:
+        return _decoder()(text, at)[1], ""
+    except RecursionError:
+        return at, "nested too deeply"
+    except ValueError as error:
+        place: int = getattr(error, "pos", at)
+        message: str = getattr(error, "msg", str(error))
+        is_cut = _WORD_AT_END.match(text, place) or message.startswith("Unterminated string")
+        return place, None if is_cut else f"not JSON: {message[:1].lower()}{message[1:]}"
+
+
+def _decoder() -> Callable[[str, int], tuple[object, int]]:
+    """Return the decoder; numbers stay text, so that none is too long."""
+    global _decode  # noqa: PLW0603 - made once, when JSON is first met
+    if _decode is None:
+        from json import JSONDecoder
+
+        _decode = JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode
+    return _decode
+
+
+_decode: Callable[[str, int], tuple[object, int]] | None = None
+
+
+def _scanned(
+    data: bytes,
+    at: int,
+    *,
+    array: bool,
+    final: bool,
+    match: Callable[[int], int | None] | None,
+    first: bool = True,
+) -> Parts:
+    """Scan values from a place on; an unfinished one ends the scan, or is a part with a problem if it is final."""
+    found: list[Part] = []
+    text = data.decode("latin-1")  # keeps every offset; the syntax of JSON is ASCII
+    needs_comma = array and not first
+    while True:
+        gap = _GAP.match(data, at)
+        start, comma = (gap.end(), gap[1]) if gap else (at, b"")
+        if start >= len(data):
+            if comma and array and final:
+                found.append(Part(at, start - 1, start, start, "no record follows this comma"))
+            return Parts(found)
+        if array and data[start : start + 1] == b"]":
+            if comma:
+                found.append(Part(at, start, start, start, "no record follows this comma"))
+            return Parts([*found, *_behind(data, start + 1)], closed=True)
+        problem: str | None = "a comma is missing before this record" if needs_comma and not comma else ""
+        if array and data[start : start + 1] == b",":
+            found.append(Part(at, start, start, start, "no record stands between two commas"))
+            at, needs_comma = start, False
+            continue
+        end = match(start) if match else None
+        if end is None:
+            end, wrong = _value(text, start)
+            if wrong is None and not final:
+                return Parts(found)
+            if wrong != "":
+                end = _end_of_broken(data, start, len(data) if wrong is None else end, array=array)
+                problem = wrong or "not JSON: it is cut off"
+        found.append(Part(at if array else start, start, end, end, problem or ""))
+        at, needs_comma = end, array
+
+
+def _behind(data: bytes, at: int) -> Iterator[Part]:
+    """Yield what follows an array, if anything does."""
+    rest = data[at:].strip()
+    if rest:
+        start = data.find(rest, at)
+        yield Part(at, start, start + len(rest), len(data), "text behind the end of the array", outside=True)
+
+
+def _end_of_broken(data: bytes, start: int, wrong: int, *, array: bool) -> int:
+    """Return where a value that goes wrong ends: before the next line or object that begins, or at the end."""
+    line = data.rfind(b"\n", start, wrong + 1)
+    following = _NEXT.search(data, wrong if line < 0 else line)
+    end = len(data) if following is None else following.start() + data.startswith(b"}", following.start())
+    body = data[start:end].rstrip(b" \t\r\n,")
+    if array and following is None and body.endswith(b"]") and body.count(b"]") > body.count(b"["):
+        body = body[:-1].rstrip()
+    return start + max(len(body), 1)
+
+
+def _documents(text: bytes) -> Iterator[Part]:
+    """Yield the documents of a YAML text that hold more than comments, each with the separator behind it."""
+    start = 0
+    for mark in _SEPARATOR.finditer(text):
+        yield from _document(text, start, mark.start() if mark[0].startswith(b"-") else mark.end(), mark.end())
+        start = mark.end()
+    yield from _document(text, start, len(text), len(text))
+
+
+def _document(text: bytes, start: int, end: int, after: int) -> Iterator[Part]:
+    start += len(MARK) * text.startswith(MARK, start)
+    if not _NO_DOCUMENT.fullmatch(text, start, end):
+        yield Part(start, start, end, after)

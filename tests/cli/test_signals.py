@@ -1,0 +1,87 @@
+"""Who ends a run leaves nothing half behind: files, lines, the terminal's state."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from typing import TYPE_CHECKING
+
+import pytest
+from shell import ENVIRONMENT, TOOL, run, start
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+STREAM = ["apply", "--transform", "{xyz: [1, 2, 3]}"]
+ENDLESS = ["sim", "follow", "--duration", "inf", "--realtime"]
+
+
+def until_written(process: subprocess.Popen[bytes], folder: Path, begun: int) -> None:
+    """Wait until a part file has something in it."""
+    while sum(path.stat().st_size for path in folder.iterdir()) <= begun:
+        assert process.poll() is None
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+@pytest.mark.parametrize("arguments", [STREAM, ENDLESS], ids=["stream", "simulation"])
+@pytest.mark.parametrize("link", [False, True])
+def test_an_ended_run_replaces_nothing(number: int, arguments: list[str], link: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    (tmp_path / "old").write_bytes(b"before")
+    (tmp_path / "link").symlink_to("old")
+    target = str(tmp_path / ("link" if link else "old"))
+    # a test may itself run under nohup, where SIGHUP is ignored and would stay so
+    with start(*arguments, "-o", target, "--force", preexec_fn=_by_default) as process:
+        assert process.stdin is not None
+        process.stdin.write(b"x,y,z\n1,2,3\n")
+        process.stdin.flush()
+        until_written(process, tmp_path, 2 * len(b"before"))
+        process.send_signal(number)
+        assert process.wait() == (130 if number == signal.SIGINT else -number)
+    assert (tmp_path / "old").read_bytes() == b"before"
+    left = {path.name for path in tmp_path.iterdir()} - {"old", "link"}
+    assert left == ({f"old.{process.pid}.part"} if number == signal.SIGKILL else set())
+
+
+def _by_default() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def test_what_is_ignored_stays_ignored(tmp_path: Path) -> None:
+    def as_under_nohup() -> None:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+    with start(*STREAM, "-o", str(tmp_path / "out"), preexec_fn=as_under_nohup) as process:
+        assert process.stdin is not None
+        process.stdin.write(b"x,y,z\n1,2,3\n")
+        process.stdin.flush()
+        until_written(process, tmp_path, 0)
+        process.send_signal(signal.SIGHUP)
+        process.communicate(b"4,5,6\n")
+    assert process.returncode == 0
+    assert (tmp_path / "out").read_bytes() == b"x,y,z\n2.0,4.0,6.0\n5.0,7.0,9.0\n"
+
+
+def test_a_bad_row_or_a_missing_input_leaves_no_file(tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+    source.write_bytes(b"x,y,z\n1,2,3\n1,?,3\n")
+    (tmp_path / "link").symlink_to("in.csv")
+    assert run(*STREAM, "-i", str(source), "-o", str(tmp_path / "out"))[0] == 1
+    assert run(*STREAM, "-i", str(source), "-o", str(tmp_path / "link"))[0] == 5
+    assert run(*STREAM, "-i", str(source), "-o", str(tmp_path / "link"), "--force")[0] == 1
+    assert source.read_bytes() == b"x,y,z\n1,2,3\n1,?,3\n"
+    assert run(*STREAM, "-i", str(source), "-o", str(tmp_path / "link"), "--force", "--on-error", "skip")[0] == 3
+    assert source.read_bytes() == b"x,y,z\n2.0,4.0,6.0\n"
+    assert sorted(os.listdir(tmp_path)) == ["in.csv", "link"]
+
+
+def test_a_result_and_its_plot_are_two_files(tmp_path: Path) -> None:
+    (tmp_path / "link.svg").symlink_to("f.svg")
+    for other in ("f.svg", "./f.svg", "link.svg"):
+        done = subprocess.run(
+            [*TOOL, "sim", "follow", "--duration", "0.1", "-o", "f.svg", "--plot", other, "--force"],
+            cwd=tmp_path, env=ENVIRONMENT, capture_output=True, check=False,
+        )  # fmt: skip
+        assert (done.returncode, b"the same file" in done.stderr) == (2, True)
+    assert os.listdir(tmp_path) == ["link.svg"]
