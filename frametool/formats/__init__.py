@@ -26,7 +26,7 @@ class Format(NamedTuple):
 
 _TREE = "frametool.formats.tree_reader"
 _MESSAGES = "frametool.ros.message_reader"
-_BAG = "frametool.ros.bags"
+BAG = "frametool.ros.bags"
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
@@ -96,15 +96,15 @@ FORMATS = {
             ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
         ),
     ),
-    "bag1": Format("ROS 1 bag", (".bag",), ("tree",), _BAG, signs=(("magic", b"#ROSBAG V2.0"),)),
+    "bag1": Format("ROS 1 bag", (".bag",), ("tree",), BAG, signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),)),
     "bag2": Format(
-        "ROS 2 bag (sqlite3)",
+        "ROS 2 bag: sqlite3, or a folder",
         suffixes=(".db3",),
         reads=("tree",),
-        reader=_BAG,
-        signs=(("magic", b"SQLite format 3\0"), ("folder", "metadata.yaml")),
+        reader=BAG,
+        signs=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
     ),
-    "mcap": Format("MCAP file", (".mcap",), ("tree",), _BAG, signs=(("magic", b"\x89MCAP0\r\n"),)),
+    "mcap": Format("MCAP file", (".mcap",), ("tree",), BAG, signs=(("magic", rb"\x89MCAP0\r\n"),)),
     "ros1": Format(
         "messages as `rostopic echo` prints them",
         writes=("poses", "points", "tree"),

@@ -2,7 +2,7 @@
 
 Kinds of signs in the table, the strongest first.  Above the suffix, a sign belongs to one form alone:
 
-    magic      the first bytes
+    magic      a pattern of the first bytes
     folder     a file that the folder holds
     xml        the root element
     json key   a key of the outermost object, or of the objects in the outermost list
@@ -98,7 +98,7 @@ def _has_delimiter(line: str) -> bool:
 
 # kind -> whether a beginning shows what a row says, the strongest first
 _STRONG: dict[str, Shows] = {
-    "magic": lambda begin, what: begin.head.startswith(what),
+    "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
     "xml": lambda begin, what: begin.root == what,
     "json key": lambda begin, what: what in begin.json_keys,
     "yaml key": lambda begin, what: what in begin.yaml_keys,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from io import BytesIO
 from typing import TYPE_CHECKING
 
 from frametool.documents.input_file import InputFile
-from frametool.errors import warn
-from frametool.formats import FORMATS
+from frametool.errors import FileProblem, warn
+from frametool.formats import BAG, FORMATS
 from frametool.formats.detect import by_sign, detect, of_folder
 from frametool.grammar.edges import Edge, Options, Tally, stop
 
@@ -30,6 +31,8 @@ class Recording(InputFile):
         stream: what was opened already, with nothing of it read.  Raises FileProblem.
         """
         folder = None if form else of_folder(str(path))
+        if not (form or folder) and os.path.isdir(path):
+            raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
         self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
         self.tally = Tally()
@@ -63,6 +66,13 @@ class Recording(InputFile):
             self.close()
         for told in self.tally.told() if tell else ():
             warn(f"{self.name}:{told.line}: {told.message}")
+
+
+def _about_folder(path: str) -> str:
+    """Say why a folder is not read, and which of its files would be."""
+    bags = tuple(suffix for row in FORMATS.values() if row.reader == BAG for suffix in row.suffixes)
+    files = sorted(name for name in os.listdir(path) if name.endswith(bags))[:5]
+    return f"a folder without metadata.yaml; name a file in it: {', '.join(files)}" if files else "is a directory"
 
 
 def open_messages(path: str, stream: BinaryIO) -> Recording | None:
