@@ -42,7 +42,7 @@ class RowFrames:
         self.source: str | None = options.pop("source_column")
 
     def __bool__(self) -> bool:
-        """Tell whether rows are looked up."""
+        """Return whether a column names a frame."""
         return self.target is not None or self.source is not None
 
     def run(
@@ -68,8 +68,8 @@ class RowFrames:
         forms = output.notations or (notation("quaternion"),)
         from frametool.stream.request import Request
 
-        wishes = Request(poses=0, frames=frames, edge_of=edge_of, notations=forms, degrees=output.style.degrees)
-        status = stream.run(wishes, output, tables_only=True)
+        request = Request(poses=0, frames=frames, edge_of=edge_of, notations=forms, degrees=output.style.degrees)
+        status = stream.run(request, output, tables_only=True)
         return status if isinstance(status, int) else 0
 
     def _fixed(self, target: str | None, source: str | None) -> tuple[str | None, str | None]:

@@ -65,9 +65,7 @@ class Output:
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
-        from frametool.frames.tree import FrameTree
-
-        if not isinstance(tree, FrameTree) and "poses" in self._writes and self.style.form not in ("yaml", "json"):
+        if tree.moves and "poses" in self._writes and self.style.form not in ("yaml", "json"):
             self.poses(sample_results(tree))
             return
         if self.style.form != "text":

@@ -28,7 +28,7 @@ class Time(Text):
     name = "time"
 
     def __init__(self, *, latest: bool = True) -> None:
-        """Say whether `latest` is a choice."""
+        """Keep whether `latest` is a choice."""
         self.latest = latest
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:

@@ -6,6 +6,7 @@ Knows nothing of text: whoever reads says where each edge stood.
 from __future__ import annotations
 
 from frametool.errors import BadTopology, FormatError, Tf2Warning, ValueInvalid, warn
+from frametool.frames.policy import Refused
 from frametool.frames.tree import FrameTree
 
 TYPE_CHECKING = False
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
     from typing import Protocol
 
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.track import Track
     from frametool.geometry.types import Rigid
 
     class Place(Protocol):
@@ -65,7 +65,7 @@ class Assembly:
     """What has been read so far, and where the first word on each frame stood."""
 
     def __init__(self, name: str, rules: Rules | None = None) -> None:
-        """Begin with no frames; `name` says in messages where they come from."""
+        """Create an empty assembly; `name` says in messages where they come from."""
         self.name = name
         self.rules = rules or Rules()
         self.tree = FrameTree(name)
@@ -95,26 +95,27 @@ class Assembly:
             else:
                 self._record(self._moving(), parent, child, components, stamp_ns, place)
         except BadTopology as error:
-            if error.source:
-                raise
-            raise place.error(self._explained(error, parent, child, place), BadTopology) from None
+            raise self._placed(error, parent, child, place) from None
+        except Refused as refused:
+            tell_rejected(refused.lines)
         except ValueInvalid as error:
-            if lines := getattr(error, "lines", None):
-                tell_rejected(lines)
-            else:
-                raise place.error(str(error), FormatError) from None
+            raise place.error(str(error), FormatError) from None
 
     def finish(self) -> FrameTree | TransformBuffer:
         """Return the tree, or the buffer if anything moves."""
         if self.buffer is None:
             return self.tree
-        standing = [] if self.rules.moving else [track for track in self.buffer.tracks() if self._stands(track)]
-        for track in standing:
-            self.buffer.make_stand(track.child)
-        self._tell_replaced({track.child for track in standing})
-        self._check_standing(self.buffer)
-        everything_stands = all(track.standing for track in self.buffer.tracks())
-        return self.tree if everything_stands and self.rules.policy == "frametool" else self.buffer
+        standing = set()
+        if not self.rules.moving:
+            moving = [track.child for track in self.buffer.tracks() if not track.standing]
+            standing = {child for child in moving if child not in self._moves}
+        for child in standing:
+            self.buffer.make_stand(child)
+        self._tell_replaced(standing)
+        if self.rules.policy != "frametool":
+            return self.buffer
+        tree = self._standing_tree(self.buffer)
+        return self.buffer if self.buffer.moves else tree
 
     def _hang(self, parent: str, child: str, components: Rigid, place: Place) -> None:
         """Add an edge that stands still."""
@@ -140,7 +141,7 @@ class Assembly:
         received, child = child, self._kept(child)
         track = buffer.track(child)
         settled = track is not None and child not in self._moves and (track.standing or stamp_ns is None)
-        if track is not None and settled and (track.parent, track.samples[-1]) == (parent, components):
+        if track is not None and settled and (track.parent, track.components) == (parent, components):
             return  # said again, once with and once without a stamp
         self._first.setdefault(child, (parent, components, place))
         if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
@@ -154,53 +155,48 @@ class Assembly:
                 self._replaced.append(Replaced(parent, child, stamp_ns, places.get(stamp_ns, place), place))
             places[stamp_ns] = place
 
-    def _stands(self, track: Track) -> bool:
-        """Say whether a track whose samples carry one stamp is that of a standing frame."""
-        return not track.standing and track.child not in self._moves
-
     def _tell_replaced(self, standing: set[str], most: int = 10) -> None:
         """Refuse standing frames with two values; warn of moving ones with two poses at one stamp."""
         from frametool.frames.stamps import format_stamp
 
         for each in self._replaced:
             if each.child in standing:
-                message = self._explained(BadTopology(""), each.parent, each.child, each.later)
-                raise each.later.error(message, BadTopology)
+                raise self._placed(BadTopology("", rule="two-poses"), each.parent, each.child, each.later)
         for each in self._replaced[:most]:
             what = f"frame {each.child!r} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
             warn(f"{self.name}: {what}; the last one holds")
         if len(self._replaced) > most:
             warn(f"{self.name}: {len(self._replaced) - most} more stamps with two poses of one frame")
 
-    def _check_standing(self, buffer: TransformBuffer) -> None:
-        """Hold all that stands still to a tree's rules."""
-        if self.rules.policy != "frametool":
-            return
-        self.tree = FrameTree(self.name)
+    def _standing_tree(self, buffer: TransformBuffer) -> FrameTree:
+        """Return all that stands still as a tree, held to a tree's rules."""
+        tree = FrameTree(self.name)
         for frame in buffer.frames:
-            self.tree.add_root(frame)
+            tree.add_root(frame)
         for track in buffer.tracks():
             if track.standing:
                 try:
-                    self.tree.add_components(track.parent, track.child, track.samples[0])
+                    tree.add_components(track.parent, track.child, track.components)
                 except BadTopology as error:
                     raise self._first[track.child][2].error(str(error), BadTopology) from None
+        return tree
 
-    def _explained(self, error: BadTopology, parent: str, child: str, place: Place) -> str:
-        """Say where the other word on a frame stood."""
+    def _placed(self, error: BadTopology, parent: str, child: str, place: Place) -> FormatError:
+        """Make the error for a place; where it contradicts what was said before, both places are named."""
+        message = str(error)
         known = self._first.get(child)
-        if known is None or known[2] is place:
-            return str(error)
-        known_parent, _, earlier = known
-        places = earlier.seen_from(place), place.seen_from(place)
-        if known_parent != parent:
-            return f"frame {child!r} has two parents: {known_parent!r} ({places[0]}) and {parent!r} ({places[1]})"
-        if "moves" in str(error):
-            return f"{error}: {places[0]} and {places[1]}"
-        return f"frame {child!r} has two different poses in {parent!r}: {places[0]} and {places[1]}"
+        if error.rule not in ("cycle", "self") and known is not None and known[2] is not place:
+            first, second = known[2].seen_from(place), place.seen_from(place)
+            if known[0] != parent:
+                message = f"frame {child!r} has two parents: {known[0]!r} ({first}) and {parent!r} ({second})"
+            elif error.rule == "two-poses":
+                message = f"frame {child!r} has two different poses in {parent!r}: {first} and {second}"
+            else:
+                message = f"{error}: {first} and {second}"
+        return place.error(message, BadTopology)
 
 
 def tell_rejected(lines: list[str]) -> None:
-    """Tell what tf2 would have logged of a transform it drops."""
+    """Warn in the words that tf2 logs when it drops a transform."""
     for line in lines:
         warn(line, kind=Tf2Warning)

@@ -7,17 +7,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.frames.tree import FrameTree
 from frametool.grammar.edge_label import edge_label, graphviz
 
 if TYPE_CHECKING:
-    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.lookups import Frames
     from frametool.grammar.result import Style
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return a digraph; names are quoted, so that any text is a name.  What moves is drawn as view_frames does."""
-    if not isinstance(tree, FrameTree):
+    if tree.moves:
         from frametool.formats import view_frames
 
         return view_frames.write_tree(tree)

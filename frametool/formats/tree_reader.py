@@ -113,19 +113,20 @@ def _below_root(root: str, children: Any, reading: Reading) -> Iterator[Edge]:
         if entries is None:
             continue
         deeper = []
-        for child, entry in _children(entries, path).items():
+        for child, entry in _children(entries, path, reading).items():
             here = (*path, child)
             yield from _nested(parent, child, entry, here, reading)
-            if entry is not None and "children" in entry:
+            if type(entry) is dict and "children" in entry:
                 deeper.append((child, entry["children"], (*here, "children")))
         pending.extend(reversed(deeper))
 
 
-def _children(entries: Any, path: Path) -> dict[str, Any]:
+def _children(entries: Any, path: Path, reading: Reading) -> dict[str, Any]:
     try:
         return as_mapping(entries, "the children as a mapping by name")
     except Misfit as misfit:
-        raise misfit.below(*path) from None
+        reading.refuse(misfit.below(*path))
+        return {}
 
 
 def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -> Iterator[Edge]:
@@ -143,10 +144,9 @@ def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -
             if key in as_mapping(entry, f"the pose of frame {child!r}"):
                 raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)
         pose = read_pose(entry, reading, CHILDREN)
-        edges = _edges(entry, pose, parent, child, path, reading)
+        yield from _edges(entry, pose, parent, child, path, reading)
     except Misfit as misfit:
-        raise misfit.below(*path) from None
-    yield from edges
+        reading.refuse(misfit.below(*path))
 
 
 def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]:
@@ -170,7 +170,8 @@ def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
             raise Misfit(f"frame {pose.name!r} has a pose but no parent")
         return _edges(entry, pose, pose.parent, pose.name, path, reading)
     except Misfit as misfit:
-        raise misfit.below(*path) from None
+        reading.refuse(misfit.below(*path))
+        return []
 
 
 def _edges(
@@ -191,7 +192,7 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
         try:
             yield _message(message, here, reading)
         except Misfit as misfit:
-            raise misfit.below(*here) from None
+            reading.refuse(misfit.below(*here))
 
 
 def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
@@ -216,16 +217,18 @@ def read_samples(
     if type(samples) is not list or not samples:
         raise Misfit(f"expected samples as a list of {{stamp: .., xyz: [..], ..}}, found {kind(samples)}", ("samples",))
     outer = reading.degrees
-    reading.degrees = read_angle_unit(entry["angles"]) if "angles" in entry else outer
     edges = []
-    for index, sample in enumerate(samples):
-        reading.here = (*path, "samples", index)
-        moved, stamp_ns = within(("samples", index), _sample, sample, reading)
-        above = moved.parent or parent
-        if above is None:
-            raise Misfit(f"frame {child!r} moves but has no parent", ("samples", index))
-        edges.append(Edge(above, child, moved.components, stamp_ns, path=reading.here))
-    reading.degrees = outer
+    try:
+        reading.degrees = read_angle_unit(entry["angles"]) if "angles" in entry else outer
+        for index, sample in enumerate(samples):
+            reading.here = (*path, "samples", index)
+            moved, stamp_ns = within(("samples", index), _sample, sample, reading)
+            above = moved.parent or parent
+            if above is None:
+                raise Misfit(f"frame {child!r} moves but has no parent", ("samples", index))
+            edges.append(Edge(above, child, moved.components, stamp_ns, path=reading.here))
+    finally:
+        reading.degrees = outer
     return edges
 
 

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.frames.report import seen
+from frametool.frames.report import cache_entries
 from frametool.grammar.edge_label import graphviz
 
 if TYPE_CHECKING:
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.report import Seen
+    from frametool.frames.lookups import Frames
+    from frametool.frames.report import CacheEntry
 
 
-def write_tree(tree: TransformBuffer) -> str:
+def write_tree(tree: Frames) -> str:
     """Return the digraph; the legend, which graphviz must hang somewhere, stands above the first root."""
-    edges = seen(tree)
+    edges = cache_entries(tree)
     newest = max((each.newest for each in edges), default=0.0)
     lines = ["digraph G {", *map(_edge, edges), "edge [style=invis];"]
     lines += [' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";']
@@ -26,7 +26,7 @@ def write_tree(tree: TransformBuffer) -> str:
     return "\n".join([*lines, "}", ""])
 
 
-def _edge(each: Seen) -> str:
+def _edge(each: CacheEntry) -> str:
     facts = {
         "Broadcaster": graphviz(each.authority),
         "Average rate": round(each.rate, 3),

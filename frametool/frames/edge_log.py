@@ -26,7 +26,7 @@ LEAST_RETURNS = 3  # so many times there and back are no accident
 RETURN_FACTOR = 0.1  # a way there and back ends so near to its begin, measured by the step there
 
 
-class Step(NamedTuple):
+class SampleStep(NamedTuple):
     """The way from one stamp to the next: where it ends, how far and how long it was, and whether it leads back.
 
     Under another parent there is no distance: metres and radians are 0.  `returns` says that the two steps up to here
@@ -45,7 +45,7 @@ class EdgeLog:
     """The samples of one child frame, in the order they came; stamps in nanoseconds."""
 
     def __init__(self, child: str) -> None:
-        """Begin without samples."""
+        """Create an empty log."""
         self.child = child
         self.parent = ""  # the newest
         self.parents: dict[str, int] = {}  # each once, numbered as it was first named
@@ -83,20 +83,20 @@ class EdgeLog:
         self._poses.extend(components)
 
     def is_late(self, stamp_ns: int) -> bool:
-        """Tell a stamp that comes after a later one."""
+        """Return whether a stamp comes after a later one."""
         return self.last_ns is not None and stamp_ns < self.last_ns
 
     @cached_property
-    def steps(self) -> list[Step]:
+    def steps(self) -> list[SampleStep]:
         """Return the ways between stamps in the order of time, once all are in; the last of equal stamps counts."""
         last = {stamp: at for at, stamp in enumerate(self._stamps)}
         order = [last[stamp] for stamp in sorted(last)]
-        found: list[Step] = []
+        found: list[SampleStep] = []
         for number, (before, at) in enumerate(pairwise(order)):
             metres, radians = self._apart(before, at)
             back = number > 0 and self._is_return(order[number - 1], at, found[-1], (metres, radians))
             pause = self._stamps[at] - self._stamps[before]
-            found.append(Step(self._stamps[at], self._lines[at], metres, radians, pause, back))
+            found.append(SampleStep(self._stamps[at], self._lines[at], metres, radians, pause, back))
         return found
 
     def _apart(self, before: int, at: int) -> tuple[float, float]:
@@ -111,8 +111,8 @@ class EdgeLog:
         tx, ty, tz, x, y, z, w = self._poses[7 * at : 7 * at + 7]
         return tx, ty, tz, x, y, z, w
 
-    def _is_return(self, begin: int, end: int, there: Step, back: tuple[float, float]) -> bool:
-        """Tell a way far off and back again from one that goes on."""
+    def _is_return(self, begin: int, end: int, there: SampleStep, back: tuple[float, float]) -> bool:
+        """Return whether two successive steps lead far off and back again."""
         far = there.metres, there.radians
         least = JUMP_METRES, JUMP_RADIANS
         return any(
@@ -122,33 +122,37 @@ class EdgeLog:
 
     @property
     def moves(self) -> bool:
-        """Tell an edge with two different stamps from one that stands still."""
+        """Return whether there are two different stamps."""
         return not self.standing and self.first_ns != self.last_ns
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """Return the first and the last stamp of an edge that moves."""
+        return self.first_ns or 0, self.last_ns or 0
 
     @property
     def rate(self) -> float | None:
         """Return samples a second between the first and the last stamp; None for an edge that stands still."""
-        if self.first_ns is None or self.last_ns is None or not self.moves:
-            return None
-        return (self.count - 1) * BILLION / (self.last_ns - self.first_ns)
+        first, last = self.span
+        return (self.count - 1) * BILLION / (last - first) if self.moves else None
 
     @property
-    def longest(self) -> Step | None:
+    def longest(self) -> SampleStep | None:
         """Return the step with the longest pause."""
         return max(self.steps, key=lambda step: step.pause_ns, default=None)
 
-    def gaps(self) -> list[Step]:
+    def gaps(self) -> list[SampleStep]:
         """Return the steps that waited far longer than usual."""
         usual = _median([step.pause_ns for step in self.steps])
         return [step for step in self.steps if step.pause_ns > GAP_FACTOR * usual]
 
-    def jumps(self) -> list[Step]:
+    def jumps(self) -> list[SampleStep]:
         """Return the steps that went far further than usual."""
         metres, radians = (_median([step[field] for step in self.steps]) for field in (2, 3))
         far, turned = max(JUMP_METRES, JUMP_FACTOR * metres), max(JUMP_RADIANS, JUMP_FACTOR * radians)
         return [step for step in self.steps if step.metres > far or step.radians > turned]
 
-    def returns(self) -> list[Step]:
+    def returns(self) -> list[SampleStep]:
         """Return the steps back where an edge goes back and forth all the time, as of two publishers that disagree."""
         back = [step for step in self.steps if step.returns]
         return back if len(back) >= max(LEAST_RETURNS, len(self.steps) / 3) else []
@@ -173,7 +177,5 @@ def chain(logs: dict[str, EdgeLog], target: str, source: str) -> list[str]:
 
 def common_interval(logs: Iterable[EdgeLog]) -> tuple[int, int] | None:
     """Return the first and last stamp that all moving edges cover; None if all stand still; empty if first > last."""
-    moving = [log for log in logs if log.moves and log.first_ns is not None and log.last_ns is not None]
-    if not moving:
-        return None
-    return max(log.first_ns for log in moving), min(log.last_ns for log in moving)  # type: ignore[type-var, return-value]
+    spans = [log.span for log in logs if log.moves]
+    return (max(first for first, _ in spans), min(last for _, last in spans)) if spans else None

@@ -9,7 +9,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.frames.track import Track
+    from frametool.frames.edge_log import EdgeLog
+    from frametool.frames.track import MovingTrack, Track
 
 OTHER_CLOCK = 10**8 * BILLION  # three years: beyond, one clock counts from 1970 and the other from its start
 
@@ -24,8 +25,8 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
     first, last = worst.span
     short = gap(worst, at_ns)
     early = at_ns < first
-    begin, end = max(track.stamps[0] for track in moving), min(track.stamps[-1] for track in moving)
-    parent = worst.parents[0 if early else -1]
+    begin, end = max(track.first_ns for track in moving), min(track.last_ns for track in moving)
+    parent = worst.parent_near(at_ns)
     off = f"{seconds(short)} s too {'early' if early else 'late'}"
     message = (
         f"no data for {parent} -> {worst.child} at {format_stamp(at_ns)}; {_cover(first, last)} ({off}), "
@@ -38,7 +39,16 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
     )  # fmt: skip
 
 
-def gap(track: Track, at_ns: int) -> int:
+def left_out(track: MovingTrack, at_ns: int) -> str:
+    """Return the sentence that says why an edge is left out of the tree at a time."""
+    return (
+        f"{track.parent} -> {track.child} is left out: no data at {format_stamp(at_ns)}, "
+        f"samples cover {format_stamp(track.first_ns)} .. {format_stamp(track.last_ns)} "
+        f"({seconds(gap(track, at_ns))} s off)"
+    )
+
+
+def gap(track: MovingTrack, at_ns: int) -> int:
     """Return how far a time lies outside of a track's samples, in nanoseconds."""
     first, last = track.span
     return max(first - at_ns, at_ns - last, 0)
@@ -63,22 +73,22 @@ def _way(target: str, source: str, path: Sequence[Track]) -> str:
     return f"on the path {' <- '.join(frames)}"
 
 
-def frames_on(target: str, source: str, path: Sequence[Track]) -> list[str]:
-    """List the frames on a path from target to source, both included."""
+def frames_on(target: str, source: str, path: Sequence[Track | EdgeLog]) -> list[str]:
+    """List the frames on a path of edges from target to source, both included."""
     frames = [target]
     for track in path:
         frames.append(track.parent if track.child == frames[-1] else track.child)
     return frames if frames[-1] == source else [*frames, source]
 
 
-def _whole(moving: Sequence[Track], begin: int, end: int) -> str:
-    """Say when all edges have data, or which two never do."""
+def _whole(moving: Sequence[MovingTrack], begin: int, end: int) -> str:
+    """Return the clause that says when all edges have data, or which two never do."""
     if len(moving) == 1:
         return ""
     if begin <= end:
         return f"; the whole path has data from {format_stamp(begin)} until {format_stamp(end)}"
-    late = max(moving, key=lambda track: track.stamps[0])
-    early = min(moving, key=lambda track: track.stamps[-1])
+    late = max(moving, key=lambda track: track.first_ns)
+    early = min(moving, key=lambda track: track.last_ns)
     return (
         f"; {early.parent} -> {early.child} ends at {format_stamp(end)} before {late.parent} -> {late.child} "
         f"begins at {format_stamp(begin)}: they never overlap"

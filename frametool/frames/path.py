@@ -1,17 +1,24 @@
-"""The way between two frames of a tree: which edges, and which of them backwards.
+"""The way between two frames of a tree: which edges, and their product.
 
-Knows names and parents only. Standing and moving trees both ask here, then compose what lies on the way.
+Knows names and parents only. Trees that stand still and trees that move both ask here.
 """
 
 from __future__ import annotations
 
 from frametool.errors import BadTopology, NotConnected
-
-MOST_SHOWN = 16  # frames of a cycle
+from frametool.geometry import rigid
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+    from typing import TypeVar
+
+    from frametool.geometry.types import Rigid
+
+    Edge = TypeVar("Edge")
+
+MOST_SHOWN = 16  # frames of a cycle
+IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
@@ -24,7 +31,7 @@ def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
     seen = {frame}
     while parent is not None:
         if parent in seen:
-            raise BadTopology(cycle_message([*line[line.index(parent) :], parent]))
+            raise BadTopology(cycle_message([*line[line.index(parent) :], parent]), rule="cycle")
         line.append(parent)
         seen.add(parent)
         parent = parent_of(parent)
@@ -50,6 +57,35 @@ def edges_between(target: str, source: str, parent_of: Callable[[str], str | Non
         target_line.pop()
         source_line.pop()
     return target_line[::-1], source_line
+
+
+def compose_path(
+    to_target: Sequence[Edge], to_source: Sequence[Edge], sample: Callable[[Edge], Rigid | None]
+) -> Rigid | None:
+    """Return target_from_source, floats or columns; None if an edge has no pose.
+
+    to_target, to_source: the edges from the common ancestor down to either end.  A branch without edges leaves the
+    other's bits alone.
+    sample: returns parent_from_child of an edge, or None.
+    """
+    top_from_target, top_from_source = _product(to_target, sample), _product(to_source, sample)
+    if top_from_target is None or top_from_source is None:
+        return None
+    if not to_target:
+        return top_from_source
+    if not to_source:
+        return rigid.inverse(*top_from_target)
+    return rigid.compose(*rigid.inverse(*top_from_target), *top_from_source)
+
+
+def _product(edges: Sequence[Edge], sample: Callable[[Edge], Rigid | None]) -> Rigid | None:
+    """Compose the edges of one branch, topmost first."""
+    product = IDENTITY
+    for here in map(sample, edges):
+        if here is None:
+            return None
+        product = here if product is IDENTITY else rigid.compose(*product, *here)
+    return product
 
 
 def cycle_message(frames: list[str]) -> str:

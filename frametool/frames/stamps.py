@@ -3,12 +3,34 @@
 from __future__ import annotations
 
 import re
+from operator import index
 
 from frametool.errors import ValueInvalid
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
 
 BILLION = 1_000_000_000
 _SECONDS = r"(?a)([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,3}))?"
 _NANOSECONDS = r"(?a)([-+]?\d{1,30})ns"
+
+
+FURTHEST_NS = 1 << 62  # differences of two such stamps fit into 64 bits; the year 2116
+
+
+def whole_stamp(stamp_ns: Any) -> int:
+    """Check a stamp: an integer, never a float.
+
+    Raises ValueInvalid.
+    """
+    try:
+        stamp = index(stamp_ns)
+    except TypeError:
+        raise ValueInvalid(f"a stamp is integer nanoseconds, found {stamp_ns!r}") from None
+    if not -FURTHEST_NS < stamp < FURTHEST_NS:
+        raise ValueInvalid(f"stamp {stamp} ns is beyond the year 2116; are these nanoseconds?")
+    return stamp
 
 
 def parse_stamp(text: str) -> int:

@@ -8,15 +8,15 @@ from __future__ import annotations
 from math import isnan, nan, sqrt
 from typing import TYPE_CHECKING
 
-from frametool.errors import BadTopology, LookupFailed, NotConnected, UnknownFrame, ValueInvalid
+from frametool.errors import BadTopology, LookupFailed, NotConnected, UnknownFrame
 from frametool.frames.path import to_root
-from frametool.frames.policy import Policy
+from frametool.frames.policy import BufferPolicy, Refused
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 
 if TYPE_CHECKING:
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.track import Track
+    from frametool.frames.lookups import Frames
+    from frametool.frames.track import MovingTrack, StandingTrack, Track
     from frametool.geometry.types import Rigid
 
 TEN_SECONDS = 10 * BILLION
@@ -25,16 +25,7 @@ EXPLAINED = "listed at http://wiki.ros.org/tf/Errors%20explained"
 MOST_EDGES = 1000
 
 
-class Refused(ValueInvalid):
-    """A transform that tf2 would log and drop; `lines` are what it logs, with console_bridge's level."""
-
-    def __init__(self, level: str, *lines: str) -> None:
-        """Keep the lines as they are logged."""
-        super().__init__("\n".join(lines))
-        self.lines = [f"{level:<9}{line}" for line in lines]
-
-
-class Ros1(Policy):
+class Ros1(BufferPolicy):
     """tf2 of ROS 1: the first insert decides whether a frame stands, the first sample of a stamp wins."""
 
     zero_counts = False
@@ -82,29 +73,31 @@ class Ros1(Policy):
         """Keep the kind of the first."""
         return track.standing
 
-    def stand(self, track: Track, parent: str, components: Rigid) -> None:
+    def stand(self, track: StandingTrack, parent: str, components: Rigid) -> None:
         """Overwrite the value."""
-        track.stand(parent, components)
+        track.parent, track.components = parent, components
 
-    def refuse_old(self, track: Track, stamp_ns: int, keep_ns: int, authority: str) -> None:
+    def refuse_old(self, track: MovingTrack, stamp_ns: int, keep_ns: int, authority: str) -> None:
         """Refuse what is older than the cache."""
-        if track.stamps[-1] - keep_ns > stamp_ns:
+        if track.last_ns - keep_ns > stamp_ns:
             raise Refused("Warning:", *self.old(_received(track.child, stamp_ns, authority)))
 
     def old(self, what: str) -> tuple[str, ...]:
         """Return the words for data from the past."""
         return (f"TF_OLD_DATA ignoring data from the past (Possible reasons are {EXPLAINED}) {what}",)
 
-    def repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:  # noqa: ARG002
+    def repeat(
+        self, track: MovingTrack, stamp_ns: int, parent: str, components: Rigid, authority: str,  # noqa: ARG002
+    ) -> bool:
         """Refuse a second sample of a stamp."""
-        what = _received(track.child, track.stamps[at], authority)
+        what = _received(track.child, stamp_ns, authority)
         raise Refused("Warning:", f"TF_REPEATED_DATA ignoring data with redundant timestamp {what}")
 
     def is_bad_name(self, name: str) -> bool:
-        """Say whether a name cannot be asked for at all."""
+        """Return whether a name cannot be asked for at all."""
         return not name or name.startswith("/")
 
-    def unknown(self, name: str, role: str, buffer: TransformBuffer) -> LookupFailed:
+    def unknown(self, name: str, role: str, buffer: Frames) -> LookupFailed:
         """Report a frame that does not exist, or a name that cannot."""
         error = UnknownFrame(name, known=buffer.frames, where=buffer.name)
         argument = f"passed to lookupTransform argument {role}"
@@ -118,8 +111,12 @@ class Ros1(Policy):
             return f"Invalid argument {argument} in tf2 frame_ids cannot be empty"
         return f"Invalid argument \"{name}\" {argument} in tf2 frame_ids cannot start with a '/' like: "
 
-    def unconnected(self, error: NotConnected, target: str, source: str) -> LookupFailed:
-        """Report two frames of different trees."""
+    def unconnected(
+        self, buffer: Frames, error: NotConnected, target: str, source: str, at_ns: int | None
+    ) -> LookupFailed:
+        """Report two frames of different trees, unless the search ends before it could tell: then the lack of data."""
+        if at_ns is not None and _blamed(buffer, target, source, at_ns) is not None:
+            return self.missing(buffer, target, source, at_ns, [])
         return NotConnected(
             f"Could not find a connection between '{target}' and '{source}' because they are not part of the same tree."
             "Tf has two or more unconnected trees.",
@@ -127,7 +124,7 @@ class Ros1(Policy):
         )
 
     def looped(
-        self, buffer: TransformBuffer, error: BadTopology, target: str, source: str, at_ns: int | None
+        self, buffer: Frames, error: BadTopology, target: str, source: str, at_ns: int | None
     ) -> tuple[list[str], list[str]]:
         """Find the way as far as tf2 does, which stops once it meets the other end; else say that there is a loop."""
         up, down = (_climb(buffer, *ends, at_ns) for ends in ((source, target), (target, source)))
@@ -135,7 +132,7 @@ class Ros1(Policy):
             raise _loop(buffer) from error
         return ([], up) if up is not None else ((down or [])[::-1], [])
 
-    def refuse_depth(self, buffer: TransformBuffer, target: str, source: str, at_ns: int | None) -> None:
+    def refuse_depth(self, buffer: Frames, target: str, source: str, at_ns: int | None) -> None:
         """Take a way of more than a thousand edges for a loop, on the source's side first."""
         for frame, other in ((source, target), (target, source)):
             line = to_root(frame, lambda each: buffer.parent(each, at_ns))
@@ -145,19 +142,19 @@ class Ros1(Policy):
             if met:
                 return
 
-    def missing(self, buffer: TransformBuffer, target: str, source: str, at_ns: int, way: list[Track]) -> LookupFailed:
+    def missing(self, buffer: Frames, target: str, source: str, at_ns: int, way: list[Track]) -> LookupFailed:
         """Blame the edge that tf2 blames."""
-        error = super().missing(buffer, target, source, at_ns, way)
         track = _blamed(buffer, target, source, at_ns)
+        error = super().missing(buffer, target, source, at_ns, way or [track] if track is not None else way)
         if track is not None:
             ends = f", when looking up transform from frame [{source}] to frame [{target}]"
             error.args = (self.extrapolation(track, at_ns) + ends,)
         return error
 
-    def extrapolation(self, track: Track, at_ns: int) -> str:
+    def extrapolation(self, track: MovingTrack, at_ns: int) -> str:
         """Return the words for a time outside of an edge's samples."""
         first, last = track.span
-        if len(track.stamps) == 1:
+        if track.count == 1:
             return (
                 f"Lookup would require extrapolation at time {self.seconds(at_ns)}, "
                 f"but only time {self.seconds(first)} is in the buffer"
@@ -199,21 +196,19 @@ class Ros2(Ros1):
         """Return the words for data from the past."""
         return f"TF_OLD_DATA ignoring data from the past {what}", f"Possible reasons are {EXPLAINED}"
 
-    def repeat(self, track: Track, at: int, parent: str, components: Rigid, authority: str) -> bool:  # noqa: ARG002
+    def repeat(
+        self, track: MovingTrack, stamp_ns: int, parent: str, components: Rigid, authority: str,  # noqa: ARG002
+    ) -> bool:
         """Drop an exact duplicate; keep other data too, the later insert as the lower bound."""
-        stamp = track.stamps[at]
-        while at >= 0 and track.stamps[at] == stamp:
-            if track.parents[at] == parent and track.samples[at] == components:
-                return False
-            at -= 1
-        track.add(stamp, parent, components)
+        if (parent, components) not in track.samples_at(stamp_ns):
+            track.add(stamp_ns, parent, components)
         return False
 
-    def prune_before(self, track: Track, keep_ns: int) -> None:
+    def prune_before(self, track: MovingTrack, keep_ns: int) -> None:
         """Prune ahead of a new sample: what is over age then lives on until the next."""
-        track.drop_before(track.stamps[-1] - keep_ns)
+        track.drop_before(track.last_ns - keep_ns)
 
-    def prune_after(self, track: Track, keep_ns: int) -> None:
+    def prune_after(self, track: MovingTrack, keep_ns: int) -> None:
         """Leave what is over age."""
 
     def invalid(self, name: str, argument: str) -> str:
@@ -230,39 +225,39 @@ class Ros2(Ros1):
         return ""
 
 
-TF2: dict[str, Policy] = {"ros1": Ros1(), "ros2": Ros2()}
+TF2: dict[str, BufferPolicy] = {"ros1": Ros1(), "ros2": Ros2()}
 
 
-def _loop(buffer: TransformBuffer) -> LookupFailed:
+def _loop(buffer: Frames) -> LookupFailed:
     """Report what tf2 takes for a loop, with all frames."""
     known = (f"Frame {track.child} exists with parent {track.parent}." for track in buffer.tracks())
     return LookupFailed("\n".join(("The tf tree is invalid because it contains a loop.", *known, "")))
 
 
-def _blamed(buffer: TransformBuffer, target: str, source: str, at_ns: int) -> Track | None:
+def _blamed(buffer: Frames, target: str, source: str, at_ns: int) -> MovingTrack | None:
     """Walk as tf2 does: up from the source until data end, then up from the target until the walks meet.
 
-    Gives the first edge on the target's side without data, else the one that ended the source's walk.
+    Returns the first edge on the target's side without data, else the one that ended the source's walk.
     """
     top, failed = _walk(buffer, source, target, at_ns)
     _, blamed = _walk(buffer, target, top, at_ns)
     return blamed or failed
 
 
-def _walk(buffer: TransformBuffer, frame: str, stop: str, at_ns: int) -> tuple[str, Track | None]:
-    """Go up from a frame to `stop`, to the root or to the first edge without data; give the end and that edge."""
+def _walk(buffer: Frames, frame: str, stop: str, at_ns: int) -> tuple[str, MovingTrack | None]:
+    """Go up from a frame to `stop`, to the root or to the first edge without data; return the end and that edge."""
     for _ in range(MOST_EDGES):
         track = buffer.track(frame)
         if frame == stop or track is None:
             break
-        if not track.standing and track.index(at_ns) is None:
+        if not track.standing and not track.covers(at_ns):
             return frame, track
-        parent = track.parent_at(None if track.standing else at_ns)
+        parent = track.parent_at(at_ns)
         frame = frame if parent is None else parent
     return frame, None
 
 
-def _climb(buffer: TransformBuffer, frame: str, stop: str, at_ns: int | None) -> list[str] | None:
+def _climb(buffer: Frames, frame: str, stop: str, at_ns: int | None) -> list[str] | None:
     """List the frames from one up to just below `stop`; None if it is not met."""
     line: list[str] = []
     while frame != stop and len(line) <= MOST_EDGES:

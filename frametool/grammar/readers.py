@@ -58,7 +58,7 @@ class Note(NamedTuple):
 class Reading:
     """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
 
-    __slots__ = ("degrees", "here", "normalize", "notes", "raw", "source")
+    __slots__ = ("degrees", "faults", "here", "normalize", "notes", "raw", "source")
 
     def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False) -> None:
         """Begin at the top of a document of `source`; `notes` collects what is odd.
@@ -71,6 +71,13 @@ class Reading:
         self.raw = raw
         self.here: Path = ()
         self.notes: list[Note] = []
+        self.faults: list[Misfit] | None = None
+
+    def refuse(self, misfit: Misfit) -> None:
+        """Raise what is wrong with one entry; or keep it in `faults`, for a reader that goes on with the next."""
+        if self.faults is None:
+            raise misfit
+        self.faults.append(misfit)
 
     def note(self, message: str, *path: str | int, rule: str = "odd") -> None:
         """Keep something worth telling about a place below `here`."""

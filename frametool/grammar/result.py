@@ -11,9 +11,8 @@ from frametool.grammar.pose import Pose
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.track import Track
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import Frames
+    from frametool.frames.track import MovingTrack
     from frametool.geometry.representations import Notation
 
 
@@ -92,32 +91,29 @@ class Result:
         return entry | self.extras
 
 
-def tree_entries(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[dict[str, Any]]:
+def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
     """Yield a tree as the entries of its list form: roots, then edges; moving ones with their samples."""
-    from frametool.frames.tree import FrameTree
-
     yield from ({"name": root} for root in tree.roots)
-    for parent, child, transform in tree.edges():
-        track = None if isinstance(tree, FrameTree) else tree.track(child)
-        if track is None or track.standing:
-            yield Result(Pose.of(transform.components, child, parent)).mapping(style)
+    for track in tree.tracks():
+        if track.standing:
+            yield Result(Pose.of(track.components, track.child, track.parent)).mapping(style)
         else:
-            yield {"name": child, "parent": parent, "samples": list(_samples(track, parent, style))}
+            yield {"name": track.child, "parent": track.parent, "samples": list(_samples(track, style))}
 
 
-def _samples(track: Track, parent: str, style: Style) -> Iterator[dict[str, Any]]:
+def _samples(track: MovingTrack, style: Style) -> Iterator[dict[str, Any]]:
     """Yield the samples of a moving frame; one under another parent than the newest names it."""
-    for stamp_ns, above, components in zip(track.stamps, track.parents, track.samples, strict=True):
-        pose = Pose.of(components, None, None if above == parent else above)
+    for stamp_ns, parent, components in track.walk():
+        pose = Pose.of(components, None, None if parent == track.parent else parent)
         yield {"stamp_ns": stamp_ns} | Result(pose).mapping(style)
 
 
-def sample_results(buffer: TransformBuffer) -> Iterator[Result]:
-    """Yield every sample as a result of its own, with its stamp."""
-    from frametool.frames.report import samples
-
-    for parent, child, components, stamp_ns in samples(buffer):
-        yield Result(Pose.of(components, child, parent), {} if stamp_ns is None else {"stamp_ns": stamp_ns})
+def sample_results(tree: Frames) -> Iterator[Result]:
+    """Yield every sample as a result of its own, frame by frame; those that move have their stamp."""
+    for track in tree.tracks():
+        for stamp_ns, parent, components in track.walk():
+            extras = {} if stamp_ns is None else {"stamp_ns": stamp_ns}
+            yield Result(Pose.of(components, track.child, parent), extras)
 
 
 def columns_of(form: Notation, style: Style) -> Sequence[str]:

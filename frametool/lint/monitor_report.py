@@ -4,13 +4,35 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.frames.edge_log import common_interval
+from frametool.errors import FormatError
+from frametool.frames.edge_log import EdgeLog, chain, common_interval
+from frametool.frames.no_data import frames_on
 from frametool.frames.stamps import BILLION
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.frames.edge_log import EdgeLog
+    from frametool.formats.recordings import Recording
+
+
+def monitor(files: Sequence[Recording], *ends: str) -> list[dict[str, Any]]:
+    """Describe every edge of some files; or, of `ends` (target, source), those between the two and their chain.
+
+    Raises FormatError for files without transforms, UnknownFrame, NotConnected.
+    """
+    logs: dict[str, EdgeLog] = {}
+    for file in files:
+        for edge in file.edges():
+            if edge.parent is not None:
+                log = logs.get(edge.child) or logs.setdefault(edge.child, EdgeLog(edge.child))
+                log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)
+    if not logs:
+        raise FormatError("no transforms in it", source=", ".join(file.name for file in files))
+    if not ends:
+        return list(map(edge_entry, logs.values()))
+    target, source = ends
+    between = [logs[child] for child in chain(logs, target, source)]
+    return [*map(edge_entry, between), chain_entry(target, source, between)]
 
 
 def edge_entry(log: EdgeLog) -> dict[str, Any]:
@@ -56,19 +78,10 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
         "delay_max_s": _extreme(max, [entry["delay_max_s"] for entry in entries]),
         "jumps": sum(entry["jumps"] for entry in entries),
         "backward": sum(entry["backward"] for entry in entries),
-        "parents": " <- ".join([target, *_frames_between(target, logs)]),
+        "parents": " <- ".join(frames_on(target, source, logs)),
         "parent_changes": sum(log.changes for log in logs),
         "overlap": None if interval is None else interval[0] <= interval[1],
     }
-
-
-def _frames_between(target: str, logs: Sequence[EdgeLog]) -> list[str]:
-    """Walk the edges from the target: each leads from the frame reached to its other end."""
-    frames, here = [], target
-    for log in logs:
-        here = log.parent if log.child == here else log.child
-        frames.append(here)
-    return frames
 
 
 def _extreme(choose: Any, values: Sequence[float | None]) -> float | None:

@@ -13,18 +13,22 @@ from frametool.lint.findings import Finding
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from frametool.documents.document import Document
     from frametool.documents.source import Source
     from frametool.formats.recordings import Recording
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Path
+    from frametool.grammar.edges import Edge
 
     Find = Callable[[Finding], None]
 
 WRITTEN_XYZW = frozenset(("quaternion", "xyzw", "rotation", "orientation", "transform"))
 
 
-class Seen(NamedTuple):
-    """An edge, or one sample of it, and where it stands; `looks_w_first` if it was written x, y, z, w with x = 1."""
+class Statement(NamedTuple):
+    """An edge, or one sample of it, and where it stands.
+
+    looks_w_first: it was written x, y, z, w with x = 1
+    """
 
     parent: str
     child: str
@@ -40,7 +44,7 @@ class Seen(NamedTuple):
         return Finding(rule, message, self.source, self.line, self.column)
 
 
-def read_all(recording: Recording, find: Find) -> Iterator[Seen]:
+def read_all(recording: Recording, find: Find) -> Iterator[Statement]:
     """Yield everything that can be read of a file, and report what cannot."""
     if recording.holds_samples:
         yield from _read_recording(recording, find)
@@ -48,111 +52,59 @@ def read_all(recording: Recording, find: Find) -> Iterator[Seen]:
         yield from _read_tree(recording.source, find)
 
 
-def _read_recording(recording: Recording, find: Find) -> Iterator[Seen]:
+def _read_recording(recording: Recording, find: Find) -> Iterator[Statement]:
     def report(error: FormatError) -> None:
         find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
 
-    for sample in recording.edges(report, tell=False):
-        w_first = looks_w_first(sample.components)
-        column = 1 if sample.line else 0
-        yield Seen(sample.parent or "", *sample[1:4], recording.name, sample.line, column, w_first)
+    for edge in recording.edges(report, tell=False):
+        w_first = looks_w_first(edge.components)
+        yield Statement(edge.parent or "", *edge[1:4], recording.name, edge.line, 1 if edge.line else 0, w_first)
     for told in recording.tally.told():
         find(Finding(told.rule, told.message, recording.name, told.line, 1))
 
 
 def looks_w_first(components: Rigid) -> bool:
-    """Tell the rotation that the identity becomes when w is written first and read last."""
+    """Return whether a rotation is what the identity becomes when w is written first and read last."""
     x, y, z, w = components[3:]
     return bool(abs(x) == 1.0 and y == z == w == 0.0)
 
 
-class _Entry(NamedTuple):
-    """A document with one entry of a larger one; paths that begin with `here` stand at `there` in that one."""
-
-    value: Any
-    here: Path
-    there: Path
-
-    def place(self, path: Path) -> Path:
-        """Return the path in the larger document."""
-        return (*self.there, *path[len(self.here) :])
-
-
-def _read_tree(source: Source, find: Find) -> Iterator[Seen]:
-    """Read a tree entry by entry; places are looked up once, for all of them."""
+def _read_tree(source: Source, find: Find) -> Iterator[Statement]:
+    """Read a tree; places are looked up once, for all that was found and read."""
     try:
         documents = parse_documents(source.text, source.name)
     except FormatError as error:
         find(Finding("syntax", error.message, source.name, error.line, error.column))
         return
     said: list[Note] = []
-    edges: list[tuple[Any, Path, bool]] = []
-    for document in documents:
-        for entry in _entries(document.value):
-            _read_entry(entry, document.index, source, said, edges)
-    places = locate_many(source.text, [path for _, _, path in said] + [path for _, path, _ in edges])
-    for (rule, message, _), (line, column) in zip(said, places, strict=False):
-        find(Finding(rule, message, source.name, line, column))
-    for (edge, _, w_first), (line, column) in zip(edges, places[len(said) :], strict=True):
-        yield Seen(edge.parent, edge.child, edge.components, edge.stamp_ns, source.name, line, column, w_first)
+    edges = [each for document in documents for each in _read_document(document, source, said)]
+    places = locate_many(source.text, [*(note.path for note in said), *(edge.path for edge, _ in edges)])
+    for note, (line, column) in zip(said, places, strict=False):
+        find(Finding(note.rule, note.message, source.name, line, column))
+    for (edge, w_first), place in zip(edges, places[len(said) :], strict=True):
+        yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
 
 
-def _read_entry(
-    entry: _Entry, document: int, source: Source,
-    said: list[Note], edges: list[tuple[Any, Path, bool]],
-) -> None:  # fmt: skip
-    """Read one entry; what it gives and what is to be said of it is kept with its path."""
+def _read_document(document: Document, source: Source, said: list[Note]) -> list[tuple[Edge, bool]]:
+    """Return the edges of a document, each with whether it looks written w first; keep what is to be said."""
     reading = Reading(source)
+    reading.faults = []
+    edges = []
     try:
-        for found in read_edges(entry.value, reading):
+        for found in read_edges(document.value, reading):
             edge = without_slashes(found, reading)
             if edge.parent is not None:
-                path = (document, *entry.place(edge.path))
-                edges.append((edge, path, _written_w_first(entry, edge)))
+                w_first = looks_w_first(edge.components) and _written_xyzw(document.value, edge)
+                edges.append((edge._replace(path=(document.index, *edge.path)), w_first))
     except Misfit as misfit:
-        said.append(Note(misfit.rule or "syntax", str(misfit), (document, *entry.place(misfit.path))))
-    said += [note._replace(path=(document, *entry.place(note.path))) for note in reading.notes]
+        reading.faults.append(misfit)
+    faults = (Note(misfit.rule or "syntax", str(misfit), misfit.path) for misfit in reading.faults)
+    said += [note._replace(path=(document.index, *note.path)) for note in (*faults, *reading.notes)]
+    return edges
 
 
-def _written_w_first(entry: _Entry, edge: Any) -> bool:
-    """Tell what looks like a quaternion with w first from half a turn that was written as angles."""
-    value = entry.value
+def _written_xyzw(value: Any, edge: Edge) -> bool:
+    """Return whether an edge's rotation was written as a quaternion, not as angles."""
     for step in edge.path:
         value = value[step]
-    return looks_w_first(edge.components) and type(value) is dict and not WRITTEN_XYZW.isdisjoint(value)
-
-
-def _entries(value: Any) -> Iterator[_Entry]:
-    """Take a document apart into documents with one entry each."""
-    if type(value) is list:
-        yield from (_Entry([item], (0,), (index,)) for index, item in enumerate(value))
-        return
-    if type(value) is dict:
-        for key in ("frames", "transforms", "static_transforms"):
-            if type(value.get(key)) is list and value[key]:
-                yield from (
-                    _Entry({**value, key: [item]}, (key, 0), (key, index)) for index, item in enumerate(value[key])
-                )
-                return
-        if type(value.get("frames")) is dict:
-            yield from _nested(value)
-            return
-    yield _Entry(value, (), ())
-
-
-def _nested(value: dict[str, Any]) -> Iterator[_Entry]:
-    """Walk a nested tree: each frame with its parent, without its children."""
-    about = {key: each for key, each in value.items() if key != "frames"}
-    roots = value["frames"].items()
-    pending: list[tuple[str, Any, Path]] = [(root, children, ("frames", root)) for root, children in roots]
-    for parent, children, path in pending:
-        if type(children) is not dict:
-            if children is not None:
-                yield _Entry({**about, "frames": {parent: children}}, ("frames", parent), path)
-            continue
-        for child, entry in children.items():
-            there = (*path, child)
-            alone = {key: each for key, each in entry.items() if key != "children"} if type(entry) is dict else entry
-            yield _Entry({**about, "frames": {parent: {child: alone}}}, ("frames", parent, child), there)
-            if type(entry) is dict and "children" in entry:
-                pending.append((child, entry["children"], (*there, "children")))
+    return type(value) is dict and not WRITTEN_XYZW.isdisjoint(value)

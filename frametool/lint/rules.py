@@ -1,4 +1,4 @@
-"""The rules of `check` about edges together: shape of the tree, and what a recording does over time."""
+"""What `check` finds in files, and its rules about edges together: the shape of the tree, what happens over time."""
 
 from __future__ import annotations
 
@@ -7,36 +7,57 @@ from typing import TYPE_CHECKING
 from frametool.frames.edge_log import EdgeLog
 from frametool.frames.path import cycle_message
 from frametool.frames.stamps import BILLION, format_stamp
+from frametool.lint.findings import Finding
+from frametool.lint.reading import read_all
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.frames.edge_log import Step
-    from frametool.lint.findings import Finding
-    from frametool.lint.reading import Seen
+    from frametool.formats.recordings import Recording
+    from frametool.frames.edge_log import SampleStep
+    from frametool.lint.reading import Statement
 
 FLICKER = 3  # so many changes of parent are no picking up and putting down
+
+
+def check(files: Sequence[Recording]) -> list[Finding]:
+    """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines."""
+    findings: list[Finding] = []
+    findings += lint(_statements(files, findings))
+    order = {file.name: index for index, file in enumerate(files)}
+    return sorted(findings, key=lambda each: (order.get(each.source, 0), each.line, each.column))
+
+
+def _statements(files: Sequence[Recording], findings: list[Finding]) -> Iterator[Statement]:
+    """Read all files; what cannot be read is found at once."""
+    for file in files:
+        before = len(findings)
+        statement = None
+        for statement in read_all(file, findings.append):
+            yield statement
+        if statement is None and len(findings) == before:
+            findings.append(Finding("empty", "no transforms in it", file.name, 1, 1))
 
 
 class Child:
     """Everything that was seen of one child frame."""
 
-    def __init__(self, first: Seen, number: int) -> None:
-        """Begin with the first edge or sample; `number` counts all that were read."""
+    def __init__(self, first: Statement, number: int) -> None:
+        """Start from the first edge or sample; `number` counts all that were read."""
         self.first = first
         self.newest = first
         self.since = (number, first)  # where the newest parent took over
         self.log = EdgeLog(first.child)
-        self.stands: Seen | None = None
-        self.changes: list[Seen] = []
+        self.stands: Statement | None = None
+        self.changes: list[Statement] = []
         self.stamps: dict[int, tuple[int, int]] = {}  # stamp -> hash of the sample, its line
-        self.other_parent: Seen | None = None
-        self.other_pose: Seen | None = None
-        self.again: list[Seen] = []
-        self.clashes: list[Seen] = []
-        self.backward: list[Seen] = []
+        self.other_parent: Statement | None = None
+        self.other_pose: Statement | None = None
+        self.again: list[Statement] = []
+        self.clashes: list[Statement] = []
+        self.backward: list[Statement] = []
 
-    def add(self, seen: Seen, number: int) -> None:
+    def add(self, seen: Statement, number: int) -> None:
         """Take in one more."""
         if seen.stamp_ns is None:
             self._stand(seen)
@@ -51,10 +72,10 @@ class Child:
         self.newest = seen
         self.log.add(seen.parent, seen.components, seen.stamp_ns, seen.line)
 
-    def _stand(self, seen: Seen) -> None:
+    def _stand(self, seen: Statement) -> None:
         self.stands = self.stands or seen
 
-    def _move(self, seen: Seen, stamp_ns: int) -> None:
+    def _move(self, seen: Statement, stamp_ns: int) -> None:
         data = hash((seen.parent, seen.components))
         fresh = (data, seen.line)
         known = self.stamps.setdefault(stamp_ns, fresh)
@@ -65,11 +86,11 @@ class Child:
 
     @property
     def moves(self) -> bool:
-        """Tell a frame with two different stamps."""
+        """Return whether there are two different stamps."""
         return len(self.stamps) > 1
 
 
-def lint(everything: Iterable[Seen]) -> Iterator[Finding]:
+def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
     """Apply the rules to all edges of all files together."""
     children: dict[str, Child] = {}
     for number, seen in enumerate(everything):
@@ -133,7 +154,7 @@ def _moving(child: Child, name: str) -> Iterator[Finding]:
 
 
 def _reparented(child: Child, name: str) -> Finding:
-    """Tell a frame that was picked up from one whose publishers disagree."""
+    """Report a changing parent: of a frame that was picked up, or of publishers that disagree."""
     parents = " -> ".join(repr(each.parent) for each in (child.first, *child.changes[:3]))
     if len(child.changes) < FLICKER:
         return child.changes[0].finding("reparented", f"frame {name!r} changes its parent: {parents}")
@@ -159,7 +180,7 @@ def _steps(child: Child, name: str) -> Iterator[Finding]:
         yield _at_step(child, step).finding("jump", message + _more(jumps))
 
 
-def _at_step(child: Child, step: Step) -> Seen:
+def _at_step(child: Child, step: SampleStep) -> Statement:
     return child.first._replace(line=step.line, column=1 if step.line else 0)
 
 
@@ -181,7 +202,7 @@ def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
 
 
 def _roots(children: dict[str, Child]) -> Iterator[Finding]:
-    """Tell of more than one root, at the first edge of the second."""
+    """Report more than one root, at the first edge of the second."""
     roots = {
         child.newest.parent: child.first
         for child in reversed(children.values())
@@ -194,7 +215,7 @@ def _roots(children: dict[str, Child]) -> Iterator[Finding]:
         yield seen.finding("several-roots", f"{len(roots)} roots: {shown}{' ..' if len(names) > 10 else ''}")
 
 
-def _at(seen: Seen) -> str:
+def _at(seen: Statement) -> str:
     return f"{seen.source}:{seen.line}" if seen.line else seen.source
 
 

@@ -12,23 +12,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.frames.report import seen
+from frametool.frames.report import cache_entries
 
 if TYPE_CHECKING:
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.report import Seen
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import Frames
+    from frametool.frames.report import CacheEntry
     from frametool.grammar.result import Style
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:  # noqa: ARG001 - tf2 has no say in it
+def write_tree(tree: Frames, style: Style) -> str:  # noqa: ARG001 - tf2 has no say in it
     """Return the listing; `{}`, or `[]` under ROS 2's rules, for no frames."""
-    policy = getattr(tree, "policy", None)
-    decimals = 3 if policy is None else policy.listing_decimals
-    return "".join(_entry(each, decimals) for each in seen(tree)) or ("{}\n" if decimals == 3 else "[]\n")
+    decimals = tree.policy.listing_decimals
+    return "".join(_entry(each, decimals) for each in cache_entries(tree)) or ("{}\n" if decimals == 3 else "[]\n")
 
 
-def _entry(each: Seen, decimals: int) -> str:
+def _entry(each: CacheEntry, decimals: int) -> str:
     return (
         f"{each.child}: \n"
         f"  parent: '{each.parent}'\n"

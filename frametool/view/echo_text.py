@@ -10,7 +10,7 @@ from frametool.geometry.representations import notation
 from frametool.grammar.result import rotation_numbers
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.grammar.result import Result, Style
 
@@ -18,12 +18,15 @@ DECIMALS = 3
 ROTATIONS = (("quaternion", "Quaternion"), ("rpy_rad", "RPY (radian)"), ("rpy_deg", "RPY (degree)"))
 
 
-def write_heading(target: str, source: str) -> str:
-    """Say in words which frame is seen from which."""
-    return f"{source} seen from {target} (maps points in {source} to points in {target})\n"
+def write_blocks(results: Iterable[Result], target: str, source: str, style: Style) -> Iterator[str]:
+    """Yield the blocks as they come; the first begins by saying in words which frame is seen from which."""
+    heading = f"{source} seen from {target} (maps points in {source} to points in {target})\n"
+    for result in results:
+        yield heading + _block(result, style)
+        heading = ""
 
 
-def write_block(result: Result, style: Style) -> str:
+def _block(result: Result, style: Style) -> str:
     """Return one block; a path that stands still has no time."""
     decimals = DECIMALS if style.precision is None else style.precision
     stamp_ns = result.extras.get("stamp_ns")

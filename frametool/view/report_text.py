@@ -51,7 +51,7 @@ def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noq
 
 
 def _chain(entry: dict[str, Any]) -> str:
-    """Say where the whole chain has data."""
+    """Return the sentence about the interval in which the whole chain has data."""
     first, last = entry["first_ns"], entry["last_ns"]
     if first is None:
         said = "stands still: any time will do"

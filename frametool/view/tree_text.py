@@ -6,21 +6,21 @@ import sys
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable
-from frametool.frames.tree import FrameTree
+from frametool.geometry.transform import Transform
 from frametool.grammar.edge_label import edge_label
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.geometry.transform import Transform
+    from frametool.frames.lookups import Frames
+    from frametool.frames.track import Track
     from frametool.grammar.result import Style
 
 
 DEEPEST = 1000  # levels; the lines of a drawing grow with its depth
 
 
-class Line(NamedTuple):
+class DrawnFrame(NamedTuple):
     """One frame of the drawing: the lines before its name, and its pose in its parent."""
 
     branch: str
@@ -28,14 +28,14 @@ class Line(NamedTuple):
     label: tuple[str, ...]
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Draw a tree with plain lines: each frame below its parent, its pose beside it."""
     return "".join(
         f"{line.branch}{line.frame}{pad}{'  '.join(line.label)}".rstrip() + "\n" for line, pad in _padded(tree, style)
     )
 
 
-def print_tree(tree: FrameTree | TransformBuffer, style: Style, color: str = "auto") -> None:
+def print_tree(tree: Frames, style: Style, color: str = "auto") -> None:
     """Draw a tree on the terminal, in colour where it has any, or as `color` says: always or never."""
     from rich.console import Console
     from rich.text import Text
@@ -49,18 +49,17 @@ def print_tree(tree: FrameTree | TransformBuffer, style: Style, color: str = "au
         console.print(Text.assemble((line.branch, "dim"), (line.frame, name), pad, ("  ".join(line.label), "cyan")))
 
 
-def _label(tree: FrameTree | TransformBuffer, child: str, transform: Transform, style: Style) -> tuple[str, ...]:
+def _label(track: Track, style: Style) -> tuple[str, ...]:
     """Return the pose of an edge, and how it moves: its newest pose then."""
-    label = edge_label(transform, style)
-    if isinstance(tree, FrameTree):
+    label = edge_label(Transform.of(*track.components), style)
+    if track.standing:
         return label
     from frametool.frames.report import motion
 
-    track = tree.track(child)
-    return label if track is None or track.standing else (*label, motion(track))
+    return *label, motion(track)
 
 
-def _padded(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[tuple[Line, str]]:
+def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
     """Yield the lines with the blanks that bring their poses below one another."""
     lines = list(_lines(tree, style))
     width = max((len(line.branch) + cells(line.frame) for line in lines), default=0)
@@ -79,17 +78,17 @@ def cells(text: str) -> int:
     return sum(0 if combining(each) else 2 if east_asian_width(each) in "WF" else 1 for each in text)
 
 
-def _lines(tree: FrameTree | TransformBuffer, style: Style) -> Iterator[Line]:
+def _lines(tree: Frames, style: Style) -> Iterator[DrawnFrame]:
     """Walk the tree from its roots, children in the order they were added; a stack, so that no tree is too deep."""
     children: dict[str, list[tuple[str, tuple[str, ...]]]] = {}
-    for parent, child, transform in tree.edges():
-        children.setdefault(parent, []).append((child, _label(tree, child, transform, style)))
+    for track in tree.tracks():
+        children.setdefault(track.parent, []).append((track.child, _label(track, style)))
     pending: list[tuple[str, tuple[str, ...], str, str]] = [(root, (), "", "") for root in reversed(tree.roots)]
     while pending:
         frame, label, branch, below = pending.pop()
         if len(branch) > 4 * DEEPEST:
             raise ValueInvalid(f"the tree is more than {DEEPEST} frames deep, too deep to draw; use --format json")
-        yield Line(branch, printable(frame), label)
+        yield DrawnFrame(branch, printable(frame), label)
         inner = children.get(frame, ())
         for at in range(len(inner) - 1, -1, -1):
             last = at == len(inner) - 1

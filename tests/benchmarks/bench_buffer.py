@@ -78,7 +78,7 @@ def standing_tree() -> FrameTree:
     """Make the standing chain as a tree."""
     tree = FrameTree()
     for track in chain(moving=False).tracks():
-        tree.add_components(track.parent, track.child, track.samples[0])
+        tree.add_components(track.parent, track.child, track.components)
     return tree
 
 

@@ -100,7 +100,7 @@ def load(path: str) -> int:
     buffer = frametool.load(path)
     if not isinstance(buffer, frametool.TransformBuffer):
         raise TypeError("nothing moves in the dump")
-    return sum(len(track.stamps) for track in buffer.tracks())
+    return sum(track.count for track in buffer.tracks())
 
 
 def samples(path: str) -> int:

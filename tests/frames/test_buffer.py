@@ -16,14 +16,14 @@ from frametool.errors import (
     UnknownFrame,
     ValueInvalid,
 )
-from frametool.frames.tf2 import Refused
+from frametool.frames.policy import Refused
 
 EPOCH = 1_700_000_000_123_456_789  # a float of this size has steps of 256
 SECOND = 10**9
 
 
 def shifted(x: float) -> Transform:
-    """Give a shift along x."""
+    """Return a shift along x."""
     return Transform.of(float(x), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -37,7 +37,7 @@ def moving(*, policy: str = "frametool", keep_ns: int | None = None) -> Transfor
 
 
 def x_of(transform: Transform) -> float:
-    """Give the x of a translation."""
+    """Return the x of a translation."""
     return float(transform.components[0])
 
 

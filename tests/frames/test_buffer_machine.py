@@ -33,7 +33,7 @@ def pose_of(seed: int) -> tuple[NDArray[np.float64], Rotation]:
 
 
 def as_matrix(xyz: NDArray[np.float64], rotation: Rotation) -> NDArray[np.float64]:
-    """Give the homogeneous matrix."""
+    """Return the homogeneous matrix."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation.as_matrix(), xyz
     return matrix
@@ -47,12 +47,12 @@ class Oracle:
         self.said: list[tuple[int, int, int | None, int]] = []  # parent, child, stamp, pose
 
     def samples(self, child: int) -> list[tuple[int, int, int]]:
-        """Give (stamp, parent, pose) of a child, oldest first; the last word on a stamp counts."""
+        """Return (stamp, parent, pose) of a child, oldest first; the last word on a stamp counts."""
         last = {stamp: (parent, pose) for parent, each, stamp, pose in self.said if each == child and stamp is not None}
         return [(stamp, *last[stamp]) for stamp in sorted(last)]
 
     def edge(self, child: int, at: int) -> tuple[int, NDArray[np.float64]] | None:
-        """Give parent and pose of a child at a time; None without data."""
+        """Return parent and pose of a child at a time; None without data."""
         for parent, each, stamp, pose in self.said:
             if each == child and stamp is None:
                 return parent, as_matrix(*pose_of(pose))
@@ -66,14 +66,14 @@ class Oracle:
         return None
 
     def to_top(self, frame: int, at: int) -> list[tuple[int, NDArray[np.float64]]]:
-        """Give a frame and those above it as far as there are data, each with the frame's pose in it."""
+        """Return a frame and those above it as far as there are data, each with the frame's pose in it."""
         way = [(frame, np.eye(4))]
         while (edge := self.edge(way[-1][0], at)) is not None:
             way.append((edge[0], edge[1] @ way[-1][1]))
         return way
 
     def lookup(self, target: int, source: int, at: int) -> NDArray[np.float64] | None:
-        """Give the pose of source in target where the two ways up meet; None where they do not."""
+        """Return the pose of source in target where the two ways up meet; None where they do not."""
         if not {target, source} <= self.frames():
             return None
         downward = dict(self.to_top(target, at))
@@ -83,7 +83,7 @@ class Oracle:
         return None
 
     def latest(self, target: int, source: int) -> int | None:
-        """Give the least of the newest stamps between the two, along the newest parents."""
+        """Return the least of the newest stamps between the two, along the newest parents."""
         parents = {child: parent for parent, child, stamp, _ in self.said if stamp is None}
         parents |= {child: self.samples(child)[-1][1] for _, child, stamp, _ in self.said if stamp is not None}
         lines = []
@@ -97,7 +97,7 @@ class Oracle:
         return min(newest, default=None)
 
     def frames(self) -> set[int]:
-        """Give every frame mentioned."""
+        """Return every frame mentioned."""
         return {frame for parent, child, _, _ in self.said for frame in (parent, child)}
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from frametool import Transform, TransformBuffer
 from frametool.errors import LookupFailed, NoDataAt, NotConnected, UnknownFrame
-from frametool.frames.tf2 import Refused
+from frametool.frames.policy import Refused
 from frametool.grammar.result import Style
 from frametool.ros.tf2_listing import write_tree
 
@@ -116,7 +116,7 @@ def test_interpolations_are_tf2s(case: dict[str, Any]) -> None:
 
 
 def refusal(buffer: TransformBuffer, call: dict[str, Any]) -> list[str]:
-    """Insert what a golden call says; give the lines that tf2 logs if it is refused."""
+    """Insert what a golden call says; return the lines that tf2 logs if it is refused."""
     pose = transform(call["t"], call["q"])
     try:
         buffer.insert(call["parent"], call["child"], pose, call["stamp_ns"], static=call["static"], authority="auth")

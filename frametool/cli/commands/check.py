@@ -10,15 +10,13 @@ from frametool.cli.command import FILE, Command
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import opened, verbose_option
-from frametool.lint.findings import RULES, WRITERS, Finding
-from frametool.lint.reading import read_all
-from frametool.lint.rules import lint
+from frametool.lint.findings import RULES, WRITERS
+from frametool.lint.rules import check
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
-    from frametool.formats.recordings import Recording
-    from frametool.lint.reading import Seen
+    from frametool.lint.findings import Finding
 
 FAILED = 1
 
@@ -51,25 +49,10 @@ def command(files: Sequence[str], form: str, strict: bool) -> int:
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
     --strict also if there is a warning; notes never fail. - is standard input.
     """
-    findings: list[Finding] = []
-    recordings = opened(files)
-    findings += lint(_everything(recordings, findings))
-    order = {recording.name: index for index, recording in enumerate(recordings)}
-    findings.sort(key=lambda each: (order.get(each.source, 0), each.line, each.column))
+    findings = check(opened(files))
     with writing(None) as write:
         write(WRITERS[form](findings))
     return FAILED if _fails(findings, strict=strict) else 0
-
-
-def _everything(recordings: Sequence[Recording], findings: list[Finding]) -> Iterator[Seen]:
-    """Read all files; what cannot be read is found at once."""
-    for recording in recordings:
-        before = len(findings)
-        seen = None
-        for seen in read_all(recording, findings.append):
-            yield seen
-        if seen is None and len(findings) == before:
-            findings.append(Finding("empty", "no transforms in it", recording.name, 1, 1))
 
 
 def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:

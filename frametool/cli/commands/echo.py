@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,19 +13,15 @@ from frametool.cli.stderr import say
 from frametool.cli.times import Time, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
 from frametool.errors import NoDataAt
-from frametool.frames.stamps import BILLION
-from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result
+from frametool.grammar.looked_up import result_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.tree import FrameTree
+    from frametool.geometry.transform import Transform
+    from frametool.grammar.result import Result
 
 SKIPPED = 3
-
-
 STAMP = Time(latest=False)
 
 
@@ -47,7 +44,7 @@ def command(
     limit: int | None, moving: bool, cache: int | None, tf2: str | None,
     format_name: str | None, output: str | None, **options: Any,
 ) -> int:  # fmt: skip
-    """Tell where SOURCE is seen from TARGET, time after time, as tf2_echo does on a running robot.
+    """Print the pose of SOURCE in TARGET, time after time, as tf2_echo does on a running robot.
 
     \b
       frametool echo drive.yaml map base_link
@@ -65,76 +62,50 @@ def command(
     out = Output("poses", format_name=form, output=output, **options)
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
     target, source = frame_name(target, frames), frame_name(source, frames)
-    times = _times(frames, target, source, rate, start, stop)
-    failures: list[NoDataAt] = []
-    results = _limited(_results(frames, target, source, times, failures), limit)
+    replayed = frames.replay(target, source, rate_hz=rate, start_ns=start, stop_ns=stop)
+    failures = Failures()
+    results = islice(_results(replayed, target, source, failures), limit)
     if out.style.form == "text":
-        from frametool.view.echo_text import write_block, write_heading
+        from frametool.view.echo_text import write_blocks
 
-        out.pieces(piece for piece in _blocks(write_heading(target, source), results, write_block, out))
+        out.pieces(write_blocks(results, target, source, out.style))
     else:
         out.poses(list(results))
-    return _told(failures)
+    return failures.told()
 
 
-def _blocks(heading: str, results: Iterator[Result], write_block: Any, out: Output) -> Iterator[str]:
-    """Yield the heading with the first block, then the others as they are looked up."""
-    for result in results:
-        yield heading + write_block(result, out.style)
-        heading = ""
+class Failures:
+    """Times without data: the first error stands for all."""
 
+    def __init__(self) -> None:
+        """Create an empty count."""
+        self.first: NoDataAt | None = None
+        self.count = 0
 
-def _times(
-    frames: FrameTree | TransformBuffer, target: str, source: str, rate: float, start: int | None, stop: int | None
-) -> Iterator[int | None]:
-    """Yield the times to look at: from the first at which every edge has data; None if nothing moves."""
-    span = getattr(frames, "span", lambda *_: None)(target, source)
-    if span is None:
-        yield start
-        return
-    begin = span[0] if start is None else start
-    end = span[1] if stop is None else stop
-    if begin > end:
-        frames.lookup(target, source, begin if stop is None else stop)  # says what has no data there
-        raise click.UsageError("--stop is before the first time at which all edges have data; give --start")
-    count = 0
-    while (at_ns := begin + round(count * BILLION / rate)) <= end:
-        yield at_ns
-        count += 1
+    def add(self, error: NoDataAt) -> None:
+        """Count one."""
+        self.first = self.first or error
+        self.count += 1
+
+    def told(self) -> int:
+        """Report them on stderr; returns the exit status."""
+        if self.first is not None:
+            say(str(self.first))
+        if self.count > 1:
+            say(f"{self.count} times without data")
+        return SKIPPED if self.count else 0
 
 
 def _results(
-    frames: FrameTree | TransformBuffer, target: str, source: str, times: Iterator[int | None], failures: list[NoDataAt]
+    replayed: Iterator[tuple[int | None, Transform | NoDataAt]], target: str, source: str, failures: Failures
 ) -> Iterator[Result]:
-    """Look up at each time; where there is no data, keep the error and go on.
-
-    Raises NoDataAt where no time has any.
-    """
+    """Yield the answers and count the errors; raise the first error where no time has data."""
     missing = True
-    for at_ns in times:
-        try:
-            found = frames.lookup(target, source, at_ns)
-        except NoDataAt as error:
-            failures.append(error)
-            continue
-        missing = False
-        extras = {} if at_ns is None else {"stamp_ns": at_ns}
-        yield Result(Pose.of(found.components, source, target), extras)
-    if missing and failures:
-        raise failures[0]
-
-
-def _limited(results: Iterator[Result], limit: int | None) -> Iterator[Result]:
-    from itertools import islice
-
-    return islice(results, limit)
-
-
-def _told(failures: list[NoDataAt]) -> int:
-    """Tell of the times without data; the status says that some are missing."""
-    if not failures:
-        return 0
-    say(str(failures[0]))  # the first one stands for all
-    if len(failures) > 1:
-        say(f"{len(failures)} times without data")
-    return SKIPPED
+    for at_ns, found in replayed:
+        if isinstance(found, NoDataAt):
+            failures.add(found)
+        else:
+            missing = False
+            yield result_at(found.components, target, source, at_ns)
+    if missing and failures.first is not None:
+        raise failures.first

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,15 +13,15 @@ from frametool.cli.stderr import tell
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, read_times, rules, rules_options, times_option
 from frametool.cli.trees import FRAME, frame_name, load_tree
-from frametool.errors import LookupFailed
-from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result
+from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, reasons
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import Frames
+
+MOST_TOLD = 10  # times without data
+SKIPPED = 3
 
 
 @click.command(cls=Command, name="lookup")
@@ -72,16 +71,12 @@ def command(
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
     if times is not None:
-        asked = read_times(times)
-        results = _many(frames, target, source, asked, skip=stream.options["on_error"] == "skip")
-        skipped = [at for at, result in zip(asked, results, strict=True) if result is None]
-        _tell_skipped(frames, (target, source), skipped, len(asked), in_json=output.told == "json")
-        output.poses(found := [result for result in results if result is not None])
-        return 3 if len(found) < len(results) else 0
+        skip = stream.options["on_error"] == "skip"
+        return _many(output, frames, target, source, read_times(times), skip=skip)
     if fixed is not None:
-        output.poses([_across(frames, target, at_ns(at), source, at_ns(source_at), fixed)])
+        output.poses([looked_up_across(frames, target, at_ns(at), source, at_ns(source_at), fixed)])
     else:
-        output.poses([_one(frames, target, source, at_ns(at))])
+        output.poses([looked_up(frames, target, source, at_ns(at))])
     return 0
 
 
@@ -93,49 +88,21 @@ def _check(at: int | str | None, source_at: int | str | None, fixed: str | None,
         raise click.UsageError("--times says all the times; leave --at, --source-at and --fixed out")
 
 
-def _one(frames: FrameTree | TransformBuffer, target: str, source: str, at: int | None) -> Result:
-    """Look up at one time, or the latest."""
-    stamp = frames.latest(target, source) if at is None else at
-    pose = Pose.of(frames.lookup(target, source, stamp).components, source, target)
-    return Result(pose, {} if stamp is None else {"stamp_ns": stamp})
-
-
-def _across(
-    frames: FrameTree | TransformBuffer, target: str, at: int | None, source: str, source_at: int | None, fixed: str
-) -> Result:
-    """Look up across two times."""
-    found = frames.lookup_across(target, at, source, source_at, fixed)
-    at = frames.latest(target, fixed) if at is None else at
-    source_at = frames.latest(fixed, source) if source_at is None else source_at
-    stamps = {key: stamp for key, stamp in (("stamp_ns", at), ("source_stamp_ns", source_at)) if stamp is not None}
-    return Result(Pose.of(found.components, source, target), {**stamps, "fixed": fixed})
-
-
-def _many(
-    frames: FrameTree | TransformBuffer, target: str, source: str, times: Sequence[int], *, skip: bool
-) -> list[Result | None]:
-    """Look up at many times; None for those without data that are skipped."""
-    found = frames.lookup_many(target, source, times, missing="nan" if skip else "raise")
-    rows = zip(*(column.tolist() for column in found.components), strict=True)
-    results = [Result(Pose.of(row, source, target), {"stamp_ns": at}) for at, row in zip(times, rows, strict=True)]
-    return [result if isfinite(result.pose.components[6]) else None for result in results]
-
-
-def _tell_skipped(
-    frames: FrameTree | TransformBuffer, ends: tuple[str, str], skipped: Sequence[int], asked: int, *,
-    in_json: bool, most: int = 10,
-) -> None:  # fmt: skip
-    """Say why times were skipped: the reasons of the first, then how many; each as an object if results are JSON."""
-    if not skipped:
-        return
+def _many(output: Output, frames: Frames, target: str, source: str, times: Sequence[int], *, skip: bool) -> int:
+    """Print the results at many times, and say which times are skipped."""
+    results = list(looked_up_many(frames, target, source, times, missing="nan" if skip else "raise"))
+    output.poses(results)
+    if len(results) == len(times):
+        return 0
     from frametool.cli.error_json import as_json
     from frametool.documents.json_writer import dump
 
-    for at in skipped[:most]:
-        try:
-            frames.lookup(*ends, at)
-        except LookupFailed as error:
-            tell(as_json(error) if in_json else f"frametool: {error} (skipped)")
-    total = f"{len(skipped)} of {asked} times skipped"
-    whole = {"error": "times_skipped", "message": total, "skipped": len(skipped), "asked": asked}
+    found = {result.extras["stamp_ns"] for result in results}
+    skipped = [at for at in times if at not in found]
+    in_json = output.told == "json"
+    for error in reasons(frames, target, source, skipped[:MOST_TOLD]):
+        tell(as_json(error) if in_json else f"frametool: {error} (skipped)")
+    total = f"{len(skipped)} of {len(times)} times skipped"
+    whole = {"error": "times_skipped", "message": total, "skipped": len(skipped), "asked": len(times)}
     tell(dump(whole) if in_json else f"frametool: {total}")
+    return SKIPPED

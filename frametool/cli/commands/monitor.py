@@ -9,14 +9,10 @@ import click
 from frametool.cli.command import FILE, TEXT, Command, result_options
 from frametool.cli.output import Output
 from frametool.cli.trees import opened, verbose_option
-from frametool.errors import FormatError
-from frametool.frames.edge_log import EdgeLog, chain
-from frametool.lint.monitor_report import chain_entry, edge_entry
+from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from frametool.formats.recordings import Recording
 
 
 @click.command(cls=Command, name="monitor")
@@ -26,7 +22,7 @@ if TYPE_CHECKING:
 @verbose_option
 @result_options("report")
 def command(recording: str, frames: Sequence[str], more: Sequence[str], **options: Any) -> None:
-    """Tell the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
+    """Print the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
 
     \b
       frametool monitor drive.yaml
@@ -42,22 +38,4 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], **option
     if len(frames) not in (0, 2):
         raise click.UsageError(f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
     output = Output("report", **options)
-    logs = _logs(opened((recording, *more)))
-    children = chain(logs, frames[0], frames[1]) if frames else list(logs)
-    entries = [edge_entry(logs[child]) for child in children]
-    if frames:
-        entries.append(chain_entry(frames[0], frames[1], [logs[child] for child in children]))
-    output.report(entries)
-
-
-def _logs(recordings: Sequence[Recording]) -> dict[str, EdgeLog]:
-    """Log every edge of the recordings, in the order of first mention."""
-    logs: dict[str, EdgeLog] = {}
-    for recording in recordings:
-        for edge in recording.edges():
-            if edge.parent is not None:
-                log = logs.get(edge.child) or logs.setdefault(edge.child, EdgeLog(edge.child))
-                log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)
-    if not logs:
-        raise FormatError("no transforms in it", source=", ".join(recording.name for recording in recordings))
-    return logs
+    output.report(monitor(opened((recording, *more)), *frames))

@@ -55,7 +55,7 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
     if not flags and len(arguments) == 1:
         output = Output("tree", format_name=form or "static2", deg=deg, **options)
         tree = load_tree(arguments[0])
-        if not isinstance(tree, FrameTree):
+        if tree.moves:
             raise ValueInvalid(moving_frames(track.child for track in tree.tracks() if not track.standing))
         output.tree(tree)
         return

@@ -10,7 +10,6 @@ from frametool.cli.command import FILE, Command, result_options, rotation_option
 from frametool.cli.output import Output
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import load_tree, verbose_option
-from frametool.frames.tree import FrameTree
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,8 +44,4 @@ def command(
     output = Output("tree", **options)
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
     stamp = at_ns(at)
-    if stamp is not None and not isinstance(frames, FrameTree):
-        from frametool.frames.report import tree_at
-
-        frames = tree_at(frames, stamp)
-    output.tree(frames, color)
+    output.tree(frames if stamp is None else frames.tree_at(stamp), color)

@@ -1,0 +1,290 @@
+"""What can be asked of frames: which there are, how they hang together, where one is seen from another, and when."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from frametool.errors import BadTopology, NoDataAt, NotConnected, warn
+from frametool.frames.path import edges_between, to_root
+from frametool.frames.query import Query
+from frametool.frames.stamps import whole_stamp
+from frametool.geometry import rigid
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import Any
+
+    from frametool.errors import LookupFailed
+    from frametool.frames.policy import BufferPolicy
+    from frametool.frames.track import Track
+    from frametool.frames.tree import FrameTree
+    from frametool.geometry.types import Rigid
+
+MOST_KEPT = 1 << 14  # queries
+
+
+class Frames:
+    """Answer where one frame is seen from another: what FrameTree and TransformBuffer have in common.
+
+    Times are integer nanoseconds; None is the latest.  Frames that stand still answer all times alike.
+    """
+
+    def __init__(self, name: str, policy: BufferPolicy) -> None:
+        """Create an empty set of frames; `name` says in error messages where they come from."""
+        self.name = name
+        self.policy = policy
+        self._tracks: dict[str, Track] = {}
+        self._frames: dict[str, None] = {}
+        self._queries: dict[tuple[str, str], Query] = {}
+        self._varies = False  # whether any frame has ever changed its parent
+        self._loops = False  # whether newest parents were found to form a circle
+
+    def add_root(self, frame: str) -> None:
+        """Make a frame known that has no parent (yet)."""
+        self._frames[frame] = None
+
+    # --- what there is ---
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Return every frame, in the order of first mention."""
+        return tuple(self._frames)
+
+    @property
+    def roots(self) -> tuple[str, ...]:
+        """Return the frames without a parent."""
+        return tuple(frame for frame in self._frames if frame not in self._tracks)
+
+    @property
+    def moves(self) -> bool:
+        """Return whether any frame moves."""
+        return any(not track.standing for track in self._tracks.values())
+
+    def parent(self, frame: str, at_ns: int | None = None) -> str | None:
+        """Return a frame's parent at a time, or the newest; None for a root or where it is not known."""
+        track = self._tracks.get(frame)
+        if track is None:
+            return None
+        return track.parent if at_ns is None else track.parent_at(at_ns)
+
+    def edges(self) -> Iterator[tuple[str, str, Transform]]:
+        """Walk the edges as (parent, child, parent_from_child), each as it was last, in the order of first mention."""
+        for track in self._tracks.values():
+            yield track.parent, track.child, Transform.of(*track.components)
+
+    def track(self, frame: str) -> Track | None:
+        """Return what is known about a frame over time; None for a root."""
+        return self._tracks.get(frame)
+
+    def tracks(self) -> Iterator[Track]:
+        """Walk what is known about each frame that has a parent, in the order of first mention."""
+        return iter(self._tracks.values())
+
+    def tree_at(self, at_ns: int) -> FrameTree:
+        """Return the tree as it stands at one time; edges without data then are left out, with a warning."""
+        from frametool.frames.no_data import left_out
+        from frametool.frames.tree import FrameTree
+
+        tree = FrameTree(self.name)
+        for frame in self._frames:
+            tree.add_root(frame)
+        for track in self._tracks.values():
+            pose, parent = track.at(at_ns), track.parent_at(at_ns)
+            if pose is not None and parent is not None:
+                tree.add_components(parent, track.child, pose)
+            elif not track.standing:
+                warn(left_out(track, at_ns))
+        return tree
+
+    # --- one lookup ---
+
+    def lookup(self, target: str, source: str, at_ns: int | None = None) -> Transform:
+        """Return target_from_source: the pose of source in target, which maps points in source to points in target.
+
+        at_ns: the time; None is `latest`.
+        Raises UnknownFrame (also for a frame against itself), NotConnected, TooEarly, TooLate.
+        """
+        kept = self._queries.get((target, source))
+        if kept is not None and kept.fixed is not None:  # the short way for frames that stand still
+            return Transform.of(*kept.fixed)
+        return Transform.of(*self.lookup_components(target, source, at_ns))
+
+    def lookup_components(self, target: str, source: str, at_ns: int | None = None) -> Rigid:
+        """Return tx, ty, tz, x, y, z, w of target_from_source; otherwise as `lookup`."""
+        query = self.query(target, source, at_ns)
+        if query.fixed is not None:
+            return query.fixed
+        if at_ns is None:  # the time comes first: at it the parents may be others than the newest
+            at_ns = query.latest(zero_counts=self.policy.zero_counts) or 0
+            query = self.query(target, source, at_ns)
+        found = query.at(at_ns if type(at_ns) is int else whole_stamp(at_ns))
+        if found is None:
+            raise self.policy.missing(self, target, source, at_ns, self.way(target, source, at_ns))
+        return found
+
+    def latest(self, target: str, source: str) -> int | None:
+        """Return the latest stamp that all moving edges have reached on the path by the newest parents, as tf2 does.
+
+        None if nothing moves there.  Of a frame against itself it is that frame's own newest stamp.
+        Raises UnknownFrame, NotConnected.
+        """
+        newest = self.query(target, source, None).latest(zero_counts=self.policy.zero_counts)
+        own = self._tracks.get(source) if target == source else None
+        return newest if own is None or own.standing else own.last_ns
+
+    def lookup_across(
+        self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str,
+    ) -> Transform:  # fmt: skip
+        """Return the pose that source had at one time, seen from where target was at another.
+
+        fixed: a frame that counts as standing in between, e.g. the map.  A time of None is that half's latest.
+        Raises as `lookup`.
+        """
+        for frame, role in ((target, "target_frame"), (source, "source_frame"), (fixed, "fixed_frame")):
+            self._require(frame, role)
+        fixed_from_source = self.lookup_components(fixed, source, source_at_ns)
+        target_from_fixed = self.lookup_components(target, fixed, target_at_ns)
+        return Transform.of(*rigid.compose(*target_from_fixed, *fixed_from_source))
+
+    # --- many lookups ---
+
+    def lookup_many(self, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
+        """Return target_from_source at many times: a batch of the times' shape.
+
+        at_ns: integer nanoseconds, an array or a sequence.  missing: "raise" at the first time without data, as
+        `lookup` does, or "nan" for rows of NaN there.
+        """
+        from frametool.frames.lookup_many import lookup_many
+
+        return lookup_many(self, target, source, at_ns, missing=missing)
+
+    def replay(
+        self, target: str, source: str, *, rate_hz: float, start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[tuple[int | None, Transform | NoDataAt]]:
+        """Yield (time, target_from_source) again and again while time goes by; the error where there is no data.
+
+        rate_hz: steps in a second.  start_ns, stop_ns: None for the `span`.  If nothing moves there is one step.
+        Raises ValueInvalid for a rate whose steps are not between a nanosecond and a century; otherwise as `lookup`.
+        """
+        from frametool.frames.replay import replay
+
+        return replay(self, target, source, rate_hz, start_ns, stop_ns)
+
+    # --- the way ---
+
+    def path(self, target: str, source: str, at_ns: int | None = None) -> list[str]:
+        """List the frames on the way from target to source, both included, as `lookup` takes it.
+
+        Raises as `lookup`.
+        """
+        if at_ns is None and self._varies:
+            at_ns = self.latest(target, source)
+        down, up = self.between(target, source, at_ns)
+        top = self.parent(up[-1] if up else down[0], at_ns) if up or down else source
+        return [*reversed(down), str(top), *reversed(up)]
+
+    def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
+        """List the edges between two frames, from the target to the source, at a time or by the newest parents."""
+        return self._along(*self.between(target, source, at_ns))
+
+    def _along(self, down: Sequence[str], up: Sequence[str]) -> list[Track]:
+        return [self._tracks[child] for child in (*reversed(down), *reversed(up))]
+
+    def span(self, target: str, source: str) -> tuple[int, int] | None:
+        """Return the first and last time at which a lookup has an answer; None if nothing moves on the way.
+
+        Where parents change there may be times without data in between.  Where there is no such time it is the first
+        that all edges have reached and the last at which all still have data, by the newest parents: first > last.
+        """
+        newest = self.query(target, source, None).span
+        changes = self.changes()
+        if not changes:
+            return newest
+        found = []
+        for begin, end in zip([changes[0] - 1, *changes], [*changes, None], strict=True):
+            way = self.way_at(target, source, begin)
+            span = None if way is None else self.query_of(*way).span
+            if span is not None:
+                first = span[0] if begin < changes[0] else max(span[0], begin)
+                last = span[1] if end is None else min(span[1], end - 1)
+                found += [(first, last)] if first <= last else []
+        return (found[0][0], found[-1][1]) if found else newest
+
+    def changes(self) -> list[int]:
+        """List the stamps, sorted, at which a frame whose parent changes gets another one, or begins, or has ended."""
+        stamps: set[int] = set()
+        for track in self._tracks.values() if self._varies else ():
+            if not track.standing and (track.varies or self._loops):
+                stamps.update(track.changes())
+                stamps.update((track.first_ns, track.last_ns + 1))
+        return sorted(stamps)
+
+    def query(self, target: str, source: str, at_ns: int | None) -> Query:
+        """Return the way between two frames at a time, or by the newest parents; keep it if no parent on it changes."""
+        if kept := self._queries.get((target, source)):
+            return kept
+        query = self.query_of(*self.between(target, source, at_ns))
+        if not self._varies or not (self._changes_above(target) or self._changes_above(source)):
+            if len(self._queries) >= MOST_KEPT:
+                self._queries.clear()
+            self._queries[target, source] = query
+        return query
+
+    def query_of(self, down: Sequence[str], up: Sequence[str]) -> Query:
+        """Prepare a way that `between` named."""
+        tracks = self._tracks
+        return Query([tracks[child] for child in down], [tracks[child] for child in reversed(up)])
+
+    def _changes_above(self, frame: str) -> bool:
+        """Return whether a frame or an ancestor of it ever changes its parent."""
+        if self._loops:
+            return True
+        return any(frame in self._tracks and self._tracks[frame].varies for frame in to_root(frame, self.parent))
+
+    def way_at(self, target: str, source: str, at_ns: int) -> tuple[list[str], list[str]] | None:
+        """Name the edges as `between` does; None where a changing parent leaves no way."""
+        try:
+            return self.between(target, source, at_ns)
+        except (NoDataAt, NotConnected):
+            return None
+
+    def between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
+        """Name the edges between two frames that both exist, as `edges_between` does."""
+        self.require(target, source)
+        try:
+            parent_of = partial(self.parent, at_ns=at_ns) if self._varies else self.parent
+            found = edges_between(target, source, parent_of)
+        except NotConnected as error:
+            raise self._unconnected(error, target, source, at_ns) from None
+        except BadTopology as error:
+            self._loops = self._varies = True
+            return self.policy.looped(self, error, target, source, at_ns)
+        self.policy.refuse_depth(self, target, source, at_ns)
+        return found
+
+    def require(self, target: str, source: str) -> None:
+        """Raise UnknownFrame unless both frames are there."""
+        self._require(target, "target_frame")
+        self._require(source, "source_frame")
+
+    def _require(self, frame: str, role: str) -> None:
+        if frame not in self._frames or self.policy.is_bad_name(frame):
+            raise self.policy.unknown(frame, role, self)
+
+    def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
+        """Make the error for two frames without a way: two trees, or a changing parent that is not known then."""
+
+        def parent_near(frame: str) -> str | None:
+            track = self._tracks.get(frame)
+            return None if track is None or at_ns is None else track.parent_near(at_ns)
+
+        if at_ns is not None and self._varies:
+            try:
+                way = self._along(*edges_between(target, source, parent_near))
+            except NotConnected:
+                pass
+            else:
+                return self.policy.missing(self, target, source, at_ns, way)
+        return self.policy.unconnected(self, error, target, source, at_ns)

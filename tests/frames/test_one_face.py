@@ -1,0 +1,311 @@
+"""Trees that stand still and trees that move answer the same questions; late samples and changing parents."""
+
+from __future__ import annotations
+
+import random
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from frametool import FrameTree, Transform, TransformBuffer
+from frametool.errors import BadTopology, LookupFailed, NoDataAt, TooLate, UnknownFrame, ValueInvalid
+from frametool.frames import track as track_module
+from frametool.frames.path import compose_path
+from frametool.frames.track import PAGE, MovingTrack
+
+if TYPE_CHECKING:
+    from frametool.frames.lookups import Frames
+
+EDGES = [("map", "base"), ("base", "lidar"), ("base", "arm"), ("arm", "hand"), ("island", "rock")]
+POSES = Transform.random(len(EDGES), seed=3)
+
+
+def standing(kind: type[FrameTree | TransformBuffer]) -> FrameTree | TransformBuffer:
+    frames = kind()
+    for (parent, child), pose in zip(EDGES, POSES, strict=True):
+        frames.add(parent, child, pose) if isinstance(frames, FrameTree) else frames.insert(parent, child, pose)
+    return frames
+
+
+def answers(frames: Frames, target: str, source: str) -> list[Any]:
+    questions = (
+        lambda: frames.path(target, source),
+        lambda: frames.lookup(target, source).components,
+        lambda: frames.lookup(target, source, 7).components,
+        lambda: frames.lookup_many(target, source, [1, 2]).as_matrix().tolist(),
+        lambda: frames.lookup_across(target, 1, source, None, "base").components,
+        lambda: frames.latest(target, source),
+        lambda: frames.span(target, source),
+        lambda: [(at, found.components) for at, found in frames.replay(target, source, rate_hz=1.0)],  # type: ignore[union-attr]
+        lambda: frames.tree_at(5).lookup(target, source).components,
+    )
+    found = []
+    for question in questions:
+        try:
+            found.append(question())
+        except (LookupFailed, ValueInvalid) as error:
+            found.append((type(error), str(error)))
+    return found
+
+
+@pytest.mark.parametrize("target", ["map", "hand", "rock", "nowhere"])
+@pytest.mark.parametrize("source", ["map", "lidar", "rock", "hnad"])
+def test_a_tree_and_a_buffer_that_stands_still_give_the_same_answers(target: str, source: str) -> None:
+    tree, buffer = standing(FrameTree), standing(TransformBuffer)
+    assert answers(tree, target, source) == answers(buffer, target, source)
+
+
+def test_a_tree_and_a_buffer_that_stands_still_hold_the_same() -> None:
+    tree, buffer = standing(FrameTree), standing(TransformBuffer)
+    assert set(tree.frames) == set(buffer.frames)
+    assert set(tree.roots) == set(buffer.roots) == {"map", "island"}
+    assert [edge[:2] for edge in tree.edges()] == [edge[:2] for edge in buffer.edges()] == EDGES
+    assert not tree.moves
+    assert not buffer.moves
+
+
+@pytest.mark.parametrize("count", [0, 1, 4])
+def test_a_path_is_composed_alike_from_floats_and_from_columns(count: int) -> None:
+    poses = Transform.random(2 * count, seed=5)
+    parts: list[Any] = [tuple(map(float, row)) for row in zip(*poses.components, strict=True)]
+    single = compose_path(parts[:count], parts[count:], lambda part: part)
+    as_columns: list[Any] = [tuple(np.array([value]) for value in part) for part in parts]
+    columns: Any = compose_path(as_columns[:count], as_columns[count:], lambda part: part)
+    assert single is not None
+    assert [float(np.ravel(column)[0]) for column in columns] == list(single)
+
+
+def test_an_edge_without_a_pose_leaves_a_path_without_one() -> None:
+    here = POSES[0].components
+    assert compose_path([here], [None], lambda part: part) is None
+    assert compose_path([None], [here], lambda part: part) is None
+
+
+# --- parents that change -------------------------------------------------------------------------------------------
+
+
+def shifted(x: float) -> Transform:
+    return Transform.of(float(x), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def reparented() -> TransformBuffer:
+    """Return f3, first below f0, then below f2, which has no data any more when f3 comes to it."""
+    buffer = TransformBuffer()
+    buffer.insert("f0", "f2", shifted(100), 400)
+    buffer.insert("f0", "f2", shifted(100), 950)
+    buffer.insert("f0", "f3", shifted(1), 825)
+    buffer.insert("f2", "f3", shifted(5), 1075)
+    return buffer
+
+
+def test_the_latest_lookup_takes_the_way_of_its_own_time() -> None:
+    buffer = reparented()
+    assert buffer.latest("f0", "f3") == 950
+    assert buffer.lookup("f0", "f3").components[0] == buffer.lookup("f0", "f3", 950).components[0] == 1.0
+    assert buffer.path("f0", "f3") == ["f0", "f3"]
+
+
+def test_the_span_of_changing_parents_is_where_there_are_answers() -> None:
+    assert reparented().span("f0", "f3") == (825, 1074)
+
+
+class Scan:
+    """tf2's BufferCore as its source has it, over lists that are searched from one end to the other."""
+
+    def __init__(self) -> None:
+        self.samples: dict[str, list[tuple[int, str, float]]] = {}
+
+    def insert(self, parent: str, child: str, x: float, stamp: int) -> None:
+        self.samples.setdefault(child, []).append((stamp, parent, x))
+        self.samples[child].sort()
+
+    def at(self, child: str, stamp: int) -> tuple[str, float] | None:
+        known = self.samples.get(child, [])
+        for (begin, parent, x), (end, after, other) in pairwise(known):
+            if begin <= stamp < end:
+                along = (other - x) * (stamp - begin) / (end - begin) if parent == after else 0.0
+                return parent, x + along
+        return known[-1][1:] if known and known[-1][0] == stamp else None
+
+    def latest(self, target: str, source: str) -> int | None:
+        """getLatestCommonTime: up from the source by the newest parents, then up from the target until the two meet."""
+        if target == source:
+            return self.samples[source][-1][0] if source in self.samples else None
+        line: list[tuple[int, str]] = []
+        frame = source
+        while frame in self.samples:
+            stamp, frame, _ = self.samples[frame][-1]
+            line.append((stamp, frame))
+            if frame == target:
+                return min(stamp for stamp, _ in line)
+        frame, newest = target, []
+        while frame in self.samples:
+            stamp, frame, _ = self.samples[frame][-1]
+            newest.append(stamp)
+            if frame == source:
+                return min(newest)
+            if frame in [parent for _, parent in line]:
+                below = [at for at, _ in line[: [parent for _, parent in line].index(frame) + 1]]
+                return min(newest + below)
+        return None
+
+    def lookup(self, target: str, source: str, stamp: int) -> float | None:
+        ups = []
+        for frame in (target, source):
+            up = {frame: 0.0}
+            here, x = frame, 0.0
+            while (found := self.at(here, stamp)) is not None:
+                here, x = found[0], x + found[1]
+                up[here] = x
+            ups.append(up)
+        return next((ups[1][frame] - ups[0][frame] for frame in ups[0] if frame in ups[1]), None)
+
+
+@pytest.mark.parametrize("policy", ["frametool", "ros1", "ros2"])
+@pytest.mark.parametrize("seed", range(40))
+def test_random_reparenting_trees_answer_as_tf2_does(seed: int, policy: str) -> None:
+    draw = random.Random(seed)  # noqa: S311 - not for secrets
+    keep = None if policy == "frametool" else 10**6
+    buffer, scan = TransformBuffer(policy=policy, keep_ns=keep), Scan()
+    frames = [f"f{number}" for number in range(6)]
+    for child in range(1, 6):
+        for stamp in draw.sample(range(1, 60), draw.randrange(1, 7)):
+            parent, x = draw.choice(frames[:child]), draw.uniform(-9, 9)
+            buffer.insert(parent, f"f{child}", shifted(x), stamp)
+            scan.insert(parent, f"f{child}", x, stamp)
+    for target in frames:
+        for source in frames:
+            if target == source:
+                continue
+            assert buffer.latest(target, source) == scan.latest(target, source)
+            asked: list[int | None] = [None, *draw.sample(range(62), 8)]
+            for time in asked:
+                settled = scan.latest(target, source) or 0 if time is None else time
+                expected = scan.lookup(target, source, settled)
+                try:
+                    found = buffer.lookup(target, source, time).components[0]
+                except NoDataAt:
+                    assert expected is None
+                else:
+                    assert expected == pytest.approx(found, abs=1e-12)
+
+
+# --- late samples --------------------------------------------------------------------------------------------------
+
+
+class Counting(list[Any]):
+    """A list that counts what an insert has to move."""
+
+    moved = 0
+
+    def insert(self, index: Any, item: Any) -> None:
+        Counting.moved += len(self) - index
+        super().insert(index, item)
+
+
+@pytest.mark.parametrize("order", ["reverse", "random", "two halves"])
+def test_a_late_sample_moves_a_page_of_others_and_not_all(order: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    class CountingPage(track_module.Page):
+        def __init__(self, stamps: list[int], parents: list[str], samples: list[Any]) -> None:
+            super().__init__(Counting(stamps), parents, samples)
+
+    monkeypatch.setattr(track_module, "Page", CountingPage)
+    count = 20_000
+    draw = random.Random(1)  # noqa: S311 - not for secrets
+    stamps = {
+        "reverse": list(range(count, 0, -1)), "random": draw.sample(range(count), count),
+        "two halves": [*range(1, count, 2), *range(0, count, 2)],
+    }[order]  # fmt: skip
+    Counting.moved = 0
+    buffer = TransformBuffer()
+    for stamp in stamps:
+        buffer.insert("a", "b", shifted(stamp), stamp)
+    assert Counting.moved <= count * PAGE
+    track = buffer.track("b")
+    assert isinstance(track, MovingTrack)
+    assert [stamp for stamp, _, _ in track.walk()] == sorted(stamps)
+    assert max(len(page.stamps) for page in track.pages[:-1]) <= PAGE + 1
+
+
+@pytest.mark.parametrize("page", [1, 2, 7, 512])
+def test_the_order_of_inserts_and_the_pages_change_no_answer(page: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(track_module, "PAGE", page + page % 2)
+    draw = random.Random(page)  # noqa: S311 - not for secrets
+    stamps = draw.sample(range(1000), 150)
+    poses = {stamp: Transform.random(seed=stamp) for stamp in stamps}
+    parents = {stamp: draw.choice("ab") if page == 7 else "a" for stamp in stamps}
+    in_order, late = TransformBuffer(), TransformBuffer()
+    for buffer in (in_order, late):
+        buffer.insert("w", "a", shifted(1))
+        buffer.insert("w", "b", shifted(2))
+    for stamp in sorted(stamps):
+        in_order.insert(parents[stamp], "c", poses[stamp], stamp)
+    for stamp in stamps:
+        late.insert(parents[stamp], "c", poses[stamp], stamp)
+        assert late.lookup("w", "c", stamp).is_close(
+            shifted(1 if parents[stamp] == "a" else 2) @ poses[stamp], angle=1e-12, distance=1e-12
+        )
+    for stamp in draw.sample(stamps, 20):  # a second word on a stamp
+        for buffer in (in_order, late):
+            buffer.insert_components(parents[stamp], "c", poses[0 if 0 in poses else stamp].components, stamp)
+    times = range(min(stamps), max(stamps) + 1)
+    assert [in_order.lookup("w", "c", at).components for at in times] == [late.lookup("w", "c", at).components for at in times]
+    assert (in_order.lookup_many("w", "c", times).xyzw == late.lookup_many("w", "c", times).xyzw).all()
+
+
+def test_what_is_too_old_is_dropped_across_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(track_module, "PAGE", 4)
+    buffer = TransformBuffer(keep_ns=30)
+    for stamp in (*range(10, 40, 2), *range(11, 40, 2), 45, 60, 100):
+        buffer.insert("a", "b", shifted(stamp), stamp)
+        track = buffer.track("b")
+        assert track is not None
+        stamps = [at for at, _, _ in track.walk() if at is not None]
+        assert stamps == sorted(stamps)
+        assert stamps[0] >= stamps[-1] - 30
+    assert stamps == [100]
+
+
+# --- time goes by --------------------------------------------------------------------------------------------------
+
+
+def drive() -> TransformBuffer:
+    buffer = TransformBuffer()
+    for stamp in (1, 3):
+        buffer.insert("map", "base", shifted(stamp), stamp * 10**9)
+    return buffer
+
+
+def test_a_replay_goes_through_the_span_in_equal_steps() -> None:
+    found = [(at, pose.components[0]) for at, pose in drive().replay("map", "base", rate_hz=2.0)]  # type: ignore[union-attr]
+    assert found == [(round(seconds * 10**9), seconds) for seconds in (1.0, 1.5, 2.0, 2.5, 3.0)]
+
+
+def test_a_replay_yields_the_error_where_there_is_no_data() -> None:
+    found = list(drive().replay("map", "base", rate_hz=1.0, start_ns=2 * 10**9, stop_ns=4 * 10**9))
+    assert [isinstance(each, TooLate) for _, each in found] == [False, False, True]
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf"), 1e-300, 1e-10, 1.1e9, 1e300])
+def test_a_replay_takes_steps_of_a_nanosecond_up_to_a_century(rate: float) -> None:
+    with pytest.raises(ValueInvalid, match="Hz has no steps between 1 ns"):
+        list(drive().replay("map", "base", rate_hz=rate))
+
+
+def test_the_fastest_replay_never_repeats_a_stamp() -> None:
+    times = [at for at, _ in drive().replay("map", "base", rate_hz=1e9, stop_ns=10**9 + 1000)]
+    assert times == list(range(10**9, 10**9 + 1001))
+
+
+def test_an_unknown_frame_and_a_second_pose_say_the_rule_they_break() -> None:
+    with pytest.raises(UnknownFrame):
+        standing(FrameTree).replay("map", "nope", rate_hz=1.0).__next__()
+    for edge, rule in ((("map", "lidar"), "two-parents"), (("base", "lidar"), "two-poses"), (("lidar", "map"), "cycle")):
+        for kind in (FrameTree, TransformBuffer):
+            frames = standing(kind)
+            add = frames.add if isinstance(frames, FrameTree) else frames.insert
+            with pytest.raises(BadTopology) as caught:
+                add(*edge, POSES[0])
+            assert caught.value.rule == rule
