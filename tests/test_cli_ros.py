@@ -223,14 +223,14 @@ def test_each_message_moves_at_its_own_stamp(run: Run) -> None:
 @pytest.mark.parametrize("form", ["ros1", "ros2"])
 def test_messages_come_out_as_they_went_in(run: Run, form: str) -> None:
     twist = {"linear": {"x": 2.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": -0.25}}
-    pose = {"position": {"x": 1.0, "y": 0.0, "z": 1e-05}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}}
-    for message in (twist, POINTS[0], stamped(5, pose=pose), {"transforms": [transform("map", "on", EPOCH + 1)]}):
+    pose = {"position": {"x": 1.0, "y": 0.0, "z": 0.125}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}}
+    for message in (twist, POINTS[0], stamped(5, pose=pose), {"transforms": [transform("cam", "on", EPOCH + 1)]}):
         text = message_text(message, Style(form))
-        assert run("apply", "--transform", "{}", stdin=text).out == text
+        assert run("apply", "--transform", "{name: cam, parent: cam, xyz: [0, 0, 0]}", stdin=text).out == text
 
 
 def test_a_message_is_written_in_the_spelling_asked_for(run: Run) -> None:
-    out = run("apply", "--transform", "{}", "-f", "ros1", stdin=json.dumps(POINTS[0])).out
+    out = run("apply", "--transform", "{name: cam, parent: cam}", "-f", "ros1", stdin=json.dumps(POINTS[0])).out
     assert out.startswith('header: \n  seq: 0\n  stamp: \n    secs: 1700000000\n    nsecs:         1\n  frame_id: "cam"\n')
 
 

@@ -8,21 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid
 from frametool.formats import FORMATS, by_suffix, writers
 from frametool.geometry.representations import notation
-from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frametool.formats.points import Point
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
     from frametool.geometry.representations import Notation
-    from frametool.ros.message_stream import Message
-    from frametool.ros.stamped import Stamped
+    from frametool.grammar.pose import Pose
 
 
 class Output:
@@ -54,14 +50,14 @@ class Output:
         """Write poses."""
         self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))
 
-    def moved(self, records: Sequence[Pose | Point]) -> None:
-        """Write moved records: poses as poses, whatever else there is as it was spelled."""
-        if all(isinstance(each, Pose) for each in records):
-            self.poses([Result(each) for each in records if isinstance(each, Pose)])
+    def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
+        """Write results: poses as poses; points, vectors and messages as the mappings they are."""
+        found = list(values)
+        poses = [each for each in found if isinstance(each, Result)]
+        if len(poses) == len(found):
+            self.poses(poses)
         else:
-            self.points(
-                [Result(each).mapping(self.style) if isinstance(each, Pose) else each.mapping() for each in records]
-            )
+            self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
@@ -84,8 +80,11 @@ class Output:
             say("note: gimbal lock: the angles are not unique; the third was set to 0")
 
     def points(self, records: Iterable[dict[str, Any]]) -> None:
-        """Write points."""
-        self.text(self._module("frametool.view.pose_text").write_points(records, self.style))
+        """Write points; for a person one a line, but what has more than three numbers as a mapping."""
+        found = list(records)
+        is_plain = all(any(isinstance(value, list) for value in each.values()) for each in found)
+        text_module = "frametool.view.pose_text" if is_plain else FORMATS["yaml"].writer
+        self.text(self._module(text_module).write_points(found, self.style))
 
     def report(self, entries: Sequence[dict[str, Any]]) -> None:
         """Write flat records that are neither poses nor points."""
@@ -102,29 +101,6 @@ class Output:
 
     def _module(self, text_module: str) -> Any:
         return import_module(FORMATS[self.style.form].writer if self.style.form in FORMATS else text_module)
-
-    def message(self, message: Message, moved: Sequence[Stamped]) -> str:
-        """Return the text of a message in which some moved: as it was spelled unless the command was told otherwise."""
-        from frametool.ros.stamped_splice import respelled
-
-        if moved and self.told in (None, moved[0].form):
-            style = self.style.in_form(moved[0].form)
-            text = respelled(message.source.text, message.document, moved, style)
-            if text is not None:
-                return text if text.endswith("\n") else f"{text}\n"
-        return "".join(map(self._message, moved))
-
-    def _message(self, message: Stamped) -> str:
-        from frametool.ros.stamped import spelling
-
-        form = self.style.form if self.told or not message.form else message.form
-        if form == "text":
-            form = spelling(message.message)
-        if form == "csv":
-            raise ValueInvalid("a message is nested and has no place in csv; write json, yaml, ros1 or ros2")
-        style = self.style.in_form(form)
-        text: str = import_module(FORMATS[form].writer).write_points([message.mapping()], style)
-        return f"{text}---\n" if form == "yaml" else text
 
     def pieces(self, pieces: Iterable[str]) -> None:
         """Write text as it comes; into a file, whole or not at all."""

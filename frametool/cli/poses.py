@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.documents.source import Source, read_text
 from frametool.errors import FormatError, ValueInvalid, warn
-from frametool.formats.records import read_poses
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
 from frametool.grammar.rotation import read_homogeneous, rotation_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
+    from frametool.cli.output import Output
+    from frametool.cli.streaming import Stream
     from frametool.geometry.representations import Notation
+    from frametool.grammar.result import Result
+    from frametool.stream.request import Request
 
 INLINE = "argument"
 
@@ -42,10 +45,32 @@ def source_of(argument: str | Source) -> Source:
 
 def poses_from(argument: str | Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
     """Read the poses of one argument: inline, `-` for standard input, or a file."""
+    from frametool.stream.record_values import read_poses
+
     try:
         return read_poses(source_of(argument), degrees=degrees, normalize=normalize)
     except FormatError as error:
         raise usage_if_inline(error) from None
+
+
+def write_results(argument: str, stream: Stream, request: Request, output: Output) -> int:
+    """Write the results of the records of one argument: inline, a file, or the stream of the command."""
+    if stream.is_wanted(argument):
+        return stream.run(request, output)
+    output.values(values_of([argument], request, output))
+    return 0
+
+
+def values_of(arguments: Sequence[str | Source], request: Request, output: Output) -> Iterator[Result | dict[str, Any]]:
+    """Yield the results of the records of arguments."""
+    from frametool.stream.record_values import results
+
+    request = request._replace(notations=request.notations or output.notations)
+    for argument in arguments:
+        try:
+            yield from results(source_of(argument), request, output.style)
+        except FormatError as error:
+            raise usage_if_inline(error) from None
 
 
 def usage_if_inline(error: FormatError) -> FormatError:

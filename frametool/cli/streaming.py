@@ -12,11 +12,11 @@ import click
 
 from frametool.cli.command import TEXT, Notations, be_verbose
 from frametool.cli.stderr import say, say_error
-from frametool.documents.source import HEAD, Source, decode
+from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
 from frametool.formats import FORMATS, readers
 from frametool.formats.detect import detect
-from frametool.stream.faults import MOST, ON_ERROR, STOP, BadRows
+from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -104,6 +104,10 @@ class Stream:
             self._opened = _opened(self.path)
         return self._opened
 
+    def has_input(self) -> bool:
+        """Tell whether something is piped in."""
+        return sys.stdin is not None and not sys.stdin.isatty() and bool(self.opened().peek(1))
+
     def is_wanted(self, argument: object) -> bool:
         """Tell whether standard input or -i FILE is to be read in this argument's place."""
         if self.path is not None and argument not in (None, "-"):
@@ -111,12 +115,9 @@ class Stream:
         return self.path is not None or argument in (None, "-")
 
     def run(
-        self, request: Request, output: Output, *, tables_only: bool = False, as_spelled: bool = False
-    ) -> int | Source:
-        """Run the stream and give its exit status; or give the text of a few records that are to be shown otherwise.
-
-        as_spelled: records cannot be shown otherwise than they are spelled.
-        """
+        self, request: Request, output: Output, *, tables_only: bool = False
+    ) -> int:
+        """Run the stream and return its exit status."""
         name = self.path or "stdin"
         with self.opened() as stream:
             begin = stream.peek()
@@ -127,14 +128,22 @@ class Stream:
                 say(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
-            if form in RECORDS and not as_spelled and (output.told or form) != form:
-                return Source(name, decode(stream.read(), name))
-            stays = as_spelled or form not in RECORDS
-            if stays and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
+            request = self._completed(request, output, form)
+            if form in RECORDS and (output.told or form) != form:
+                return self._run_as_values(stream, form, request, output)
+            if form not in RECORDS and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
                 raise click.UsageError(
                     f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
                 )
-            return self._run(stream, form, self._completed(request, output, form), output)
+            return self._run(stream, form, request, output)
+
+    def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        """Write the results of records in another form than theirs."""
+        from frametool.stream.record_values import stream_results
+
+        bad = self.policy(self.path or "stdin")
+        output.values(stream_results(stream, form, request, output.style, bad))
+        return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str) -> BadRows:
         """Return what reports and counts the bad rows of a source."""

@@ -8,13 +8,19 @@ if TYPE_CHECKING:
     from typing import Any
 
 
+class Verbatim(str):
+    """A number or truth value as it was written; it is written so again, without quotes."""
+
+    __slots__ = ()
+
+
 def dump(value: Any, number: Callable[[float], str] = repr) -> str:
     """Write plain values as JSON on one line; `number` writes the floats.
 
     Not json.dumps, because that has no say in how floats are written.
     """
-    if isinstance(value, float):
-        return number(value)
+    if isinstance(value, (float, Verbatim)):
+        return number(value) if isinstance(value, float) else str(value)
     if isinstance(value, dict):
         return "{" + ", ".join(f"{dump(key)}: {dump(each, number)}" for key, each in value.items()) + "}"
     if isinstance(value, (list, tuple)):

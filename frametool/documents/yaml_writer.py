@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 
+from frametool.documents.json_writer import Verbatim
 from frametool.errors import ValueInvalid
 
 TYPE_CHECKING = False
@@ -75,7 +76,7 @@ def _escape(match: re.Match[str]) -> str:
 def _scalar(value: Any, number: Callable[[float], str]) -> str:
     """Write what is neither a list nor a map."""
     if isinstance(value, str):
-        return quoted(value)
+        return str(value) if isinstance(value, Verbatim) else quoted(value)
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -103,7 +104,7 @@ def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
 
 def _fits_flow(key: str, value: Any) -> bool:
     """Say whether an entry may stand in a map on one line."""
-    return isinstance(value, (int, float)) and len(key) <= _LONGEST_KEY
+    return isinstance(value, (int, float, Verbatim)) and len(key) <= _LONGEST_KEY
 
 
 def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:

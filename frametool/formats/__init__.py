@@ -10,7 +10,7 @@ class Format(NamedTuple):
 
     summary: what it is, in a line
     suffixes: of files in this form
-    reads: what is read from it: `tree` by `read` of `reader`; `messages`, `records` and `rows` by the streams
+    reads: what is read from it: `tree` by `read` of `reader`; `records` and `rows` by the streams
     writes: what is written in it, by `write_poses`, `write_points` (also for a `report`), `write_tree` of `writer`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     """
@@ -69,13 +69,13 @@ FORMATS = {
     "tum": Format("trajectory: t x y z qx qy qz qw", suffixes=(".tum",), reads=("rows",)),
     "echo": Format(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
-        reads=("tree", "messages"),
+        reads=("tree",),
         reader=_MESSAGES,
         signs=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
     ),
     "jsonl": Format(
         "messages as JSON, one a line (rosbridge, Foxglove)",
-        reads=("tree", "messages"),
+        reads=("tree",),
         reader=_MESSAGES,
         signs=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
     ),
@@ -131,7 +131,7 @@ FORMATS = {
 
 
 def readers(*what: str) -> tuple[str, ...]:
-    """Name the forms from which any of `tree`, `messages`, `records` and `rows` is read."""
+    """Name the forms from which any of `tree`, `records` and `rows` is read."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
 
 

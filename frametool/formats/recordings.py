@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from frametool.documents.input_file import InputFile
 from frametool.errors import FileProblem, warn
 from frametool.formats import BAG, FORMATS
-from frametool.formats.detect import by_sign, detect, of_folder
+from frametool.formats.detect import detect, of_folder
 from frametool.grammar.edges import Edge, Options, Tally, stop
 
 if TYPE_CHECKING:
@@ -73,10 +73,3 @@ def _about_folder(path: str) -> str:
     bags = tuple(suffix for row in FORMATS.values() if row.reader == BAG for suffix in row.suffixes)
     files = sorted(name for name in os.listdir(path) if name.endswith(bags))[:5]
     return f"a folder without metadata.yaml; name a file in it: {', '.join(files)}" if files else "is a directory"
-
-
-def open_messages(path: str, stream: BinaryIO) -> Recording | None:
-    """Take a stream that begins with a ROS message, as text or JSON lines; None for any other, nothing of it read."""
-    head = stream.peek(1)  # type: ignore[attr-defined]
-    form = by_sign(head, "messages")
-    return Recording(path, stream, form) if form else None

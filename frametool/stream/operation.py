@@ -29,22 +29,24 @@ MOVERS: dict[str, Callable[..., Components]] = {
 
 
 class Operation(NamedTuple):
-    """Products with fixed poses before and after each row, after it was turned around if asked for.
+    """What is done to each row: turned around if asked for, then multiplied with fixed poses, then compared.
 
-    left, right: applied as left @ row @ right
+    left, right: applied as left @ row @ right[0] @ right[1] ..
     inverse: the row itself is inverted first
-    of: "" for nothing more; else relative: "first" inverse(fixed) row, "second" inverse(row) fixed, "pair" the two
-        poses of a row, "previous" the row before and this one
+    of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
+        "pair" the two poses of a row, "previous" the row before and this one
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
+    turns: only the rotation changes; the position, if there is one, stays as it is
     """
 
     left: Rigid | None = None
-    right: Rigid | None = None
+    right: tuple[Rigid, ...] = ()
     inverse: bool = False
     of: str = ""
     fixed: Rigid | None = None
     moves: bool = False
+    turns: bool = False
 
     @property
     def extras(self) -> tuple[str, ...]:
@@ -54,7 +56,21 @@ class Operation(NamedTuple):
     @property
     def changes_nothing(self) -> bool:
         """Tell whether rows only change their notation."""
-        return self.left is self.right is None and not self.inverse and not self.of
+        return self._is_bare and not self.inverse
+
+    @property
+    def keeps_position(self) -> bool:
+        """Tell whether positions stay as they are written."""
+        return self.changes_nothing or self.turns
+
+    @property
+    def only_inverts(self) -> bool:
+        """Tell whether rows are turned around and nothing else."""
+        return self._is_bare and self.inverse
+
+    @property
+    def _is_bare(self) -> bool:
+        return not (self.left or self.right or self.of or self.moves)
 
     def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
         """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
@@ -80,8 +96,8 @@ class Operation(NamedTuple):
         left = edge or self.left
         if left is not None:
             result = rigid.compose(*left, *result)
-        if self.right is not None:
-            result = rigid.compose(*result, *self.right)
+        for right in self.right:
+            result = rigid.compose(*result, *right)
         return self._relative([result, *poses[1:]], xp) if self.of else result
 
     def _relative(self, poses: Sequence[Rigid], xp: Namespace) -> Components:

@@ -31,7 +31,9 @@ INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist
 PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque")}
 PARENT_KEYS = ("parent", "frame", "frame_id", "parent_frame_id")  # the frame a record is given in
 NAME_KEYS = ("name", "child_frame_id")  # what a pose is the pose of
+NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
 XYZ = ("x", "y", "z")
+STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 
 
 class Name(NamedTuple):
@@ -74,6 +76,10 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
     """
     try:
         found = list(_search(document, (), ()))
+        if not found and type(document) is dict and NOTHING_BUT.issuperset(document) and not request.operation.moves:
+            reading.here = path
+            reading.note("neither position nor rotation: taken as the identity", rule="identity")
+            found = [((), ())]
         if not found:
             raise _nothing_in(document)
     except Misfit as misfit:
@@ -311,7 +317,7 @@ def _with_flat_rotation(
         rotation_of(form, texts, places, reading)
     except NotARotation as misfit:
         raise misfit if misfit.path else misfit.below(names[0]) from None
-    values, degrees = read_components(form, texts, places, reading)
+    values, degrees = read_components(form, texts, places, Reading(reading.source, degrees=reading.degrees))
     numbers = (*record.numbers, *((*record.path, name) for name in names))
     shape = record.shape._replace(kind=POSE, notation=form, degrees=degrees)
     first = next(key for key in value if key in names)

@@ -136,8 +136,7 @@ def _rendered(template: Template, request: Request, line: int) -> tuple[bytes, b
         return Fault.of(line, getattr(error, "column_name", ""), error)
     notes = [RowNote.of_degrees(line, doubt)] if doubt else []
     notes += [RowNote.of_rounding(line)] * mended
-    if template.unnamed:
-        notes.append(RowNote.of_lost_name(line, template.unnamed))
+    notes += [RowNote(line, *each) for each in template.notes]
     return text.encode(), mended, notes
 
 

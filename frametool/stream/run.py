@@ -32,11 +32,6 @@ class RowNote(NamedTuple):
         """Tell that a rotation had to be normalised."""
         return cls(line, "rounded", "the rotation is off by more than 1e-6 and was normalised")
 
-    @classmethod
-    def of_lost_name(cls, line: int, name: str) -> RowNote:
-        """Tell that a frame is not named any more."""
-        return cls(line, "unnamed", f"frame {name!r} is left out: the frames of the result are not known")
-
 
 class Outcome(NamedTuple):
     """What became of a block.

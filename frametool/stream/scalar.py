@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Components, Quaternion, Rigid
+    from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
-    from frametool.stream.template import Entry, Template
+    from frametool.stream.template import Template
 
 
 class Rendered(NamedTuple):
@@ -37,7 +38,7 @@ def result_of(template: Template, request: Request) -> Rendered:
     for entry, edge in zip(template.entries, _edges(template, request), strict=True):
         shape = entry.record.shape
         values = template.values[first : first + shape.size]
-        parts, odd = _moved(entry, edge, values, request)
+        parts, odd = moved(entry.record, edge, values, request)
         numbers += entry.target.written(parts, floats)
         locked = locked or bool(entry.target.locked(parts))
         mended = mended or odd
@@ -67,18 +68,20 @@ def _edges(template: Template, request: Request) -> list[Rigid | None]:
     return edges
 
 
-def _moved(entry: Entry, edge: Rigid | None, values: Sequence[float], request: Request) -> tuple[Components, bool]:
+def moved(
+    record: Record, edge: Rigid | None, values: Sequence[float], request: Request
+) -> tuple[Components, bool]:
     """Apply the operation to one record; return also whether its rotation had to be normalised."""
-    shape = entry.record.shape
+    shape = record.shape
     own = values[: shape.own_size]
     if shape.kind != POSE:
         start = shape.position(own) if shape.unit is not None else tuple(own)
         return request.operation.move(shape, (*start, *values[shape.own_size :]), edge), False
     rotation, mended = checked_rotation(shape, own, request)
     pose: Rigid = pose_of(shape.position(own), rotation)
-    moved = request.operation.pose([rigid.inverse(*pose) if entry.record.inverse else pose], edge, floats)
+    result = request.operation.pose([rigid.inverse(*pose) if record.inverse else pose], edge, floats)
     beside = request.operation.covariance(shape, tuple(values[shape.own_size :]), edge)
-    return (*moved, *beside), mended
+    return (*result, *beside), mended
 
 
 def checked_rotation(shape: Shape, values: Sequence[float], request: Request) -> tuple[Quaternion, bool]:

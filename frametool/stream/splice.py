@@ -13,8 +13,8 @@ from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
-from frametool.stream.record import PARENT_KEYS, POINT_KEYS, XYZ
-from frametool.stream.row_layout import POSE, SIX, Target, axes_of
+from frametool.stream.record import PARENT_KEYS, POINT_KEYS, STALE, XYZ
+from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Target, axes_of
 from frametool.stream.text_parts import Const, IfLocked, Out
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.text_parts import Piece
 
-STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 MARK = "\0"
 SAMPLE = (0.5, 0.5, 0.5, 0.5)
 OURS = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *XYZ, "linear", "angular", "force", "torque")).union(
@@ -49,8 +48,7 @@ def target_of(record: Record, request: Request) -> Target:
     if shape.kind != POSE:
         return Target(shape.unit, ())
     forms = request.notations or ((shape.notation,) if shape.notation else ())
-    product = not operation.changes_nothing and not (operation.inverse and operation.left is operation.right is None)
-    product = product or operation.moves
+    product = not (operation.keeps_position or operation.only_inverts)
     if not forms and product:
         forms = (notation("quaternion"),)
     placed = shape.whole or shape.unit is not None or product
@@ -144,6 +142,9 @@ class Splicer:
                 anchor = self.node.value[self.record.rotation][0] if self.record.rotation else self._first_key()
                 self._insert_before(anchor, self._member({"xyz": list(SAMPLE[:3])}, 0))
             return
+        if key in (POINT, VECTOR) and self.record.shape.kind in (POINT, VECTOR) and key != self.record.shape.kind:
+            node = self.node.value[key][0]
+            self.edits.append(Edit(node.start, node.end, (Const(self._text(self.record.shape.kind).encode()),)))
         if target.unit is None:
             self.dropped.update((key,) if key else XYZ)
         elif None in self.slots[:3]:
@@ -154,7 +155,7 @@ class Splicer:
     def _position_stays(self) -> bool:
         """Tell whether only the notation of the rotation changes: then the position keeps its text."""
         request = self.request
-        return request.operation.changes_nothing and not request.operation.moves and not self.record.inverse
+        return request.operation.keeps_position and not self.record.inverse
 
     def _rotation(self) -> None:
         """Write the rotation where it stands, or its members anew."""
@@ -209,7 +210,7 @@ class Splicer:
         """Write a frame's name where the record says it, or as a member of its own."""
         if new == old.text:
             return
-        if not old.paths:
+        if not old.paths and self.record.shape.kind not in SIX:  # a bare Twist or Wrench has no field for it
             self._insert_before(self._first_key(), self._member({key: new}, 0))
         for path in old.paths:
             if new is None and path[:-1] == self.record.path and path[-1] in ("name", *PARENT_KEYS):

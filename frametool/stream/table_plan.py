@@ -29,7 +29,7 @@ COUNTING = "frame"  # such a column often counts pictures: beside a SOURCE it is
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
     """Settle which columns are read and written; raises FormatError that names the columns there are."""
     poses = _find(table, request, source)
-    if request.poses == 1 and not request.operation.moves and request.operation.changes_nothing:
+    if request.poses == 1 and not request.operation.moves and request.operation.keeps_position:
         poses = [_without_position(poses[0], request, table, source)]
     shapes = tuple(_shape(pose, request) for pose in poses)
     target = _target(shapes, request)
@@ -125,7 +125,7 @@ def _target(shapes: Sequence[Shape], request: Request) -> Target:
 def _only_turns_around(request: Request) -> bool:
     """Tell whether rows without a rotation have none afterwards."""
     operation = request.operation
-    return operation.left is operation.right is None and not operation.of and not _by_row(request)
+    return operation.left is None and not operation.right and not operation.of and not _by_row(request)
 
 
 def _by_row(request: Request) -> bool:
@@ -136,7 +136,7 @@ def _by_row(request: Request) -> bool:
 def _shifts(request: Request) -> bool:
     """Tell whether rows without a position may have one afterwards."""
     operation = request.operation
-    fixed = (operation.left, operation.right, operation.fixed)
+    fixed = (operation.left, *operation.right, operation.fixed)
     return _by_row(request) or any(pose is not None and any(pose[:3]) for pose in fixed)
 
 

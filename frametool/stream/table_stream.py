@@ -45,6 +45,8 @@ def run_table(
         raise FormatError("nothing in it", source=source)
     table, rest = open_table(first, delimiter, header=header, source=source)
     table = _as_tum(table, form)
+    if request.timed is not None and not request.timed.name:
+        request = request._replace(timed=None)  # rows have no header
     plan, layout = plan_table(table, request, source)
     head = table.head + (layout.header(table.header) + table.line_end if table.header else b"")
     taken = len(first) - len(rest)

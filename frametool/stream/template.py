@@ -10,13 +10,13 @@ import re
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.document import Document, format_error, parse_documents
+from frametool.documents.document import Document, parse_documents
 from frametool.documents.json_reader import strict_json
 from frametool.documents.nodes import Node, parse_nodes
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
 from frametool.grammar.pose import POSE_KEYS
-from frametool.grammar.readers import Misfit, NotARotation, Reading
+from frametool.grammar.readers import Misfit, Reading, within
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_records
 from frametool.stream.splice import OURS, Splicer, target_of
@@ -69,7 +69,7 @@ class Template:
     numbers: the stretches that hold our numbers, in order
     stamps: the stretches of each entry's stamp
     pieces: what the result is made of
-    unnamed: a frame that the result cannot name any more; "" if there is none
+    notes: what is worth telling, as (what it is about, the sentence)
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Template:
         self.text = text
         self.entries = tuple(entries)
         self.json = json
-        self.unnamed = next((lost for entry in entries if (lost := _lost_name(entry.record, request))), "")
+        self.notes = list(_notes(entries, request))
         self._root = root
         self._request = request
         slots = [_inside(root, path) for entry in entries for path in entry.record.numbers]
@@ -161,7 +161,16 @@ class Template:
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
 
 
-def _lost_name(record: Record, request: Request) -> str:
+def _notes(entries: Sequence[Entry], request: Request) -> Iterator[tuple[str, str]]:
+    """Yield what is worth telling about the records of a text."""
+    for entry in entries:
+        if lost := lost_name(entry.record, request):
+            yield "unnamed", f"frame {lost!r} is left out: the frames of the result are not known"
+        if not entry.record.values:
+            yield "identity", "neither position nor rotation: taken as the identity"
+
+
+def lost_name(record: Record, request: Request) -> str:
     """Name a frame that the record names and its result cannot, because the operation does not know the other one."""
     if request.rename is None:
         return ""
@@ -277,11 +286,16 @@ def _entries(document: Document, request: Request, source: Source) -> list[Entry
         records = list(find_records(document.value, request, reading, (document.index,)))
         made = [_entry(document, record, request) for record in records]
     except Misfit as misfit:
-        error = format_error(source, misfit.path, str(misfit), key=misfit.key)
-        error.__cause__ = misfit if isinstance(misfit, NotARotation) else None
+        error = placed(misfit, source)
         error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
         raise error from misfit
     return made
+
+
+def placed(misfit: Misfit, source: Source) -> FormatError:
+    """Make the error that names line and column of a misfit whose path begins with the index of its document."""
+    index, *path = misfit.path
+    return type(misfit)(str(misfit), tuple(path), key=misfit.key, rule=misfit.rule).placed(source, int(index))
 
 
 def _entry(document: Document, record: Record, request: Request) -> Entry:
@@ -290,7 +304,8 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     edge = None
     timed = request.timed
     if timed is not None and timed.name:
-        stamp = ((document.index, *stamp_path(document.value, record.path[1:], timed.name)),)
+        found = within((document.index,), stamp_path, document.value, record.path[1:], timed.name)
+        stamp = ((document.index, *found),)
     elif timed is not None and record.stamp and timed.moves(record.parent.text):
         stamp = record.stamp
     elif request.way is not None:

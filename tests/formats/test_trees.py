@@ -10,7 +10,7 @@ import pytest
 from frametool import FrameTree, load
 from frametool.documents.source import Source
 from frametool.errors import BadTopology, FormatError
-from frametool.formats.records import read_poses
+from frametool.stream.record_values import read_poses
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -98,7 +98,7 @@ def test_the_size_of_blocks_does_not_show_in_records(size: int) -> None:
 
 def test_one_record_alone_gives_what_it_gives_among_many() -> None:
     record = '{"name": "a", "xyz": [0.1, 0.2, 0.3], "quaternion": {"x": 0.1, "y": -0.2, "z": 0.3, "w": 0.9273618495495703}}\n'
-    for request in (INVERT, MOVE, convert("matrix"), Request(Operation(right=(1.0, 0.0, 0.0, 0.0, 0.6, 0.0, 0.8)))):
+    for request in (INVERT, MOVE, convert("matrix"), Request(Operation(right=((1.0, 0.0, 0.0, 0.0, 0.6, 0.0, 0.8),)))):
         assert flow(record.encode() * MANY, request, "json").text == flow(record.encode(), request, "json").text * MANY
 
 

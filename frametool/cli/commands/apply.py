@@ -8,28 +8,23 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline
+from frametool.cli.poses import is_inline, one_pose, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, announced, frame_name, load_tree
-from frametool.errors import FormatError, ValueInvalid
-from frametool.formats.points import Point, read_moveables
-from frametool.geometry import quaternion, rigid
-from frametool.grammar.pose import Pose
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
-from frametool.stream.stamp_source import Timed
+from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.documents.source import Source
+from frametool.errors import ValueInvalid
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.documents.source import Source
     from frametool.formats.assembly import Rules
-    from frametool.formats.recordings import Recording
     from frametool.geometry.types import Components, Rigid
+    from frametool.grammar.pose import Pose
+    from frametool.stream.request import Request
 
-CHOICES = ("point", "vector", "pose")
+CHOICES = ("point", "vector", "pose", "twist", "wrench")
 
 
 @click.command(cls=Command, name="apply")
@@ -107,25 +102,16 @@ def command(
         way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
     if time_column is not None:
         _check_timed(rest, at)
-    elif rest in ((), ("-",)) and (recording := _messages(stream)) is not None:
-        from frametool.cli.messages import move_messages
-
-        announced(recording)
-        return move_messages(recording, kind, way, output, stream.policy(recording.name), normalize=normalize)
+    request = way.request(frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
     if rest in ((), ("-",)):
-        wishes = _wishes(way, frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
-        outcome = stream.run(wishes, output, as_spelled=time_column is not None)
-        if isinstance(outcome, int):
-            return outcome
-        rest = (outcome,)
-    elif stream.path:
+        return stream.run(request, output)
+    if stream.path:
         raise click.UsageError("-i FILE and records are two inputs; give one")
-    records = _records(rest, kind, degrees=deg, normalize=normalize)
-    output.moved([move(each, way.from_frame(own_frame(each), None), way.target) for each in records])
+    output.values(values_of(list(_sources(rest, kind)), request, output))
     return 0
 
 
-def _check_timed(records: tuple[str | Source, ...], at: int | str | None) -> None:
+def _check_timed(records: tuple[str, ...], at: int | str | None) -> None:
     """Refuse what does not belong together with each row's own time."""
     if at is not None:
         raise click.UsageError("--time-column gives each row its own time; leave --at out")
@@ -133,45 +119,52 @@ def _check_timed(records: tuple[str | Source, ...], at: int | str | None) -> Non
         raise click.UsageError("--time-column is for the rows of a stream; give records on the command line --at TIME")
 
 
-def _wishes(way: Way, frame_column: str | None, time_column: str | None) -> Request:
-    """Say how a stream's rows move: all from one frame, or each from the one it names; all alike, or in time."""
-    has_source = way.has_source and frame_column is None
-    timed = None if time_column is None else Timed(time_column, way.at_times, way.from_frame)
-    fixed = way.from_frame(None, None) if has_source and timed is None else None
-    frames = () if has_source else (frame_column or "",)
-
-    def edge_of(own: str | None) -> Rigid:
-        return way.from_frame(own, None)
-
-    return Request(
-        Operation(left=fixed, moves=True), frames=frames, edge_of=edge_of if frames else None, way=edge_of,
-        timed=timed, told=way.target,
-    )  # fmt: skip
-
-
 class Way(NamedTuple):
-    """Where records go: the target, and the transform that takes them there from the frame they are given in."""
+    """Where records go, and the transform that takes them there from the frame they are given in.
+
+    target: the frame they are then given in, if it has a name
+    from_frame: the transform from a frame (None: the one SOURCE), at a time or the latest
+    at_times: columns of such transforms, nan where there is no data; None where the time does not matter
+    moves: tells whether the transform from a frame depends on the time
+    has_source: whether all come from one frame
+    counters: whether no frame has a number for its name
+    """
 
     target: str | None
     from_frame: Callable[[str | None, int | None], Rigid]
-    at_times: Callable[[str | None, Any], Components]  # columns of such transforms, nan where there is no data
-    has_source: bool  # whether all come from one frame
+    at_times: Callable[[str | None, Any], Components] | None
+    moves: Callable[[str | None], bool]
+    has_source: bool
+    counters: bool = True
 
+    def request(self, frame_column: str | None, time_column: str | None) -> Request:
+        """Say how records move: from one frame or each from its own, all alike or each at its own time."""
+        from frametool.stream.operation import Operation
+        from frametool.stream.request import Request
+        from frametool.stream.stamp_source import Timed
 
-def move(record: Pose | Point, target_from_source: Rigid, target: str | None) -> Pose | Point:
-    """Return a record as seen from the target: points shift and rotate, vectors rotate, poses compose."""
-    if isinstance(record, Pose):
-        return Pose.of(rigid.compose(*target_from_source, *record.components), record.name, target)
-    if record.is_vector:
-        x, y, z = quaternion.rotate(*target_from_source[3:], *record.position)
-    else:
-        x, y, z = rigid.apply(*target_from_source, *record.position)
-    return record._replace(position=(x, y, z), frame=target)
+        has_source = self.has_source and frame_column is None
+        timed = self.at_times and Timed(time_column or "", self.at_times, self.from_frame, self.moves)
+        frames = () if has_source else (frame_column or "",)
+
+        def edge_of(own: str | None) -> Rigid:
+            return self.from_frame(own, None)
+
+        return Request(
+            Operation(left=edge_of(None) if has_source and not time_column else None, moves=True),
+            frames=frames,
+            edge_of=edge_of if frames else None,
+            way=edge_of,
+            timed=timed,
+            told=self.target,
+            counters=self.counters,
+            rename=lambda _parent, name: (self.target, name),
+        )
 
 
 def _way_by_tree(
     arguments: tuple[str, ...], more: Sequence[str], chosen_rules: Rules, chosen: int | str | None
-) -> tuple[Way, tuple[str | Source, ...]]:
+) -> tuple[Way, tuple[str, ...]]:
     """Take tree, target and, if one is named, source from the arguments; the rest are records.
 
     chosen: the time of all lookups, where one was chosen.
@@ -181,7 +174,7 @@ def _way_by_tree(
     tree = load_tree(arguments[0], more, chosen_rules)
     target, rest = frame_name(arguments[1], tree), arguments[2:]
     source = None
-    if rest and not is_record(rest[0]):
+    if rest and not _is_record(rest[0]):
         source, rest = frame_name(rest[0], tree), rest[1:]
 
     if not {target, source or target} <= set(tree.frames):
@@ -202,7 +195,12 @@ def _way_by_tree(
     def at_times(own: str | None, times_ns: Any) -> Components:
         return tree.lookup_many(target, start(own), times_ns, missing="nan").components
 
-    return Way(target, from_frame, at_times, source is not None), rest
+    def moves(own: str | None) -> bool:
+        return tree.latest(target, start(own)) is not None
+
+    counters = not any(frame.isdecimal() for frame in tree.frames)
+    in_time = at_times if chosen is None else None
+    return Way(target, from_frame, in_time, moves, source is not None, counters), rest
 
 
 def _way_by_pose(pose: Pose) -> Way:
@@ -212,16 +210,11 @@ def _way_by_pose(pose: Pose) -> Way:
         _settled(own, pose.name)
         return pose.components
 
-    return Way(pose.parent, from_frame, lambda own, _times_ns: from_frame(own), has_source=True)
-
-
-def own_frame(record: Pose | Point) -> str | None:
-    """Return the frame a record says it is given in."""
-    return record.parent if isinstance(record, Pose) else record.frame
+    return Way(pose.parent, from_frame, None, lambda _own: False, has_source=True)
 
 
 def _settled(own: str | None, source: str | None) -> str | None:
-    """Settle which frame a record is given in: where both it and the command say, they must agree."""
+    """Decide which frame a record is given in: where both it and the command say, they must agree."""
     if own and source is not None and own != source:
         raise ValueInvalid(
             f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame"
@@ -229,30 +222,29 @@ def _settled(own: str | None, source: str | None) -> str | None:
     return own or source
 
 
-def is_record(argument: str) -> bool:
+def _is_record(argument: str) -> bool:
     """Tell a record from a frame's name."""
     return argument == "-" or is_inline(argument)
 
 
-def _records(
-    arguments: Sequence[str | Source], kind: str | None, *, degrees: bool, normalize: bool
-) -> Iterator[Pose | Point]:
-    """Read the records: bare numbers in threes, mappings, standard input."""
+def _sources(arguments: Sequence[str], kind: str | None) -> Iterator[str | Source]:
+    """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
     pending: list[str] = []
-    for argument in arguments:
-        if isinstance(argument, str) and not is_record(argument):
+    for argument in (*arguments, ""):
+        if argument and not _is_record(argument):
             pending.append(argument)
             continue
-        yield from _points(pending, kind)
+        for x, y, z in _threes(pending, kind):
+            yield Source("argument", f'{{"{kind or "point"}": [{x!r}, {y!r}, {z!r}]}}')
         pending = []
-        yield from _read(argument, kind, degrees=degrees, normalize=normalize)
-    yield from _points(pending, kind)
+        if argument:
+            yield argument
 
 
-def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
+def _threes(texts: Sequence[str], kind: str | None) -> Iterator[Sequence[float]]:
     """Take bare numbers three at a time."""
-    if kind == "pose" and texts:
-        raise click.UsageError("a pose is a mapping, e.g. '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'")
+    if texts and kind not in (None, "point", "vector"):
+        raise click.UsageError(f"a {kind} is a mapping, e.g. '{{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}'")
     try:
         numbers = [parse_number(text) for text in texts]
     except NotFinite:
@@ -261,34 +253,4 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Point]:
         raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
     if len(numbers) % 3:
         raise click.UsageError(f"points are three numbers each, found {len(numbers)}")
-    for at in range(0, len(numbers), 3):
-        x, y, z = numbers[at : at + 3]
-        yield Point((x, y, z), kind or "point")
-
-
-def _messages(stream: Stream) -> Recording | None:
-    """Take a stream for stamped ROS messages where its first bytes tell; None for any other."""
-    opened = stream.opened()
-    if opened.isatty():
-        return None
-    from frametool.formats.recordings import open_messages
-
-    return open_messages(stream.path or "-", opened)
-
-
-def _read(argument: str | Source, kind: str | None, *, degrees: bool, normalize: bool) -> Iterator[Pose | Point]:
-    """Read records from a mapping or from standard input, and take them for what --as says."""
-    source = source_of(argument) if isinstance(argument, str) else argument
-    try:
-        records = read_moveables(source, degrees=degrees, normalize=normalize)
-    except FormatError as error:
-        raise usage_if_inline(error) from None
-    for record in records:
-        if kind == "pose" and isinstance(record, Point):
-            yield Pose(record.position, None, record.name, record.frame)
-        elif kind in ("point", "vector") and isinstance(record, Pose):
-            raise ValueInvalid(f"a record has a rotation and cannot be taken for a {kind}")
-        elif kind in ("point", "vector") and isinstance(record, Point) and record.is_vector != (kind == "vector"):
-            yield record._replace(key=kind)
-        else:
-            yield record
+    yield from (numbers[at : at + 3] for at in range(0, len(numbers), 3))

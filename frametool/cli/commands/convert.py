@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, pose_from_numbers, poses_from
+from frametool.cli.poses import is_inline, pose_from_numbers, values_of
 from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
@@ -18,9 +18,8 @@ from frametool.grammar.result import Result
 
 if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
+    from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Quaternion
-
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 @click.command(cls=Command, name="convert", short_help="one rotation or pose in other representations")
@@ -60,37 +59,40 @@ def command(
     """
     stream = Stream(options)
     output = Output("poses", deg=deg, **options)
-    turn = None if axes is None else _axes(axes)
-    if stream.path or values == ("-",) or not (values or axes):
+    from frametool.stream.operation import Operation
+    from frametool.stream.request import Request
+
+    turn: tuple[Rigid, ...] = () if axes is None else ((0.0, 0.0, 0.0, *_axes(axes)),)
+    forms = output.notations or (notation("quaternion"),)
+    request = Request(
+        Operation(right=turn, turns=bool(turn)),
+        given=one_notation(given),
+        degrees=deg,
+        normalize=normalize,
+        notations=forms,
+        unwrap=unwrap,
+    )
+    if stream.path or values == ("-",) or not (values or (turn and not stream.has_input())):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
-        from frametool.stream.operation import Operation
-        from frametool.stream.request import Request
-
-        operation = Operation(right=None if turn is None else (0.0, 0.0, 0.0, *turn))
-        forms = output.notations or (notation("quaternion"),)
-        outcome = stream.run(
-            Request(operation, 1, "", one_notation(given), deg, normalize, forms, unwrap=unwrap), output
-        )
-        if isinstance(outcome, int):
-            return outcome
-        poses = poses_from(outcome, degrees=deg, normalize=normalize)
-    elif not values:
-        poses = [Pose()]
+        return stream.run(request, output)
+    if not values:
+        results: list[Any] = [Result(Pose.of((0.0, 0.0, 0.0, *turn[0][3:]))._replace(position=None))]
     elif not is_inline(values[0]) and (given or len(values) > 1):
-        poses = [pose_from_numbers(values, given, degrees=deg, normalize=normalize)]
+        pose = pose_from_numbers(values, given, degrees=deg, normalize=normalize)
+        results = [Result(_turned(pose, turn))]
     else:
-        poses = [pose for each in values for pose in poses_from(each, degrees=deg, normalize=normalize)]
-    poses = [each._replace(rotation=_turned(each.rotation or IDENTITY, turn)) for each in poses]
-    output.poses(Result(pose) for pose in poses)
-    output.tell_of_lock(poses)
+        results = list(values_of(values, request, output))
+    output.values(results)
+    output.tell_of_lock([each.pose for each in results if isinstance(each, Result)])
     return 0
 
 
-def _turned(rotation: Quaternion, turn: Quaternion | None) -> Quaternion:
-    """Turn a rotation's axes; without a turn its bits stay as they are."""
-    turned: Quaternion = rotation if turn is None else quaternion.compose(*rotation, *turn)
-    return turned
+def _turned(pose: Pose, turn: tuple[Rigid, ...]) -> Pose:
+    """Return a pose with other axes; without a turn its bits stay as they are."""
+    if not turn or pose.rotation is None:
+        return pose
+    return pose._replace(rotation=quaternion.compose(*pose.rotation, *turn[0][3:]))
 
 
 def _axes(name: str) -> Quaternion:

@@ -9,9 +9,7 @@ import click
 from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations
-from frametool.errors import ValueInvalid
-from frametool.geometry import floats, rigid
-from frametool.grammar.pose import Pose
+from frametool.grammar.pose_algebra import interpolated
 from frametool.grammar.result import Result
 
 
@@ -34,11 +32,4 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
     """
     output = Output("poses", deg=deg, **options)
     pairs = combinations((a, b), degrees=deg, normalize=normalize)
-    output.poses([_between(*pair, fraction=fraction) for pair in pairs for fraction in fractions])
-
-
-def _between(a: Pose, b: Pose, *, fraction: float) -> Result:
-    if a.parent is not None and b.parent is not None and a.parent != b.parent:
-        raise ValueInvalid(f"A is given in {a.parent!r} and B in {b.parent!r}; give both in one frame")
-    components = rigid.interpolate(*a.components, *b.components, fraction, floats)
-    return Result(Pose.of(components, a.name if a.name == b.name else None, a.parent or b.parent))
+    output.poses([Result(interpolated(first, last, each)) for first, last in pairs for each in fractions])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,13 +10,10 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose
 from frametool.cli.streaming import Stream, stream_options
-from frametool.errors import ValueInvalid
-from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result
+from frametool.grammar.pose_algebra import relative, relative_names
 
 if TYPE_CHECKING:
-    from frametool.documents.source import Source
     from frametool.stream.request import Request
 
 
@@ -43,34 +39,30 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
     """
     stream = Stream(options)
     output = Output("poses", deg=deg, **options)
-    given: list[str | Source] = [each for each in (a, b) if each is not None]
+    given = [each for each in (a, b) if each is not None]
     if consecutive and given not in ([], ["-"]):
         raise click.UsageError("--consecutive is about the rows of a stream; leave A and B out")
     if len(given) < 2 or "-" in given:
-        wishes = _wishes(a, b, consecutive=consecutive, degrees=deg, normalize=normalize)
-        outcome = stream.run(wishes, output)
-        if isinstance(outcome, int):
-            return outcome
-        given = [outcome if each == "-" else each for each in given]
-    elif stream.path:
+        return stream.run(_request(a, b, consecutive=consecutive, degrees=deg, normalize=normalize), output)
+    if stream.path:
         raise click.UsageError("-i FILE is read where - stands for A or B")
-    if len(given) != 2:
-        raise click.UsageError("name A and B; one of them may be - for standard input")
-    pairs = combinations(given, degrees=deg, normalize=normalize)
-    output.poses([_relative(*pair) for pair in pairs])
+    output.poses([relative(*pair) for pair in combinations(given, degrees=deg, normalize=normalize)])
     return 0
 
 
-def _wishes(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, normalize: bool) -> Request:
-    """Say what a stream's rows are compared with: a fixed A or B, the row before, or the row's own second pose."""
+def _request(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, normalize: bool) -> Request:
+    """Compare a stream's rows with a fixed A or B, with the row before, or with the row's own second pose."""
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
+    plain = Request(degrees=degrees, normalize=normalize)
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
-        of = "previous" if consecutive else "pair"
-        return Request(Operation(of=of), poses=1 if consecutive else 2, degrees=degrees, normalize=normalize)
+        if not consecutive:
+            return plain._replace(operation=Operation(of="pair"), poses=2)
+        # a row is seen from the one before it, which is the same thing a moment earlier
+        return plain._replace(operation=Operation(of="previous"), rename=lambda _parent, name: (name, name))
     if a == b == "-":
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     first = a != "-"
@@ -78,18 +70,7 @@ def _wishes(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, n
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         own = Pose(name=name, parent=parent)
-        result = _relative(*((fixed, own) if first else (own, fixed))).pose
-        return result.parent, result.name
+        return relative_names(*((fixed, own) if first else (own, fixed)))
 
     operation = Operation(of="first" if first else "second", fixed=fixed.components)
-    return Request(operation, rename=rename, degrees=degrees, normalize=normalize)
-
-
-def _relative(a: Pose, b: Pose) -> Result:
-    if a.parent is not None and b.parent is not None and a.parent != b.parent:
-        raise ValueInvalid(f"A is given in {a.parent!r} and B in {b.parent!r}; give both in one frame")
-    components = rigid.relative(*a.components, *b.components)
-    distance = floats.length(*components[:3])
-    angle = quaternion.angle(*components[3:], floats)
-    extras = {"distance": distance, "angle": angle, "angle_deg": math.degrees(angle)}
-    return Result(Pose.of(components, b.name, a.name), extras)
+    return plain._replace(operation=operation, rename=rename)

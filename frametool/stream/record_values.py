@@ -1,0 +1,289 @@
+"""Records of a whole text and their results as values: for arguments, for files, and for output in another form.
+
+The records, the operation and what is said of them are those of streams; only the text is not kept.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.documents.document import parse_documents
+from frametool.documents.json_writer import Verbatim
+from frametool.documents.nodes import parse_nodes
+from frametool.documents.source import Source, decode
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, warn
+from frametool.formats.tree_reader import tell
+from frametool.frames.stamps import BILLION
+from frametool.geometry import floats
+from frametool.grammar.pose import Pose, inverted
+from frametool.grammar.readers import Misfit, Reading
+from frametool.grammar.result import Result
+from frametool.stream.faults import Fault
+from frametool.stream.record import PARTS, STALE, XYZ, find_records, value_at
+from frametool.stream.request import Request
+from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
+from frametool.stream.scalar import checked_rotation, moved
+from frametool.stream.splice import target_of
+from frametool.stream.splitter import Splitter
+from frametool.stream.template import JSON_NUMBER, lost_name, placed
+from frametool.text.lines import read_blocks
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.document import Document
+    from frametool.documents.nodes import Node
+    from frametool.geometry.types import Components, Rigid
+    from frametool.grammar.readers import Path
+    from frametool.grammar.result import Style
+    from frametool.stream.faults import BadRows
+    from frametool.stream.record import Record
+    from frametool.text.lines import Source as ByteStream
+
+    Value = Result | dict[str, Any]
+
+MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
+NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
+
+
+class Answer(NamedTuple):
+    """A record and what became of it: the components of its result, and the frames it then names."""
+
+    record: Record
+    parts: Components
+    parent: str | None
+    name: str | None
+
+
+def read_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
+    """Return every pose of a text, in order; at least one.
+
+    degrees: the unit of bare angles.  normalize: accept any non-zero quaternion and any matrix near a rotation.
+    Raises FormatError with the place.
+    """
+    request = Request(kind=POSE, degrees=degrees, normalize=normalize)
+    poses = [pose_of(record, request) for _, records in documents(source, request) for record in records]
+    if not poses:
+        raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
+    return poses
+
+
+def pose_of(record: Record, request: Request) -> Pose:
+    """Return a record as a named pose; position or rotation is None where it has none."""
+    shape = record.shape
+    rotation = checked_rotation(shape, record.values, request)[0] if shape.notation is not None else None
+    placed_at = shape.whole or shape.unit is not None
+    pose = Pose(shape.position(record.values) if placed_at else None, rotation, record.name.text, record.parent.text)
+    return inverted(pose) if record.inverse else pose
+
+
+def documents(source: Source, request: Request) -> Iterator[tuple[Document, list[Record]]]:
+    """Yield the documents of a text with their records, and warn of what is odd in them, each with its place."""
+    for document in parse_documents(source.text, source.name):
+        reading = Reading(source, degrees=request.degrees, normalize=request.normalize)
+        try:
+            records = list(find_records(document.value, request, reading, (document.index,)))
+        except Misfit as misfit:
+            raise placed(misfit, source) from misfit
+        tell(source, reading.notes)
+        yield document, records
+
+
+def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
+    """Yield the results of every record of a text in a form: poses with what else their records say, or messages.
+
+    Raises FormatError with the place of a record that cannot be read or has no result.
+    """
+    nodes: list[Node] = []
+    found = False
+    for document, records in documents(source, request):
+        found = True
+        nodes = nodes or parse_nodes(source.text)
+        answers = [_answer(record, request, source) for record in records]
+        for unit in dict.fromkeys(_unit(answer.record, document.value) for answer in answers):
+            ours = [answer for answer in answers if answer.record.path[: len(unit)] == unit]
+            yield from _values(_at(nodes, unit), unit, ours, request, style)
+    if not found:
+        raise FormatError("nothing in it", source=source.name)
+
+
+def _unit(record: Record, document: Any) -> Path:
+    """Return the path of the thing that a record's result is: the document, or an item of the list it is."""
+    return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
+
+
+def _answer(record: Record, request: Request, source: Source) -> Answer:
+    """Apply the operation to one record."""
+    try:
+        parent, name = record.parent.text, record.name.text
+        if request.rename is not None:
+            if lost := lost_name(record, request):
+                warn(f"{source.name}: frame {lost!r} is left out: the frames of the result are not known")
+            parent, name = request.rename(parent, name)
+        parts, _ = moved(record, _edge(record, request, source), record.values, request)
+    except ValueInvalid as error:
+        raise placed(Misfit(str(error), record.path), source) from error
+    return Answer(record, parts, parent, name)
+
+
+def _edge(record: Record, request: Request, source: Source) -> Rigid | None:
+    """Find the pose that moves a record, at the time its header says where that matters."""
+    timed = request.timed
+    if timed is not None and record.stamp and timed.moves(record.parent.text):
+        return timed.pose(record.parent.text, _stamp_ns(record, source))
+    return None if request.way is None else request.way(record.parent.text)
+
+
+def _stamp_ns(record: Record, source: Source) -> int:
+    """Return the stamp of a record's header."""
+    values = {document.index: document.value for document in parse_documents(source.text, source.name)}
+    seconds, below = (int(value_at(values, path)) for path in record.stamp)
+    return seconds * BILLION + below
+
+
+def _values(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
+    """Yield what one document or item becomes: itself with new numbers, or a pose for each record in it."""
+    inside = any(type(step) is str for answer in answers for step in answer.record.path[len(unit) :])
+    keeps = not request.notations or [form.spec for form in style.notations] == ["quaternion"]
+    if inside and style.form in MESSAGES and keeps and request.operation.moves:
+        yield _rewritten(node, unit, answers, request)
+        return
+    for answer in answers:
+        record = answer.record
+        if record.shape.kind == POSE:
+            yield _pose_result(node, unit, answer, request)
+        elif style.form == "csv" or (style.form == "text" and record.shape.kind not in PARTS):
+            yield _flat(answer, request)
+        else:
+            yield _rewritten(node, unit, [answer], request)
+
+
+def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Result:
+    """Return a pose with its frames and what else its record says."""
+    shape = answer.record.shape
+    operation = request.operation
+    pose = Pose.of(answer.parts[:7], answer.name, answer.parent)
+    if operation.keeps_position or operation.only_inverts:
+        has_position = shape.whole or shape.unit is not None
+        has_rotation = shape.notation is not None or operation.turns or request.notations
+        pose = pose._replace(
+            position=pose.position if has_position else None, rotation=pose.rotation if has_rotation else None
+        )
+    extras: dict[str, Any] = dict(zip(request.operation.extras, answer.parts[7:], strict=False))
+    return Result(pose, extras | _rest(node, unit, answer.record))
+
+
+def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
+    """Return what a record and the mappings around it say beside the pose, its frames and its stamp."""
+    used = {record.key, record.rotation, *record.others, *record.flat, *NOT_PLAIN}
+    used |= set(XYZ) if not record.key and record.shape.unit is not None else set()
+    names = {path for each in (record.name, record.parent) for path in each.paths}
+    rest: dict[str, Any] = {}
+    for depth in range(len(unit), len(record.path) + 1):
+        path = record.path[:depth]
+        holder = node.at(path[len(unit) :])
+        if type(holder.value) is not dict:
+            continue
+        on_the_way = set(record.path[depth : depth + 1]) | {"header", "covariance"}
+        for key, (_, value) in holder.value.items():
+            if key not in on_the_way and (*path, key) not in names and not (path == record.path and key in used):
+                rest.setdefault(key, plain(value))
+    return rest
+
+
+def _flat(answer: Answer, request: Request) -> dict[str, Any]:
+    """Return a point, vector, twist or wrench as a mapping without levels."""
+    record = answer.record
+    entry: dict[str, Any] = {"frame": answer.parent} if answer.parent is not None else {}
+    numbers = target_of(record, request).written(answer.parts, floats)[:6]
+    if record.shape.kind in PARTS:
+        first, second = PARTS[record.shape.kind]
+        return entry | {first: numbers[:3], second: numbers[3:]}
+    return entry | {record.shape.kind: numbers}
+
+
+def _rewritten(node: Node, unit: Path, answers: list[Answer], request: Request) -> Any:
+    """Return a document or an item of it with the numbers and frames of its results, all else as it is."""
+    if type(node.value) is list:
+        return _flat(answers[0], request)
+    changes: dict[Path, Any] = {}
+    added: dict[Path, dict[str, Any]] = {}
+    for answer in answers:
+        record = answer.record
+        numbers = target_of(record, request._replace(notations=())).written(answer.parts, floats)
+        for index, (path, number) in enumerate(zip(record.numbers, numbers, strict=True)):
+            if path is None:
+                added.setdefault((*record.path, record.key), {})[XYZ[index]] = number
+            else:
+                changes[path] = number
+        for name, new, key in ((record.name, answer.name, "name"), (record.parent, answer.parent, "frame")):
+            changes |= dict.fromkeys(name.paths, new)
+            if new is not None and not name.paths and record.shape.kind not in SIX:
+                added.setdefault(record.path, {})[key] = new
+    made = _plain_with(node, unit, changes, added)
+    record = answers[0].record
+    if record.path == unit and record.key in (POINT, VECTOR) and record.key != record.shape.kind:
+        return {record.shape.kind if key == record.key else key: value for key, value in made.items()}
+    return made
+
+
+def _plain_with(node: Node, path: Path, changes: dict[Path, Any], added: dict[Path, dict[str, Any]]) -> Any:
+    """Return a node as a plain value in which some values are others; a name that became None is left out or ''."""
+    if path in changes:
+        return changes[path]
+    if type(node.value) is list:
+        return [_plain_with(item, (*path, index), changes, added) for index, item in enumerate(node.value)]
+    if type(node.value) is not dict:
+        return plain(node)
+    made = {}
+    for key, (_, value) in node.value.items():
+        here = (*path, key)
+        if here in changes and changes[here] is None and key in ("frame", "name", "parent"):
+            continue
+        made[key] = "" if here in changes and changes[here] is None else _plain_with(value, here, changes, added)
+    new = added.get(path, {})
+    return {key: value for key, value in new.items() if key not in XYZ} | made | new
+
+
+def plain(node: Node) -> Any:
+    """Return a node as a plain value; numbers and truth values keep their text."""
+    if type(node.value) is dict:
+        return {key: plain(value) for key, (_, value) in node.value.items()}
+    if type(node.value) is list:
+        return [plain(item) for item in node.value]
+    if node.quote or node.value is None:
+        return node.value
+    if node.value in ("null", "~", ""):
+        return None
+    is_plain = node.value in ("true", "false") or re.fullmatch(JSON_NUMBER, node.value)
+    return Verbatim(node.value) if is_plain else node.value
+
+
+def _at(nodes: list[Node], path: Path) -> Node:
+    """Return the node at a path that begins with the index of its document."""
+    return nodes[int(path[0])].at(path[1:])
+
+
+def stream_results(
+    stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows
+) -> Iterator[Value]:
+    """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
+    splitter = Splitter(form)
+    line, rows = 1, 0
+    for block in read_blocks(stream, whole=splitter.whole):
+        for part in splitter.parts(block).parts:
+            rows += 1
+            at = line + block.count(b"\n", 0, part.start)
+            if part.problem:
+                bad.take([Fault(at, "", part.problem)])
+                continue
+            try:
+                text = decode(block[part.start : part.end], bad.source)
+                yield from results(Source(bad.source, text), request, style)
+            except FormatError as error:
+                bad.take([Fault(at + max(error.line, 1) - 1, str(error.column or ""), error.message)])
+            except FrametoolError as error:
+                bad.take([Fault.of(at, "", error)])
+        line += block.count(b"\n")
+    bad.finish(rows)
