@@ -8,13 +8,13 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from frametool.documents.input_file import InputFile
-from frametool.errors import FileProblem, warn
+from frametool.errors import FileProblem, FormatError, warn
 from frametool.formats import BAG, FORMATS
 from frametool.formats.detect import detect, of_folder
-from frametool.grammar.edges import Edge, Options, Tally, stop
+from frametool.grammar.edges import Edge, Options, Tally, Topics, stop
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from os import PathLike
     from typing import BinaryIO
 
@@ -25,10 +25,17 @@ if TYPE_CHECKING:
 class Recording(InputFile):
     """A file of frames and its form."""
 
-    def __init__(self, path: str | PathLike[str], stream: BinaryIO | None = None, form: str | None = None) -> None:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        stream: BinaryIO | None = None,
+        form: str | None = None,
+        topics: Iterable[str] = (),
+    ) -> None:
         """Open a file, a bag's folder, or standard input for `-`, and find its form, unless it is told.
 
-        stream: what was opened already, with nothing of it read.  Raises FileProblem.
+        stream: what was opened already, with nothing of it read.  topics: those of a recording that are read.
+        Raises FileProblem.
         """
         folder = None if form else of_folder(str(path))
         if not (form or folder) and os.path.isdir(path):
@@ -36,6 +43,7 @@ class Recording(InputFile):
         super().__init__(path, stream, folder=folder is not None)
         self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
         self.tally = Tally()
+        self.topics = Topics(topics)
 
     @classmethod
     def inline(cls, source: Source) -> Recording:
@@ -61,9 +69,12 @@ class Recording(InputFile):
         tell: without it what was odd is only kept, in `tally`.  raw: messages as tf2 receives them, unchecked.
         """
         try:
-            yield from import_module(FORMATS[self.form].reader).read(self, Options(self.tally, report, raw))
+            options = Options(self.tally, self.topics, report, raw)
+            yield from import_module(FORMATS[self.form].reader).read(self, options)
         finally:
             self.close()
+        if missing := self.topics.missing():
+            report(FormatError(missing, source=self.name))
         for told in self.tally.told() if tell else ():
             warn(f"{self.name}:{told.line}: {told.message}")
 

@@ -34,12 +34,12 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     Raises FileProblem when the extra is missing; FormatError for a bag that is broken or holds no transforms.
     """
     try:
-        yield from _edges(file.path, options.tally)
+        yield from _edges(file.path, options)
     except FormatError as error:
         options.report(error)
 
 
-def _edges(path: str, tally: Tally) -> Iterator[Edge]:
+def _edges(path: str, options: Options) -> Iterator[Edge]:
     """Open the bag; whatever the library raises for a broken one is one error."""
     try:
         from rosbags.highlevel import AnyReader
@@ -52,9 +52,9 @@ def _edges(path: str, tally: Tally) -> Iterator[Edge]:
     if Path(path).is_file() and not Path(path).stat().st_size:
         raise FormatError("nothing in it: an empty file is no bag", source=path)
     try:
-        _check_whole(path, tally)
+        _check_whole(path, options.tally)
         with AnyReader([Path(path)]) as reader:
-            yield from _transforms(reader, path, tally)
+            yield from _transforms(reader, path, options)
     except FrametoolError:
         raise
     except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything, also MemoryError
@@ -95,7 +95,7 @@ def _check_database(file: Path) -> None:
         raise FormatError(f"the bag is damaged: {said}", source=str(file))
 
 
-def _transforms(reader: Any, path: str, tally: Tally) -> Iterator[Edge]:
+def _transforms(reader: Any, path: str, options: Options) -> Iterator[Edge]:
     """Walk the messages of every topic with transforms; there must be as many as the bag says."""
     topics = [connection for connection in reader.connections if connection.msgtype in TYPES]
     for other in reader.connections:
@@ -107,10 +107,15 @@ def _transforms(reader: Any, path: str, tally: Tally) -> Iterator[Edge]:
         raise FormatError(said, source=path)
     number = 0
     for number, (topic, received_ns, data) in enumerate(reader.messages(connections=topics), 1):
-        still = topic.topic.endswith("tf_static")
+        name = topic.topic
+        still = name.endswith("tf_static")
         for transform in reader.deserialize(data, topic.msgtype).transforms:
-            edge = _edge(transform, number, path, tally)
-            yield edge._replace(stamp_ns=None if still else edge.stamp_ns, received_ns=received_ns)
+            if not options.topics.takes(name):
+                continue
+            edge = _edge(transform, number, path, options.tally)
+            if problem := options.topics.conflict(name, edge.child):
+                options.report(FormatError(problem, source=path, rule="two-topics"))
+            yield edge._replace(stamp_ns=None if still else edge.stamp_ns, received_ns=received_ns, topic=name)
     expected = _expected(reader, topics)
     if number != expected:
         names = ", ".join(sorted({topic.topic for topic in topics}))

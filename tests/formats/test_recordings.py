@@ -16,6 +16,7 @@ from frametool.grammar.result import Style
 from frametool.ros.echo_format import message_text, stamp
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from frametool.grammar.edges import Edge
@@ -376,3 +377,69 @@ def test_an_mcap_file_without_a_summary_says_what_cannot_be_known(tmp_path: Path
     file.write_bytes(data[:-28] + bytes(20) + data[-8:])
     with pytest.warns(FrametoolWarning, match=r"run\.mcap has no summary: whether it lost messages cannot be known"):
         assert len(list(Recording(file).edges())) == 2
+
+
+# --- topics --------------------------------------------------------------------------------------------------------
+
+TWO_ROBOTS = [("/tf", EXPECTED[0]), ("/tf_static", EXPECTED[1]), ("/robot1/tf", EXPECTED[0])]
+
+
+def bridged(path: Path, recorded: list[tuple[str, Any]]) -> Path:
+    """Write a recording of rosbridge, one line a message."""
+    lines = [{"op": "publish", "topic": topic, "msg": {"transforms": [transform(*each)]}} for topic, each in recorded]
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    return path
+
+
+def two_robots(kind: str, folder: Path, recorded: list[tuple[str, Any]] = TWO_ROBOTS) -> Path:
+    if kind == "rosbridge":
+        return bridged(folder / "run.jsonl", recorded)
+    path = folder / ("run.bag" if kind == "ros1" else "run")
+    write_bag(path, kind, recorded)
+    return path
+
+
+KINDS = ["rosbridge", "ros1", "SQLITE3", "MCAP"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_two_robots_that_use_the_same_names_are_not_merged(kind: str, tmp_path: Path) -> None:
+    said = "frame 'base' comes by /tf and by /robot1/tf; choose with --topic /tf or --topic /robot1/tf"
+    assert refusal(two_robots(kind, tmp_path)).endswith(said)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("topics", "count"), [(["/tf"], 1), (["tf", "tf_static"], 2), (["/robot1/tf"], 1), (["/robot1/tf", "/tf_static"], 2)]
+)
+def test_the_topics_chosen_are_read(kind: str, topics: list[str], count: int, tmp_path: Path) -> None:
+    edges = list(Recording(two_robots(kind, tmp_path), topics=topics).edges())
+    assert {edge.topic.strip("/") for edge in edges} == {topic.strip("/") for topic in topics}
+    assert len(edges) == count
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_topic_that_is_not_there_is_told_with_those_that_are(kind: str, tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"no transforms on odom; topics: /robot1/tf, /tf, /tf_static"):
+        list(Recording(two_robots(kind, tmp_path), topics=["/odom"]).edges())
+
+
+def test_robots_with_names_of_their_own_are_one_tree(tmp_path: Path) -> None:
+    apart = [("/tf", EXPECTED[0]), ("/robot1/tf", EXPECTED[1])]
+    assert len(list(Recording(two_robots("rosbridge", tmp_path, apart)).edges())) == 2
+
+
+def test_what_names_no_topics_is_read_whatever_is_chosen(tmp_path: Path) -> None:
+    (tmp_path / "tf.txt").write_text(GOOD)
+    assert len(list(Recording(tmp_path / "tf.txt", topics=["/odom"]).edges())) == 1
+
+
+def test_the_command_line_chooses_and_lists_topics(run: Callable[..., Any], tmp_path: Path) -> None:
+    path = str(two_robots("rosbridge", tmp_path))
+    assert run("lookup", path, "map", "base").status == 1
+    assert run("lookup", path, "map", "base", "--topic", "/robot1/tf").status == 0
+    found = run("check", path)
+    assert "transforms on /tf (1), /tf_static (1), /robot1/tf (1) [topics]" in found.out
+    assert "frame 'base' comes by /tf and by /robot1/tf" in found.out
+    entry = json.loads(run("monitor", path, "--topic", "tf", "-f", "json").out)
+    assert entry["topics"] == "/tf (1)"

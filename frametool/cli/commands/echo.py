@@ -11,7 +11,7 @@ from frametool.cli.command import FILE, Command, result_options, rotation_option
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.cli.times import Time, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
+from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option, verbose_option
 from frametool.errors import NoDataAt
 from frametool.grammar.looked_up import result_at
 
@@ -36,6 +36,7 @@ STAMP = Time(latest=False)
 @click.option("-l", "--limit", type=click.IntRange(1), metavar="N", help="at most so many blocks")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this file too; may be repeated")
 @rules_options
+@topic_option
 @verbose_option
 @rotation_options
 @result_options("poses")

@@ -12,7 +12,7 @@ from frametool.cli.output import Output
 from frametool.cli.stderr import tell
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, read_times, rules, rules_options, times_option
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
 from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, reasons
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ SKIPPED = 3
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")
 @times_option
 @rules_options
+@topic_option
 @rotation_options
 @result_options("poses")
 @column_options

@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, result_options
 from frametool.cli.output import Output
-from frametool.cli.trees import opened, verbose_option
+from frametool.cli.trees import opened, topic_option, verbose_option
 from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 @click.argument("recording", type=TEXT)
 @click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
+@topic_option
 @verbose_option
 @result_options("report")
 def command(recording: str, frames: Sequence[str], more: Sequence[str], **options: Any) -> None:
