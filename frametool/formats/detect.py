@@ -21,7 +21,7 @@ import os
 import re
 from functools import cached_property
 
-from frametool.documents.source import UTF16
+from frametool.documents.source import LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError
 from frametool.formats import FORMATS, by_suffix, readers
 
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from typing import Any, TypeAlias
 
     Shows: TypeAlias = Callable[["Beginning", Any], bool]
-
-LOOKED_AT = 4096  # characters in which keys are searched
 
 
 class Beginning:
@@ -148,6 +146,8 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "") -> tup
     """
     if form := by_sign(head, *reads, name=name):
         return form, "its first bytes"
+    if "tree" not in reads and (what := not_text(head)):
+        raise FormatError(what, source=name or "stdin")
     if form := by_suffix(name, readers(*reads)):
         return form, f"the suffix {name[name.rfind('.'):].lower()}"
     begin = Beginning(head)
