@@ -53,6 +53,17 @@ class FrametoolError(Exception):
         """Return all there is to say beside the kind and the message."""
         return self.fields
 
+    def __reduce__(self) -> tuple[Callable[..., FrametoolError], tuple[object, ...]]:
+        """Let an error pass from one process to another, whatever arguments it was made of."""
+        return _rebuilt, (type(self), self.args, self.__dict__)
+
+
+def _rebuilt(kind: type[FrametoolError], message: tuple[object, ...], state: dict[str, object]) -> FrametoolError:
+    error = kind.__new__(kind, *message)
+    error.args = message
+    error.__dict__.update(state)
+    return error
+
 
 class ValueInvalid(FrametoolError, ValueError):
     """Report a number, rotation or name that cannot be used."""
@@ -205,8 +216,10 @@ def listing(names: Iterable[str], most: int = 20) -> str:
 
 
 def printable(name: str) -> str:
-    """Return a name as a terminal may show it: control characters as escapes, so that none can steer it."""
-    return name if name.isprintable() else repr(name)[1:-1]
+    """Return text on one line as a terminal may show it: control characters as escapes, so that none can steer it."""
+    if name.isprintable():
+        return name
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in name)
 
 
 def quoted(value: object) -> str:

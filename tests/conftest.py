@@ -8,12 +8,19 @@ import sys
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
+from hypothesis import settings
 
 from frametool import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
+
+    from oracles_of_use import Tool
+
+# the same examples in every run, however busy the machine is
+settings.register_profile("steady", deadline=None, derandomize=True)
+settings.load_profile("steady")
 
 
 class Outcome(NamedTuple):
@@ -54,3 +61,12 @@ def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("FRAMETOOL_TREE", raising=False)
     monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.setitem(os.environ, "COLUMNS", "100")
+
+
+@pytest.fixture
+def tool(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Tool:
+    """Run the command line in this process, in an empty folder, with the oracles of the fuzz."""
+    from oracles_of_use import Tool
+
+    monkeypatch.chdir(tmp_path)
+    return Tool(monkeypatch)

@@ -68,6 +68,13 @@ def test_applying_a_product_is_applying_twice() -> None:
     assert np.allclose((POSES @ OTHERS).apply(SHIFTS), POSES.apply(OTHERS.apply(SHIFTS)), rtol=0.0, atol=2e-14)
 
 
+def test_the_power_of_a_wrench_on_a_twist_is_the_same_seen_from_anywhere() -> None:
+    twists, wrenches = POSES.log(), OTHERS.log()
+    here, there = np.sum(twists * wrenches, axis=1), np.sum(POSES.apply_twist(twists) * POSES.apply_wrench(wrenches), axis=1)
+    assert np.allclose(here, there, rtol=0.0, atol=1e-12)
+    assert np.allclose(POSES[0].apply_twist(twists)[0], POSES.apply_twist(twists)[0], rtol=0.0, atol=0.0)
+
+
 def test_q_and_minus_q_are_one_rotation() -> None:
     minus = Rotation.of(*(-part for part in POSES.rotation.components))
     assert np.all(minus.is_close(POSES.rotation, angle=0.0))

@@ -6,9 +6,11 @@ import json
 import os
 import pty
 import re
+import select
 import signal
 import subprocess
 import sys
+import termios
 import xml.etree.ElementTree as ET
 from importlib import import_module
 from importlib.util import find_spec
@@ -214,7 +216,7 @@ def test_a_closed_pipe_ends_an_endless_run_quietly() -> None:
     with tool:
         assert tool.stdout.readline().startswith("t,turtle")
         tool.stdout.close()
-        assert (tool.wait(20), tool.stderr.read()) == (-signal.SIGPIPE, "")
+        assert (tool.wait(), tool.stderr.read()) == (-signal.SIGPIPE, "")
 
 
 def test_an_interrupt_prints_the_summary_and_exits_130() -> None:
@@ -227,7 +229,7 @@ def test_an_interrupt_prints_the_summary_and_exits_130() -> None:
         for _ in range(3):
             tool.stdout.readline()
         tool.send_signal(signal.SIGINT)
-        _, err = tool.communicate(timeout=20)
+        _, err = tool.communicate()
     assert tool.returncode == 130
     assert "final distance to turtle1" in err
     assert "Traceback" not in err
@@ -249,7 +251,7 @@ def test_in_real_time_one_key_is_enough_and_an_open_stdin_does_not_hold_the_end_
         assert tool.stderr is not None
         tool.stdin.write("up\n")
         tool.stdin.flush()
-        assert tool.wait(20) == 0
+        assert tool.wait() == 0
         assert tool.stdout.read().count(",turtle1,") == 25
         assert tool.stderr.read().endswith("0.4 s simulated; wall hits: 0\n")
 
@@ -264,7 +266,7 @@ def test_an_interrupt_ends_a_run_that_waits_for_keys(more: tuple[str, ...]) -> N
         tool.stdin.flush()
         tool.stdout.readline()
         tool.send_signal(signal.SIGINT)
-        assert tool.wait(20) == 130
+        assert tool.wait() == 130
         assert "simulated; wall hits: 0\n" in tool.stderr.read()
 
 
@@ -284,12 +286,42 @@ def test_keys_drive_the_turtle_in_a_terminal_and_commands_go_to_stdout() -> None
         drawn = b""
         while chunk := _read(ours):
             drawn += chunk
-        assert tool.wait(20) == 0
+        assert tool.wait() == 0
     os.close(ours)
     assert first["turtle"] == "turtle2"
     assert any(each["turtle"] == "turtle1" and each["linear"]["x"] == 2.0 for each in lines)
     assert "→" in drawn.decode()
     assert b"\x1b[?25h" in drawn  # the cursor is back
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("name", [("follow", "--live", "--duration", "inf"), ("teleop",)])
+def test_a_signal_gives_the_terminal_back_with_its_cursor_and_leaves_no_file(
+    number: signal.Signals, name: tuple[str, ...], tmp_path: Path,
+) -> None:  # fmt: skip
+    ours, theirs = pty.openpty()
+    before = termios.tcgetattr(theirs)
+    tool = subprocess.Popen(
+        [*TOOL, "sim", *name, "-o", "run.csv"], stdin=theirs, stderr=theirs, stdout=theirs, cwd=tmp_path,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "LINES": "24", "PYTHONPATH": str(console.ROOT)},
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # noqa: PLW1509 - ignored under nohup
+    )  # fmt: skip
+    drawn = b""
+    while "→" not in drawn.decode(errors="replace"):
+        drawn += os.read(ours, 1 << 16)
+    tool.send_signal(number)
+    while tool.poll() is None:
+        if select.select([ours], [], [], 0.05)[0]:
+            drawn += os.read(ours, 1 << 16)
+    assert termios.tcgetattr(theirs) == before
+    os.close(theirs)
+    while chunk := _read(ours):
+        drawn += chunk
+    os.close(ours)
+    assert drawn.rindex(b"\x1b[?25h") > drawn.rindex(b"\x1b[?25l")
+    assert tool.returncode == (130 if number == signal.SIGINT else -number)
+    assert b"Traceback" not in drawn
+    assert list(tmp_path.iterdir()) == []
 
 
 def _read(terminal: int) -> bytes:

@@ -5,6 +5,7 @@ Nothing is imported here that takes time: from the first moment on Ctrl-C ends t
 
 from __future__ import annotations
 
+import os
 import sys
 from io import TextIOWrapper
 from typing import TYPE_CHECKING
@@ -35,6 +36,7 @@ IN_OUT, INTERRUPTED = 5, 130  # exit codes
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line as a program of its own and exit with its status."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads that nothing here uses cost memory
     try:
         from frametool.cli.signals import with_signals
 
@@ -48,6 +50,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
     from frametool.cli.signals import die_of
     from frametool.cli.stderr import discard, say, say_warning
+    from frametool.documents.limits import DEEPEST
     from frametool.errors import heard_by
 
     if sys.stdout is None:
@@ -55,6 +58,7 @@ def run(arguments: list[str]) -> int:
         return IN_OUT
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.encoding.lower() != "utf-8":
         sys.stdout.reconfigure(encoding="utf-8")  # the same bytes in every locale
+    sys.setrecursionlimit(max(sys.getrecursionlimit(), 20 * DEEPEST))  # a document may be so deep, a walk some calls
     status = 0
     try:
         with heard_by(say_warning):
@@ -64,6 +68,12 @@ def run(arguments: list[str]) -> int:
         from signal import SIGPIPE
 
         status = die_of(SIGPIPE)  # as `cat` does when its reader is gone
+    except MemoryError:
+        say("out of memory")
+        status = IN_OUT
+    except ImportError as error:  # numpy's tells of missing memory and files in many lines, the cause in the last one
+        say(f"a library cannot be loaded: {str(error).strip().splitlines()[-1]}")
+        status = IN_OUT
     except OSError as error:
         if status != IN_OUT:  # else it was told, and what is still in the buffer fails again
             say((error.strerror or str(error)).lower())
@@ -92,17 +102,21 @@ def _run(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except click.ClickException as error:
-        problem = Misused(_usage(error))
+        problem = Misused(_usage(error, arguments))
     except FrametoolError as error:
         problem = error
     say_error(problem, in_json=wants_json(arguments))
     return problem.exit_code
 
 
-def _usage(error: click.ClickException) -> str:
-    """Put a usage error on one line, with how the command is called."""
+def _usage(error: click.ClickException, arguments: list[str]) -> str:
+    """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
+    from frametool.errors import SHOWN, quoted
+
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
+    for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
+        message = message.replace(repr(text), quoted(text)).replace(text, quoted(text)[1:-1])
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
     if ctx is None or ctx.parent is None:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from frametool.cli.help import WithHelp
-from frametool.errors import ValueInvalid
+from frametool.cli.stderr import say
+from frametool.errors import ValueInvalid, quoted
 from frametool.formats import writers
 from frametool.geometry.euler import AXES
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notation
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
-SPELLINGS = [f"{name}:AXES" if name == "euler" else name for name in REPRESENTATIONS]
+SPELLINGS = [row.spelling for row in REPRESENTATIONS.values()]
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file, 130 interrupted."
 
 
@@ -46,13 +47,23 @@ class Command(WithHelp):
 
 
 class Text(click.ParamType[str]):
-    """A text argument, without the blank that shields negative numbers."""
+    """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes."""
 
     name = "text"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
-        """Take the shield off."""
+        """Remove the blank."""
         return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
+
+
+class Utf8(Text):
+    """Text that will be part of a result."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse bytes that are no text."""
+        if any("\ud800" <= each <= "\udfff" for each in str(value)):
+            self.fail(f"{quoted(value)} is not UTF-8 text", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 class File(Text):
@@ -103,22 +114,33 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
 
         done, comma, begun = incomplete.rpartition(",")
         names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
-        if begun.startswith("euler"):
-            names += [f"{begun.partition(':')[0]}:{axes}" for axes in AXES]
+        spec = begun.partition(":")[0]
+        if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
+            names += [f"{spec}:{axes}" for axes in AXES]
         return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
 
 
+TEXT = Text()
+UTF8 = Utf8()
+FILE = File()
 VERBOSE = "frametool.verbose"  # where a command's context keeps that -v was given
 
 
-def be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> bool:
-    """Remember that -v was given, for whatever opens files."""
+def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:
     context.meta[VERBOSE] = chosen
-    return chosen
 
 
-TEXT = Text()
-FILE = File()
+verbose_option = click.option(
+    "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
+    help="say on stderr what each input was taken for",
+)  # fmt: skip
+
+
+def say_if_verbose(text: str) -> None:
+    """Write a line on stderr if the command was called with -v."""
+    context = click.get_current_context(silent=True)
+    if context is not None and context.meta.get(VERBOSE):
+        say(text)
 
 
 def result_options(what: str) -> Callable[[Function], Function]:

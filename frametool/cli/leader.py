@@ -10,8 +10,9 @@ import click
 
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, alternatives
-from frametool.sim.command_file import read_script, read_twists
+from frametool.sim.command_file import read_commands, read_script
 from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
+from frametool.text.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,7 +31,7 @@ def leader_of(argument: str, seed: int, *, paced: bool) -> MakeLeader:
     if argument == "-":
         return _from_stdin(paced=paced)
     if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
-        raise click.UsageError(f"no leader {argument!r}{alternatives(argument, LEADERS, 'leaders')}, or a file")
+        raise click.UsageError(f"no leader {shown(argument)}{alternatives(argument, LEADERS, 'leaders')}, or a file")
     return scripted(read_script(Source(argument, read_text(argument))))
 
 
@@ -39,9 +40,9 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
     if sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe commands in, or see frametool sim teleop")
     if not paced:
-        return scripted(read_twists(stdin_lines(), "stdin"))
+        return scripted(read_commands(stdin_lines(), "stdin"))
     mailbox = Mailbox()
-    mailbox.fill_from(read_twists(stdin_lines(), "stdin", period_ns=0))
+    mailbox.fill_from(read_commands(stdin_lines(), "stdin", period_ns=0))
     return lambda: mailbox
 
 

@@ -8,6 +8,7 @@ import click
 
 from frametool.cli.command import TEXT
 from frametool.cli.trees import frame_name
+from frametool.errors import UnknownFrame
 from frametool.geometry.representations import notation
 
 if TYPE_CHECKING:
@@ -59,8 +60,10 @@ class RowFrames:
         fixed_target, fixed_source = self._fixed(target, source)
 
         def edge_of(names: str) -> Rigid:
-            first, _, second = names.partition("\0")
-            return tree.lookup(fixed_target or first, fixed_source or second or first, at).components
+            cells = names.split("\0") if len(frames) == 2 else [names]
+            if len(cells) > len(frames):
+                raise UnknownFrame(names, known=tree.frames)  # a NUL in a cell is no end of a name
+            return tree.lookup(fixed_target or cells[0], fixed_source or cells[-1], at).components
 
         fixed_target = fixed_target and frame_name(fixed_target, tree)
         fixed_source = fixed_source and frame_name(fixed_source, tree)

@@ -1,4 +1,4 @@
-"""Results on their way out: which form, and to where."""
+"""Results: in which form they are written, and where to."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
+from frametool.errors import printable
 from frametool.formats import FORMATS, by_suffix, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
@@ -36,7 +37,7 @@ class Output:
         deg: bool = False,
         keep_sign: bool = False,
     ) -> None:
-        """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+        """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
         self.told = format_name or by_suffix(output, writers(what))
@@ -75,7 +76,7 @@ class Output:
             self.text(write_tree(tree, self.style))
 
     def tell_of_lock(self, poses: Sequence[Pose]) -> None:
-        """Say of a single result that its Euler angles are not unique."""
+        """Report that the Euler angles of a single result are not unique."""
         if len(poses) == 1 and any(is_locked(poses[0], form) for form in self.style.notations):
             say("note: gimbal lock: the angles are not unique; the third was set to 0")
 
@@ -106,7 +107,7 @@ class Output:
         """Write text as it comes; into a file, whole or not at all."""
         with writing(self.path, force=self.force) as write:
             for piece in pieces:
-                write(piece)
+                write("\n".join(map(printable, piece.split("\n"))) if self.style.form == "text" else piece)
 
     def text(self, text: str) -> None:
         """Write text."""

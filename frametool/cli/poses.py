@@ -11,7 +11,7 @@ from frametool.documents.source import Source, read_text
 from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
-from frametool.grammar.rotation import read_homogeneous, rotation_of
+from frametool.grammar.rotation import read_spelled, rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -116,8 +116,8 @@ def pose_from_numbers(
     size = len(form.representation.columns)
     reading = Reading(Source(INLINE, ""), degrees=degrees, normalize=normalize)
     try:
-        if len(texts) == 16 and size == 9:
-            return Pose(*read_homogeneous(form, texts, INDICES, reading))
+        if (whole := form.representation.whole) and len(texts) == len(whole.columns):
+            return Pose(*read_spelled(form, texts, INDICES, reading))
         if len(texts) not in (size, size + 3):
             expected = f"{size} numbers ({' '.join(form.columns)}), or {size + 3} with x y z before them"
             raise click.UsageError(f"{form.spec} has {expected}; found {len(texts)}")

@@ -57,14 +57,6 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
             signal.signal(number, signal.SIG_DFL)
 
 
-def leave_signals() -> None:
-    """Let Ctrl-C pass and SIGTERM and SIGHUP end the process at once: for workers, whom their parent looks after."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, signal.SIG_DFL)
-
-
 @contextmanager
 def whole_lines() -> Iterator[None]:
     """Hold Ctrl-C back until a block of lines is written."""

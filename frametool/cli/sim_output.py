@@ -1,4 +1,4 @@
-"""A scene on its way to the user: steps out of the simulation, to stdout, stderr, a drawing, a plot."""
+"""What a run of turtles shows, and where: records to stdout or a file, messages to stderr, a drawing, a plot."""
 
 from __future__ import annotations
 
@@ -6,58 +6,67 @@ import os
 import sys
 from contextlib import ExitStack
 from importlib import import_module
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Number
+from frametool.cli.command import TEXT, decorated
+from frametool.cli.sim_options import REACH
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.errors import FileProblem
+from frametool.formats import FORMATS
 from frametool.frames.stamps import BILLION
-from frametool.sim.progress import Progress
+from frametool.grammar.result import Style
+from frametool.sim.run_summary import RunSummary
 from frametool.sim.simulate import simulate
-from frametool.sim.step_writer import EMITS, FORMS, Writer
+from frametool.sim.step_writer import EMITS, FORMS, StepWriter
+from frametool.text.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.cli.sink import Write
     from frametool.sim.scene import Scene
-    from frametool.sim.simulate import Step
+    from frametool.sim.simulate import SimulationStep
     from frametool.view.drawing import Drawing
 
-    Watch = Callable[[Step], None]
+    Watch = Callable[[SimulationStep], None]
 
-SUFFIXES = {".csv": "csv", ".json": "json", ".jsonl": "json", ".txt": "text", ".yaml": "yaml", ".yml": "yaml"}
 PLOTS = {".svg": "frametool.view.plot_svg", ".html": "frametool.view.plot_html", ".png": "frametool.view.plot_png"}
 
 
-def play_options(function: Any) -> Any:
-    """Add to a command the options that say what is shown of a simulation."""
-    options = [
-        click.option("--emit", type=click.Choice(EMITS), default="commands", show_default=True,
-                     help="followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`"),
+def format_options(function: Any) -> Any:
+    """Add to a command the options that say in which form, and where to, its result is written."""
+    options = (
         click.option("-f", "--format", "format_name", type=click.Choice(FORMS),
                      help="form of the records  [default: text on a terminal, yaml otherwise]"),
         click.option("--precision", type=click.IntRange(0, 30), metavar="N",
                      help="digits after the point  [default: the shortest text that reads back to the same bits]"),
         click.option("-o", "--output", type=TEXT, metavar="FILE",
                      help="write there instead of stdout, whole or not at all"),
-        click.option("--reach", type=Number(), default=0.5, show_default=True, metavar="D",
-                     help="metres that count as having come to the target"),
+        click.option("--plot", type=TEXT, metavar="FILE", help="draw the result into a .svg, .html or .png"),
+        click.option("--force", is_flag=True, help="let --output and --plot replace existing files"),
+    )  # fmt: skip
+    return decorated(function, options)
+
+
+def output_options(function: Any) -> Any:
+    """Add to a command the options that say what is shown of a run."""
+    options = (
+        click.option("--emit", type=click.Choice(EMITS), default="commands", show_default=True,
+                     help="followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`"),
+        REACH,
         click.option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
         click.option("--live", is_flag=True, help="draw the turtles in the terminal, in real time"),
-        click.option("--plot", type=TEXT, metavar="FILE", help="draw the run into a .svg, .html or .png"),
-        click.option("--force", is_flag=True, help="let --output and --plot replace existing files"),
-    ]  # fmt: skip
-    for option in reversed(options):
-        function = option(function)
-    return function
+        format_options,
+    )  # fmt: skip
+    return decorated(function, options)
 
 
-class Show:
-    """What is shown of a simulation, and where: what the options of a command say."""
+class SimOutput:
+    """What is shown of a run, and where: what the options of a command say."""
 
     def __init__(
         self, *, emit: str = "commands", format_name: str | None = None, precision: int | None = None,
@@ -69,8 +78,7 @@ class Show:
         Raises click.UsageError, FileProblem.
         """
         self.emit = emit
-        self.form = form_of(format_name, output)
-        self.number = number_writer(precision)
+        self.style = style_of(format_name, output, precision)
         self.leaders = leaders
         self.output = None if output == "-" else output
         self.reach = reach
@@ -78,35 +86,33 @@ class Show:
         self.live = live
         self.plot = plot
         self.force = force
-        self._check()
-
-    def _check(self) -> None:
-        if self.reach < 0.0:
-            raise click.UsageError(f"--reach must be 0 or more, found {self.reach:g}")
-        if self.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
+        if reach < 0.0:
+            raise click.UsageError(f"--reach must be 0 or more, found {reach:g}")
+        if live and not (sys.stdout.isatty() or sys.stderr.isatty()):
             raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        check_files(self.plot, self.output, force=self.force)
+        check_files(plot, self.output, force=force)
 
-    def play(self, scene: Scene) -> None:
+    def run(self, scene: Scene) -> None:
         """Run a scene to its end and sum it up on stderr.
 
         Raises KeyboardInterrupt after the summary if it was interrupted.
         """
-        progress = Progress(scene, self.reach)
+        summary = RunSummary(scene, self.reach)
         drawing = self._drawing(scene)
         interrupted = False
         try:
             with ExitStack() as stack:
-                watchers = [progress.watch, *self._watchers(scene, stack), *([drawing.watch] if drawing else [])]
+                watchers = [summary.watch, *self._watchers(scene, stack), *([drawing.watch] if drawing else [])]
                 for step in simulate(scene):
                     for watch in watchers:
                         watch(step)
         except KeyboardInterrupt:  # leaves no file: what it holds is not the whole run
             interrupted = True
-        for line in progress.lines():
+        for line in summary.lines():
             say(line)
-        if drawing:
-            self._save(drawing)
+        if drawing and self.plot:
+            with writing(self.plot, force=self.force) as write:
+                write(import_module(PLOTS[suffix_of(self.plot)]).plot(drawing))
         if interrupted:
             raise KeyboardInterrupt
 
@@ -121,78 +127,64 @@ class Show:
     def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
         """Open what the steps go to; the stack closes it."""
         if self.realtime:
-            yield Pace().wait
+            yield RealTimeClock().wait
         if self.live:
             from frametool.view.live import Screen
 
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
         else:
-            yield Log().watch
+            yield EventLog().watch
         if self.output is not None or not (self.live and sys.stdout.isatty()):
             yield self._writing(stack.enter_context(writing(self.output, force=self.force)), scene)
-
-    def _save(self, drawing: Drawing) -> None:
-        """Write the plot in the form that its suffix names."""
-        path = str(self.plot)
-        with writing(path, force=self.force) as write:
-            write(import_module(PLOTS[suffix_of(path)]).plot(drawing))
 
     def _writing(self, write: Write, scene: Scene) -> Watch:
         """Return what writes a step's records, each at once, so that a reader at the other end of a pipe sees it."""
         several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
-        writer = Writer(self.emit, self.form, self.number, leaders=self.leaders, labelled=several)
+        writer = StepWriter(self.emit, self.style, leaders=self.leaders, labelled=several)
 
-        def watch(step: Step) -> None:
+        def watch(step: SimulationStep) -> None:
             for text in writer.write(step):
                 write(text)
 
         return watch
 
 
-class Pace:
+class RealTimeClock:
     """Keep simulated time from running ahead of the clock."""
 
     def __init__(self) -> None:
         """Start the clock."""
-        from time import monotonic, sleep
-
-        self._sleep, self._clock = sleep, monotonic
         self._start = monotonic()
 
-    def wait(self, step: Step) -> None:
+    def wait(self, step: SimulationStep) -> None:
         """Wait until a step is due."""
-        ahead = step.t_ns / BILLION - (self._clock() - self._start)
+        ahead = step.t_ns / BILLION - (monotonic() - self._start)
         if ahead > 0.0:
-            self._sleep(ahead)
+            sleep(ahead)
 
 
-class Log:
-    """Tell on stderr what turtlesim and the followers log; of a wall once for each contact."""
+class EventLog:
+    """Print on stderr what turtlesim and the followers log; a wall once for each contact."""
 
     def __init__(self) -> None:
-        """Begin with no turtle at a wall."""
+        """Create the log of a run in which no turtle is at a wall yet."""
         self._at_wall: frozenset[str] = frozenset()
 
-    def watch(self, step: Step) -> None:
-        """Tell of one step."""
-        for line in step.log:
+    def watch(self, step: SimulationStep) -> None:
+        """Print what one step logged."""
+        new = (str(hit) for hit in step.walls if hit.turtle not in self._at_wall)
+        for line in (*step.log, *new):
             say(f"{step.t_ns / BILLION:.3f} s: {line}")
-        for hit in step.walls:
-            if hit.turtle not in self._at_wall:
-                say(f"{step.t_ns / BILLION:.3f} s: {hit}")
         if step.is_tick:
             self._at_wall = frozenset(hit.turtle for hit in step.walls)
 
 
-def form_of(format_name: str | None, output: str | None) -> str:
-    """Settle the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
-    by_suffix = SUFFIXES.get(suffix_of(output or ""))
-    return format_name or by_suffix or ("text" if output is None and sys.stdout.isatty() else "yaml")
-
-
-def number_writer(precision: int | None) -> Callable[[float], str] | None:
-    """Return what writes numbers with so many decimals; None for the form's own way."""
-    return None if precision is None else f"{{:.{precision}f}}".format
+def style_of(format_name: str | None, output: str | None, precision: int | None) -> Style:
+    """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+    suffix = suffix_of(output or "")
+    by_suffix = next((name for name in FORMS if name in FORMATS and suffix in FORMATS[name].suffixes), None)
+    default = "text" if suffix == ".txt" or (output is None and sys.stdout.isatty()) else "yaml"
+    return Style(format_name or by_suffix or default, precision=precision)
 
 
 def suffix_of(path: str) -> str:
@@ -206,9 +198,9 @@ def check_files(plot: str | None, output: str | None, *, force: bool) -> None:
     Raises click.UsageError, FileProblem, ValueInvalid when matplotlib is missing.
     """
     if plot and suffix_of(plot) not in PLOTS:
-        raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {plot!r}")
+        raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {shown(plot)}")
     if plot and output and os.path.realpath(plot) == os.path.realpath(output) and not is_special(plot):
-        raise click.UsageError(f"--output and --plot are the same file: {plot}")
+        raise click.UsageError(f"--output and --plot are the same file: {shown(plot)}")
     for path in filter(None, (plot, output)):
         refuse_existing(path, force=force)
         if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):

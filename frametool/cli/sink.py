@@ -11,7 +11,7 @@ from itertools import count
 from typing import TYPE_CHECKING, BinaryIO
 
 from frametool.cli.signals import whole_lines
-from frametool.errors import FileProblem, printable
+from frametool.errors import FileProblem, ValueInvalid, printable, quoted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -67,13 +67,20 @@ def _own_stream(path: str) -> int | None:
 
 def _writer(stream: BinaryIO, name: str) -> Write:
     def write(piece: str | bytes) -> None:
-        view = memoryview(piece.encode() if isinstance(piece, str) else piece)
+        view = memoryview(_encoded(piece) if isinstance(piece, str) else piece)
         with _problems_of(name), whole_lines():
             while view:  # an unbuffered stream may take a part
                 view = view[stream.write(view) :]
             stream.flush()
 
     return write
+
+
+def _encoded(text: str) -> bytes:
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        raise ValueInvalid(f"{quoted(error.object[error.start :])} cannot be written as UTF-8 text") from None
 
 
 @contextmanager

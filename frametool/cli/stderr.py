@@ -7,14 +7,14 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning
+from frametool.errors import FrametoolError, FrametoolWarning, LookupFailed, Tf2Warning, printable
 
 if TYPE_CHECKING:
     from typing import TextIO
 
 
 def tell(text: str) -> None:
-    """Write a line; that stderr is closed or on a full disk does not change what the data is worth."""
+    """Write lines; that stderr is closed or on a full disk does not change what the data is worth."""
     if sys.stderr is None:
         return
     try:
@@ -24,13 +24,13 @@ def tell(text: str) -> None:
 
 
 def say(text: str) -> None:
-    """Write a line about the work, under the program's name."""
-    tell(f"frametool: {text}")
+    """Write one line about the work, under the program's name."""
+    tell(printable(f"frametool: {text}"))
 
 
 def say_warning(message: str, _rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
     """Write a warning; what tf2 would have logged stands there in its own words."""
-    tell(message if kind is Tf2Warning else f"frametool: warning: {message}")
+    tell(printable(message if kind is Tf2Warning else f"frametool: warning: {message}"))
 
 
 def say_error(error: FrametoolError, *, in_json: bool) -> None:
@@ -40,8 +40,12 @@ def say_error(error: FrametoolError, *, in_json: bool) -> None:
 
         tell(as_json(error))
         return
-    snippet = getattr(error, "snippet", "")
-    say(f"{error}\n{snippet}" if snippet else str(error))
+    if isinstance(error, LookupFailed):  # a loop is told by tf2 on a line for each frame
+        tell("\n".join(map(printable, f"frametool: {error}".split("\n"))))
+    else:
+        say(str(error))
+    if snippet := getattr(error, "snippet", ""):
+        tell(snippet)
 
 
 def discard(stream: TextIO) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Notations, be_verbose
+from frametool.cli.command import FILE, TEXT, UTF8, Notations, decorated, say_if_verbose, verbose_option
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
@@ -28,61 +28,51 @@ if TYPE_CHECKING:
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
+MOST_JOBS = 256
 STREAMED = ("records", "rows")
 RECORDS = readers("records")
-NAMES = (
-    "input_path",
-    "input_form",
-    "columns",
-    "keep",
-    "prefix",
-    "header",
-    "on_error",
-    "max_errors",
-    "jobs",
-    "quiet",
-    "verbose",
-)
+OPTIONS = {
+    "input_path": click.option(
+        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream from this file instead of standard input"
+    ),
+    "input_form": click.option(
+        "--in", "input_form", type=click.Choice(readers(*STREAMED)),
+        help="form of the stream  [default: by suffix or first line]",
+    ),
+    "given": click.option(
+        "--from", "given", type=Notations(), metavar="REP",
+        help="what the rotations of VALUES or of a stream's columns are",
+    ),
+    "columns": click.option(
+        "--columns", type=TEXT, metavar="NAME,..", multiple=True,
+        help="our columns, by name or number; once for each pose",
+    ),
+    "keep": click.option("--keep", is_flag=True, help="add the result's columns instead of replacing ours"),
+    "prefix": click.option(
+        "--prefix", type=UTF8, default="", metavar="TEXT", help="put this before the names of the result's columns"
+    ),
+    "header": click.option(
+        "--no-header", "header", is_flag=True, flag_value=False, default=True,
+        help="a table without names; columns are numbered",
+    ),
+    "on_error": click.option(
+        "--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="how to treat bad rows"
+    ),
+    "max_errors": click.option(
+        "--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N",
+        help="report at most N bad rows; all are counted",
+    ),
+    "jobs": click.option(
+        "--jobs", type=click.IntRange(1, MOST_JOBS), default=1, show_default=True, metavar="N",
+        help="processes for a large stream",
+    ),
+    "quiet": click.option("--quiet", is_flag=True, help="no progress on stderr"),
+}  # fmt: skip
 
 
 def stream_options(function: Function) -> Function:
     """Add to a command the options of streams; `Stream` takes them."""
-    for names, attributes in reversed(OPTIONS):
-        function = click.option(*names, **attributes)(function)
-    return function
-
-
-def _flag(summary: str) -> dict[str, Any]:
-    return {"is_flag": True, "help": summary}
-
-
-def _text(metavar: str, summary: str) -> dict[str, Any]:
-    return {"type": TEXT, "metavar": metavar, "help": summary}
-
-
-def _number(least: int, default: int, summary: str) -> dict[str, Any]:
-    kind = click.IntRange(least)
-    return {"type": kind, "default": default, "show_default": True, "metavar": "N", "help": summary}
-
-
-FORM = {"type": click.Choice(readers(*STREAMED)), "help": "form of the stream  [default: by suffix or first line]"}
-GIVEN = {"type": Notations(), "metavar": "REP", "help": "what the rotations of VALUES or of a stream's columns are"}
-HEADER = {"is_flag": True, "flag_value": False, "default": True, "help": "a table without names; columns are numbered"}
-ON_BAD_ROWS = {"type": click.Choice(ON_ERROR), "default": STOP, "show_default": True, "help": "what bad rows do"}
-OPTIONS: tuple[tuple[tuple[str, ...], dict[str, Any]], ...] = (
-    (("-i", "--input", "input_path"), _text("FILE", "stream from this file instead of standard input")),
-    (("--in", "input_form"), FORM),
-    (("--from", "given"), GIVEN),
-    (("--columns",), _text("NAME,..", "our columns, by name or number; once for each pose") | {"multiple": True}),
-    (("--keep",), _flag("add the result's columns instead of replacing ours")),
-    (("--prefix",), _text("TEXT", "put this before the names of the result's columns") | {"default": ""}),
-    (("--no-header", "header"), HEADER),
-    (("--on-error",), ON_BAD_ROWS),
-    (("--max-errors",), _number(0, MOST, "tell of so many bad rows; all are counted")),
-    (("--jobs",), _number(1, 1, "processes for a large stream")),
-    (("--quiet",), _flag("no progress on stderr")),
-    (("-v", "--verbose"), _flag("say on stderr what was detected") | {"callback": be_verbose}),
-)
+    return decorated(function, [*OPTIONS.values(), verbose_option])
 
 
 class Stream:
@@ -90,9 +80,9 @@ class Stream:
 
     def __init__(self, options: dict[str, Any]) -> None:
         """Take the stream's options out of a command's."""
-        self.options = {name: options.pop(name) for name in NAMES}
-        self.given = one_notation(options.pop("given", None))
         self._tell = partial(say_error, in_json=options.get("format_name") == "json")
+        self.options = {name: options.pop(name) for name in OPTIONS if name in options}
+        self.given = one_notation(self.options.get("given"))
         self.path: str | None = self.options["input_path"]
         if self.path == "-":
             self.path = None
@@ -124,8 +114,8 @@ class Stream:
             form, known_by = self.options["input_form"], ""
             if form is None:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
-            if self.options["verbose"] and known_by:
-                say(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
+            if known_by:
+                say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             request = self._completed(request, output, form)

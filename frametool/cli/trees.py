@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import TEXT, VERBOSE, Text, be_verbose
+from frametool.cli.command import TEXT, Text, say_if_verbose
 from frametool.cli.poses import is_inline, source_of
-from frametool.cli.stderr import say
 from frametool.errors import warn
 from frametool.formats.load import load_sources
 from frametool.formats.recordings import Recording
@@ -42,12 +41,10 @@ def opened(arguments: Sequence[str]) -> list[Recording]:
 
 
 def _opened(path: str) -> Recording:
-    """Open one file; say what it was taken for, if the command was asked to."""
+    """Open one file, of a recording the topics chosen; say what it was taken for, if the command was asked to."""
     context = click.get_current_context(silent=True)
-    asked = {} if context is None else context.meta
-    file = Recording(path, topics=asked.get(TOPICS, ()))
-    if asked.get(VERBOSE):
-        say(file.described)
+    file = Recording(path, topics=() if context is None else context.meta.get(TOPICS, ()))
+    say_if_verbose(file.described)
     return file
 
 
@@ -61,12 +58,6 @@ def _keep_topics(context: click.Context, _: click.Parameter, chosen: Sequence[st
 topic_option = click.option(
     "--topic", type=TEXT, multiple=True, metavar="NAME", expose_value=False, callback=_keep_topics,
     help="read only this topic of a recording; may be repeated",
-)  # fmt: skip
-
-
-verbose_option = click.option(
-    "-v", "--verbose", is_flag=True, expose_value=False, callback=be_verbose,
-    help="say on stderr what each file was taken for",
 )  # fmt: skip
 
 

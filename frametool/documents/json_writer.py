@@ -29,4 +29,5 @@ def dump(value: Any, number: Callable[[float], str] = repr) -> str:
         return f'"{value}"'  # keys and most names, without importing json
     import json
 
-    return json.dumps(value, ensure_ascii=False)
+    is_plain = not isinstance(value, str) or value.isprintable()
+    return json.dumps(value, ensure_ascii=not is_plain)  # control characters and lone surrogates reach no terminal raw

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.grammar.result import columns_of, is_matrix, rotation_numbers
+from frametool.errors import ValueInvalid
+from frametool.grammar.result import carries_position, pose_numbers
+from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -17,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return a header and one row a result; the columns are those of the first."""
-    return _table([dict(_pose_cells(result, style)) for result in results], style)
+    """Return a header and one row a result."""
+    return _table([_pose_row(result, style) for result in results], style)
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
@@ -26,28 +28,25 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     return _table([dict(_record_cells(record)) for record in records], style)
 
 
-def _pose_cells(result: Result, style: Style) -> Iterator[tuple[str, Any]]:
-    """Yield a pose's cells by column name."""
+def _pose_row(result: Result, style: Style) -> dict[str, Any]:
+    """Return a pose's cells by column name.
+
+    An extra that a notation says already (the angle beside an axis) is left out; raises ValueInvalid where two
+    notations need one column.
+    """
     pose = result.pose
-    yield from ((key, name) for key, name in (("name", pose.name), ("parent", pose.parent)) if name is not None)
-    whole = pose.position is not None and any(is_matrix(form) for form in style.notations)
-    if pose.position is not None and not whole:
-        yield from zip("xyz", pose.position, strict=True)
-    for form in style.notations if pose.rotation is not None else ():
-        numbers = rotation_numbers(pose, form, style)
-        if whole and is_matrix(form):
-            yield from _homogeneous_cells(numbers, pose.position or ())
-        else:
-            yield from zip(columns_of(form, style), numbers, strict=True)
-    yield from result.extras.items()
-
-
-def _homogeneous_cells(numbers: Sequence[float], position: Sequence[float]) -> Iterator[tuple[str, float]]:
-    """Yield the cells m11 .. m44 of a 4x4 pose."""
-    for row in range(3):
-        yield from ((f"m{row + 1}{column + 1}", numbers[3 * row + column]) for column in range(3))
-        yield f"m{row + 1}4", position[row]
-    yield from zip(("m41", "m42", "m43", "m44"), (0.0, 0.0, 0.0, 1.0), strict=True)
+    cells: dict[str, Any] = {
+        key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name is not None
+    }
+    if pose.position is not None and not any(carries_position(each) for each in style.notations):
+        cells |= zip("xyz", pose.position, strict=True)
+    for notation in style.notations if pose.rotation is not None else ():
+        columns, numbers = pose_numbers(pose, notation, style)
+        rotation = dict(zip(columns, numbers, strict=True))
+        if twice := [name for name in rotation if cells.get(name, rotation[name]) != rotation[name]]:
+            raise ValueInvalid(f"columns {', '.join(twice)} would stand twice; write json or yaml, or one --to at once")
+        cells |= rotation
+    return cells | {key: value for key, value in result.extras.items() if key not in cells}
 
 
 def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -61,18 +60,20 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:
-    """Write rows under the columns of the first."""
+    """Write rows under the columns of all of them."""
     if not rows:
         return ""
-    columns = list(rows[0])
-    lines = [",".join(columns)]
-    lines += [",".join(_cell(row.get(column, ""), style) for column in columns) for row in rows]
-    return "\n".join(lines) + "\n"
+    columns = list(dict.fromkeys(name for each in rows for name in each))
+    return row(columns, style) + "".join(row([each.get(column, "") for column in columns], style) for each in rows)
+
+
+def row(cells: Iterable[Any], style: Style) -> str:
+    """Return one line of cells with its line end."""
+    return ",".join(_cell(value, style) for value in cells) + "\n"
 
 
 def _cell(value: Any, style: Style) -> str:
     """Write one cell, quoted where a reader would split it."""
     if isinstance(value, float):
         return style.number(value)
-    text = "" if value is None else str(value)
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
+    return quoted("" if value is None else str(value))

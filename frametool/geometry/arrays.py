@@ -7,41 +7,39 @@ from __future__ import annotations
 
 import numpy as np
 from numpy import any as some
-from numpy import cbrt, copysign, degrees, frexp, ldexp, maximum, minimum, radians, sqrt, where
+from numpy import copysign, fmod, frexp, ldexp, maximum, minimum, sqrt, where
 
 from frametool.errors import ValueInvalid
-from frametool.geometry.trig import doubled_arctan, half_sincos, largest
+from frametool.geometry import far_angles, trig
 
 __all__ = [
-    "all_near_one", "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp",
-    "half_sincos", "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some",
-    "sqrt", "where",
+    "all_near_one", "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp",
+    "largest", "ldexp", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.geometry.types import Array, Components, Kernel, Number, Pair, Quaternion
+    from frametool.geometry.types import Array, Components, Four, Kernel, Number, Two
 
 BLOCK = 16384  # rows: numpy's calls cost little beside their work, and the temporaries of a kernel stay in the cache
 WIDE = 12  # columns in and out: kernels with more have more temporaries, and get three quarters of the rows
-SQRT_HALF = float(np.sqrt(0.5))
 np.empty(2**21)  # 16 MiB given back untouched: from then on glibc reuses the memory of blocks instead of mapping anew
 
 
-def length(x: Number, y: Number, z: Number) -> Number:
-    """Return the length of a vector; np.hypot takes two numbers and six times as long."""
-    return sqrt(x * x + y * y + z * z)
+def largest(x: Array) -> float:
+    """Return the largest magnitude, NaN if there is one."""
+    return float(np.abs(x).max(initial=0.0))
 
 
-def all_near_one(values: Number, tolerance: float) -> bool:
+def all_near_one(values: Array, tolerance: float) -> bool:
     """Say whether all values are within a tolerance of 1; none, and NaN is not."""
     least, most = np.min(values, initial=1.0), np.max(values, initial=1.0)
     return bool(1.0 - tolerance <= least and most <= 1.0 + tolerance)
 
 
-def first_nonzero(*values: Number) -> Number:
+def first_nonzero(*values: Array) -> Array:
     """Return element by element the first value that is not zero, or the last."""
     found = values[0]
     for value in values[1:]:
@@ -51,50 +49,79 @@ def first_nonzero(*values: Number) -> Number:
     return found
 
 
-def canonical_sign(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
+def canonical_sign(x: Array, y: Array, z: Array, w: Array) -> Four[Array]:
     """Return q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0.
 
     A product with +-1 costs a quarter of `where`; only exact zeros need the longer way.
     """
     sign = copysign(1.0, first_nonzero(w, x, y, z))
-    return tuple(part * sign if np.all(part) else where(sign < 0.0, 0.0 - part, part) for part in (x, y, z, w))
+    signed = [part * sign if np.all(part) else where(sign < 0.0, 0.0 - part, part) for part in (x, y, z, w)]
+    return signed[0], signed[1], signed[2], signed[3]
 
 
-def incline(rise: Number, run: Number) -> Number:
-    """Return the angle of a direction of length 1 to 1e-8, run >= 0.
+def doubled_sincos(y: Array) -> Two[Array]:
+    """Return sine and cosine of 2y, |y| <= pi/4.
 
-    Twice that whose tangent is rise / (length + run), which is at most 1; even parts are exactly pi/4.
+    The rounding of sin y is added to its square, so that the cosine of a right angle vanishes to half an eps.
     """
-    length = 0.5 + 0.5 * (rise * rise + run * run)
-    angle = doubled_arctan(rise / (length + run))
-    even = rise == run
-    return where(even, 0.25 * np.pi, angle) if np.any(even) else angle
+    squared = y * y
+    bend = _polynomial(squared, trig.SINE)
+    bend *= squared
+    bend *= y
+    sine = y + bend
+    rounding = y - sine
+    rounding += bend
+    rounding *= sine
+    rounding *= 2.0
+    squared = sine * sine
+    squared += rounding
+    root = sqrt(1.0 - squared)
+    root *= 2.0
+    root *= sine
+    squared *= -2.0
+    squared += 1.0
+    level = squared < trig.LEVEL
+    if some(level):
+        squared = where(level, trig.RIGHT_ANGLE - abs(y + y) + trig.RIGHT_ANGLE_REST, squared)
+    return root, squared
 
 
-def bearing(y: Number, x: Number, radius: Number) -> Number:
-    """Return the angle of a direction of this length in [-pi, pi], NaN for none."""
-    angle = doubled_arctan(y / (radius + abs(x)))
-    angle *= copysign(1.0, x)
-    angle += np.signbit(x) * copysign(np.pi, y)
-    return angle
+def doubled_arctan(tangent: Array) -> Array:
+    """Return 2 atan(t), |t| <= 1, at most 1 eps off; of 1 it is pi/2 to the bit."""
+    squared = tangent * tangent
+    rest = _polynomial(squared, trig.ARC_ABOVE)
+    rest /= _polynomial(squared, trig.ARC_BELOW)
+    rest *= squared
+    rest *= tangent
+    rest = tangent - rest
+    rest *= 2.0
+    return rest
 
 
-def half_sincos_deg(angle: Number) -> Pair:
-    """Return sine and cosine of half an angle in degrees, exact at multiples of 90 as that of `floats` is."""
-    half = 0.5 * np.fmod(angle, 720.0)
-    quarter = np.rint(half / 90.0)
-    rest = half - 90.0 * quarter
-    sine, cosine = half_sincos(np.radians(2.0 * rest))
-    diagonal = abs(rest) == 45.0
-    sine, cosine = where(diagonal, copysign(SQRT_HALF, rest), sine), where(diagonal, SQRT_HALF, cosine)
-    turns = quarter.astype(np.int64)
-    odd, back = (turns & 1) == 1, (turns & 2) == 2
-    sine, cosine = where(odd, cosine, sine), where(odd, 0.0 - sine, cosine)
-    return where(back, 0.0 - sine, sine), where(back, 0.0 - cosine, cosine)
+def _polynomial(x: Array, coefficients: tuple[float, ...]) -> Array:
+    """Evaluate a polynomial by Horner's rule in one array, lowest coefficient first."""
+    value = x * coefficients[-1]
+    for coefficient in coefficients[-2:0:-1]:
+        value += coefficient
+        value *= x
+    value += coefficients[0]
+    return value
+
+
+def reduced_exactly(x: Array) -> Two[Array]:
+    """Return what is left of angles less the nearest whole numbers of quarter turns, and those numbers modulo 2.
+
+    Rows near enough for `trig.reduced` have what they have among their like.
+    """
+    x = np.atleast_1d(x)
+    rest, turns = trig.reduced(x)
+    for row in np.argwhere(~(abs(x) < trig.FAR)).tolist():
+        rest[*row], turns[*row] = far_angles.reduced_exactly(float(x[*row]))
+    return rest, turns
 
 
 def run(kernel: Kernel, count: int, parts: Components, *args: object) -> Components:
-    """Apply a kernel to components, some or all of them arrays; give `count` component arrays."""
+    """Apply a kernel to components, some or all of them arrays; return `count` component arrays."""
     shape = batch_shape(parts)
     out = np.empty((count, *shape))
     walk(kernel, parts, out.reshape(count, -1), *args)
@@ -102,7 +129,7 @@ def run(kernel: Kernel, count: int, parts: Components, *args: object) -> Compone
 
 
 def rows(kernel: Kernel, count: int, parts: Components, *args: object) -> Array:
-    """Apply a kernel to components; give an array (..., count) of rows."""
+    """Apply a kernel to components; return an array (..., count) of rows."""
     shape = batch_shape(parts)
     out = np.empty((*shape, count))
     walk(kernel, parts, out.reshape(-1, count).T, *args)
@@ -124,28 +151,38 @@ def batch_shape(parts: Components) -> tuple[int, ...]:
 
 def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *args: object) -> None:
     """Fill flat targets block by block with what the kernel makes of the parts."""
-    shape = batch_shape(parts)
-    columns = [part if isinstance(part, float) else np.broadcast_to(part, shape).reshape(-1) for part in parts]
     with np.errstate(all="ignore"):
-        for start, stop in blocks(int(np.prod(shape)), len(parts) + len(targets)):
-            results = kernel(*(_cut(column, start, stop) for column in columns), *args)
-            for target, result in zip(targets, results, strict=True):
-                target[start:stop] = result
+        for place, block in cut(parts, len(targets)):
+            for target, result in zip(targets, kernel(*block, *args), strict=True):
+                target[place] = result
 
 
 def guarded(kernel: Kernel, complain: Callable[[], None]) -> Kernel:
-    """Watch a kernel's first and last component: what is not finite in a row's input is not finite in one of them.
+    """Watch a kernel's results for what is not finite.
 
     `complain` then looks at the input itself, raises if that is to blame, and else lets pass.
     """
 
     def watched(*block: object) -> Components:
         results = kernel(*block)
-        if not np.isfinite(np.sum(results[0]) + np.sum(results[-1])):
+        if not all_finite(results):
             complain()
         return results
 
     return watched
+
+
+def all_finite(results: Components) -> bool:
+    """Tell whether all results are finite, by the first and the last: what goes wrong in a row shows in one of them."""
+    return bool(np.isfinite(np.sum(results[0]) + np.sum(results[-1])))
+
+
+def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:
+    """Cut components, flat, into blocks of contiguous float64 for a kernel that fills so many targets."""
+    shape = batch_shape(parts)
+    columns = [part if isinstance(part, float) else np.broadcast_to(part, shape).reshape(-1) for part in parts]
+    for start, stop in blocks(int(np.prod(shape)), len(parts) + targets):
+        yield slice(start, stop), tuple(_cut(column, start, stop) for column in columns)
 
 
 def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:

@@ -1,147 +1,124 @@
-"""Check many rotations at once: pass what is plainly right block by block, and look at all rows if one is not.
+"""Check and convert many rotations at once: which rows are none and why, and which were normalised.
 
-The rules are those of `quaternion.check` and `matrix.check`, which also word the error of the first bad row.
+The rules are those of one rotation (`Representation.checked`), which also words what is said of a row.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, NamedTuple
+
 import numpy as np
 
 from frametool.errors import ValueInvalid, warn
-from frametool.geometry import arrays, matrix, quaternion
-from frametool.geometry.validation import at_first, first_row
+from frametool.geometry import arrays
+from frametool.geometry.quaternion import SILENT, TOLERATED
+from frametool.geometry.validation import all_finite, at_first, first_row
 
-TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from typing import Any
+    from collections.abc import Sequence
 
-    from frametool.geometry.types import Array, Components, Kernel, Matrix
+    from frametool.geometry.representations import BatchRule, Notation
+    from frametool.geometry.types import Array, Components, Indices
 
-
-class _Irregular(Exception):
-    """A block holds rows that are not plainly rotations."""
-
-
-def unit_quaternions(given: Components, name: str, *, normalize: bool) -> Components:
-    """Check many quaternions and give them unit; those unit to 4 eps keep their bits.
-
-    The rules are those of `quaternion.check`; warnings are one for all rows.
-
-    Raises:
-        ValueInvalid: naming the first row that is no rotation.
-    """
-    copied = np.empty((4, *given[0].shape))
-    columns, flat = [column.reshape(-1) for column in given], copied.reshape(4, -1)
-    for start, stop in arrays.blocks(flat.shape[1]):
-        block = flat[:, start:stop]
-        for target, column in zip(block, columns, strict=True):
-            target[...] = column[start:stop]
-        if not _made_unit(block):
-            return arrays.run(_quaternion_sifter(given, name, normalize=normalize), 4, given)
-    return tuple(copied)
+IDENTITY = 0.0, 0.0, 0.0, 1.0
+NONE = np.empty(0, np.int64)
 
 
-def _made_unit(block: Array) -> bool:
-    """Make a block unit if its rows need no word; most are already."""
-    x, y, z, w = block
-    with np.errstate(over="ignore", invalid="ignore"):
-        squared = quaternion.squared_norm(x, y, z, w)
-    if not arrays.all_near_one(squared, quaternion.SILENT):
-        return False
-    if not arrays.all_near_one(squared, quaternion.UNIT):
-        block[...] = quaternion.unit(x, y, z, w, arrays)
-    return True
+class Rotations(NamedTuple):
+    """Unit quaternions of n rows, the reasons of those that are no rotation, and the rows that were normalised."""
+
+    quaternions: Components
+    reasons: dict[int, str]
+    mended: Indices
 
 
-def _quaternion_sifter(given: Components, name: str, *, normalize: bool) -> Kernel:
-    """Refuse or warn about whatever must be, over all rows; give the kernel that then normalises."""
-
-    def grade(x: Any, y: Any, z: Any, w: Any) -> Components:
-        squared = quaternion.squared_norm(x, y, z, w)
-        if normalize:
-            largest = np.maximum(np.maximum(abs(x), abs(y)), np.maximum(abs(z), abs(w)))
-            return (np.where((largest > 0.0) & (largest < np.inf), 0.0, np.inf),)
-        return (abs(np.sqrt(squared) - 1.0),)
-
-    (off,) = arrays.run(grade, 1, given)
-    refuse_or_warn(off, given, name, "quaternions", lambda row: quaternion.check(*row, normalize=normalize))
-
-    def kernel(x: Any, y: Any, z: Any, w: Any) -> Components:
-        unit = abs(quaternion.squared_norm(x, y, z, w) - 1.0) <= quaternion.UNIT
-        after = quaternion.normalized(x, y, z, w, arrays)
-        return tuple(np.where(unit, old, new) for old, new in zip((x, y, z, w), after, strict=True))
-
-    return kernel
+def read_rotations(
+    notation: Notation, numbers: Sequence[Array], *, degrees: bool = False, normalize: bool = False
+) -> Rotations:
+    """Return the quaternions of rows of numbers in column order; the identity stands for rows that are no rotation."""
+    quaternions, off = _converted(notation, tuple(numbers), degrees=degrees, normalize=normalize)
+    if off is None:
+        return Rotations(tuple(quaternions), {}, NONE)
+    refused = np.flatnonzero(off == np.inf)
+    reasons = {row: _reason(notation, [number[row] for number in numbers], normalize) for row in refused.tolist()}
+    quaternions[:, refused] = np.reshape(IDENTITY, (4, 1))
+    return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)))
 
 
-def refuse_or_warn(off: Any, given: Components, name: str, what: str, check: Callable[..., object]) -> None:
-    """Raise for the first row that is off beyond what is tolerated; warn once for those off beyond silence."""
-    bad = ~(off <= quaternion.TOLERATED)
-    if bad.any():
-        try:
-            check(first_row(given, bad))
-        except ValueInvalid as error:
-            count = int(bad.sum())
-            more = f" ({count} such rows)" if count > 1 else ""
-            raise ValueInvalid(f"{at_first(name, bad)}: {error}{more}") from None
-    odd = (off > quaternion.SILENT) & ~bad
-    if odd.any():
-        largest = float(np.max(off, where=odd, initial=0.0))
-        share = f"{int(odd.sum())} of {odd.size} {what}"
-        warn(f"{name}: {share} are off by up to {largest:.2g} (first: {at_first(name, odd)}) and were normalised")
-
-
-def rotation_quaternions(given: Components, name: str, *, normalize: bool) -> Components:
-    """Check many matrices, nine columns, and give the quaternions of the nearest rotations.
-
-    The rules are those of `matrix.check`; warnings are one for all rows.
+def require_rotations(notation: Notation, given: Components, name: str, *, normalize: bool = False) -> Components:
+    """Return the quaternions of columns of any shape; warn once for all rows that were normalised.
 
     Raises:
-        ValueInvalid: naming the first row that is no rotation.
+        ValueInvalid: naming the first row that is no rotation, and how many there are.
     """
-    try:
-        return arrays.run(_plainly_rotations, 4, given)
-    except _Irregular:
-        return arrays.run(_matrix_sifter(given, name, normalize=normalize), 4, given)
+    shape = arrays.batch_shape(given)
+    quaternions, off = _converted(notation, given, degrees=False, normalize=normalize)
+    if off is not None:
+        _refuse_or_warn(notation, given, name, off.reshape(shape), normalize=normalize)
+    return tuple(quaternions.reshape(4, *shape))
 
 
-def _plainly_rotations(*given: Any) -> Components:
-    """Convert a block of matrices that need no word."""
-    entries: Matrix = given
-    off = matrix.defect(*entries, arrays)
-    if not arrays.largest(off) <= quaternion.SILENT or not matrix.determinant(*entries).min(initial=1.0) > 0.0:
-        raise _Irregular
-    return matrix.to_quaternion(*_projected(entries, off > matrix.ORTHONORMAL), arrays)
+def _converted(notation: Notation, given: Components, *, degrees: bool, normalize: bool) -> tuple[Array, Array | None]:
+    """Return quaternions (4, n) and how far each row was off: inf if refused; None if no row needs a word."""
+    quaternions = np.empty((4, int(np.prod(arrays.batch_shape(given)))))
+    off = None
+    with np.errstate(all="ignore"):
+        for place, block in arrays.cut(given, 4):
+            grades, right = _repaired(notation.representation.batch, block, normalize=normalize)
+            results = notation.to_quaternion(right, arrays, degrees=degrees)
+            if notation.representation.batch is None and not arrays.all_finite(results):
+                grades = np.where(np.isfinite(sum(results)), 0.0, np.inf)
+            for target, result in zip(quaternions, results, strict=True):
+                target[place] = result
+            if grades is not None:
+                off = np.zeros(quaternions.shape[1]) if off is None else off
+                off[place] = grades
+    return quaternions, off
 
 
-def _projected(entries: Matrix, rough: Any) -> Matrix:
-    """Replace the rough rows of a block by their nearest rotations."""
-    if not rough.any():
-        return entries
-    chosen_rows: Matrix = tuple(entry[rough] for entry in entries)
-    nearest = matrix.nearest(*matrix.scaled(*chosen_rows, arrays), arrays)
-    after: Matrix = tuple(entry.copy() for entry in entries)
-    for column, values in zip(after, nearest, strict=True):
+def _repaired(rule: BatchRule | None, block: Components, *, normalize: bool) -> tuple[Array | None, Components]:
+    """Return how far the rows of a block are off, None if no row needs a word; and the block made rotations."""
+    if rule is None:
+        return None, block
+    off = rule.deviation(*block, arrays)
+    worst = arrays.largest(off)
+    if worst <= min(rule.exact, SILENT):
+        return None, block
+    refused = ~(off < np.inf) if normalize else ~(off <= TOLERATED)
+    rough = np.flatnonzero((off > rule.exact) & ~refused)
+    grades = None if worst <= SILENT else np.where(refused, np.inf, 0.0 if normalize else off)
+    return grades, _with_repaired(rule, block, rough) if rough.size else block
+
+
+def _with_repaired(rule: BatchRule, block: Components, rough: Indices) -> Components:
+    """Replace the rough rows of a block by rotations."""
+    if len(rough) == len(block[0]):
+        return rule.repair(*block, arrays)
+    after = tuple(column.copy() for column in block)
+    for column, values in zip(after, rule.repair(*(column[rough] for column in block), arrays), strict=True):
         column[rough] = values
     return after
 
 
-def _matrix_sifter(given: Components, name: str, *, normalize: bool) -> Kernel:
-    """Refuse or warn about whatever must be, over all rows; give the kernel that then projects and converts."""
+def _reason(notation: Notation, row: Sequence[float], normalize: bool) -> str:  # noqa: FBT001
+    """Say why one row is no rotation."""
+    try:
+        notation.representation.checked([float(part) for part in row], normalize=normalize)
+    except ValueInvalid as error:
+        return str(error)
+    return "the numbers are no rotation"
 
-    def grade(*block: Any) -> Components:
-        entries: Matrix = block
-        off = matrix.defect(*entries, arrays)
-        volume = matrix.relative_volume(*entries, arrays)
-        return (np.where(volume > matrix.SINGULAR, 0.0 if normalize else off, np.inf),)
 
-    (off,) = arrays.run(grade, 1, given)
-    refuse_or_warn(off, given, name, "matrices", lambda row: matrix.check(*row, normalize=normalize))
-
-    def kernel(*block: Any) -> Components:
-        entries: Matrix = block
-        rough = ~(matrix.defect(*entries, arrays) <= matrix.ORTHONORMAL)
-        return matrix.to_quaternion(*_projected(entries, rough), arrays)
-
-    return kernel
+def _refuse_or_warn(notation: Notation, given: Components, name: str, off: Array, *, normalize: bool) -> None:
+    """Raise for the first row that is refused; warn once for those off beyond silence."""
+    rule = notation.representation.batch
+    bad, odd = off == np.inf, off > SILENT
+    if bad.any():
+        if rule is None:
+            all_finite(given, name)
+        count = int(bad.sum())
+        more = f" ({count} such rows)" if count > 1 else ""
+        raise ValueInvalid(f"{at_first(name, bad)}: {_reason(notation, first_row(given, bad), normalize)}{more}")
+    if rule is not None and odd.any():
+        share = f"{int(odd.sum())} of {odd.size} {rule.what}"
+        warn(f"{name}: {share} are off by up to {off.max():.2g} (first: {at_first(name, odd)}) and were normalised")

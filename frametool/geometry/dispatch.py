@@ -17,15 +17,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Components, Kernel, Numbers
 
 
-def convert(kernel: Kernel, count: int, given: Components, name: str, *args: object) -> Components:
-    """Run a kernel over what came in: floats for one item, else guarded blocks."""
-    if single(given):
-        return kernel(*given, *args, floats)
-    from frametool.geometry import arrays
-
-    return arrays.run(arrays.guarded(kernel, complain_of(given, name)), count, given, *args, arrays)
-
-
 def checked(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> Components:
     """Run a kernel that not every finite input suits; `check` looks at one item, and at the first row that fails."""
     if single(given):
@@ -70,12 +61,12 @@ def run_with_xp(kernel: Kernel, count: int, given: Components) -> Components:
 
 
 def number(kernel: Callable[..., Any], given: Components) -> Any:
-    """Run a kernel that gives one number."""
+    """Run a kernel that returns one number."""
     return run_with_xp(lambda *parts: (kernel(*parts),), 1, given)[0]
 
 
 def rows(kernel: Kernel, count: int, given: Components, *args: object) -> Array:
-    """Run a kernel that needs functions; give its components as rows (..., count)."""
+    """Run a kernel that needs functions; return its components as rows (..., count)."""
     if single(given):
         return stacked(kernel(*given, *args, floats))
     from frametool.geometry import arrays
@@ -83,8 +74,8 @@ def rows(kernel: Kernel, count: int, given: Components, *args: object) -> Array:
     return arrays.rows(kernel, count, given, *args, arrays)
 
 
-def moved(kernel: Kernel, mover: Components, flatten: Kernel, given: Components, name: str) -> Array:
-    """Move vectors: each by its own mover, or all by the matrix of one."""
+def moved(kernel: Kernel, mover: Components, given: Components, name: str, *, flatten: Kernel | None = None) -> Array:
+    """Move vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster."""
     import numpy as np
 
     if single(given) and single(mover):
@@ -92,9 +83,9 @@ def moved(kernel: Kernel, mover: Components, flatten: Kernel, given: Components,
     from frametool.geometry import arrays
 
     parts = (*mover, *given)
-    if single(mover):
+    if flatten and single(mover):
         kernel, parts = _matrix_kernel(flatten(*mover)), given
-    return arrays.rows(arrays.guarded(kernel, complain_of(given, name)), 3, parts)
+    return arrays.rows(arrays.guarded(kernel, complain_of(given, name)), len(given), parts)
 
 
 def _matrix_kernel(entries: Components) -> Kernel:
@@ -120,27 +111,36 @@ def chosen(components: Components, index: Any) -> Components:
     return tuple(part[index] if getattr(part[index], "shape", ()) else float(part[index]) for part in components)
 
 
-def second_moment(components: Components, heavy: Array | None) -> Array:
-    """Return sum(w q q^T), 4 by 4, walked in blocks."""
-    import numpy as np
+def second_moment(components: Components, mass: Array) -> list[list[float]]:
+    """Return sum(w q q^T), 4 by 4."""
+    heavy = [mass * part for part in components]
+    upper = {(i, j): total(heavy[i], components[j]) for i in range(4) for j in range(i, 4)}
+    return [[upper[min(i, j), max(i, j)] for j in range(4)] for i in range(4)]
 
+
+def total(part: Array, factor: Array | float) -> float:
+    """Return the sum of products, block by block and each by halves: numpy's own order depends on the machine."""
     from frametool.geometry import arrays
 
-    flat = [part.reshape(-1) for part in components]
-    if not flat[0].size:
-        raise ValueInvalid("mean of no rotations; give at least one")
-    mass = None if heavy is None else heavy.reshape(-1)
-    total = np.zeros((4, 4))
-    for start, stop in arrays.blocks(flat[0].size):
-        block = np.stack([part[start:stop] for part in flat])
-        weighted = block if mass is None else block * mass[start:stop]
-        total += np.einsum("in,jn->ij", weighted, block)  # not @: BLAS would start threads
-    return total
+    whole = 0.0
+    for _, (first, second) in arrays.cut((part, factor), 0):
+        products = first * second
+        while products.size > 1:
+            half = products.size // 2
+            products[:half] += products[-half:]
+            products = products[: products.size - half]
+        whole += float(products[0])
+    return whole
 
 
-def mean_rows(components: Components, heavy: Numbers | None) -> Array:
-    """Return the weighted mean of each component."""
+def masses(heavy: Numbers | None, shape: tuple[int, ...]) -> Array:
+    """Return weights of a batch's shape, 1 each if none are told.
+
+    Raises:
+        ValueInvalid: the batch is empty, or the weights are none.
+    """
     import numpy as np
 
-    mass = None if heavy is None else weights(heavy, components[0].shape)
-    return np.array([np.average(part, weights=mass) for part in components])
+    if 0 in shape:
+        raise ValueInvalid("mean of no rotations; give at least one")
+    return np.ones(shape) if heavy is None else weights(heavy, shape)

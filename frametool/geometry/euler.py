@@ -7,10 +7,11 @@ and three axis letters in the order of the rotations. Angles stand in the order 
 from __future__ import annotations
 
 from frametool.geometry.quaternion import EPS, settled
+from frametool.geometry.trig import RADIAN, bearing, half_sincos, half_sincos_deg, incline
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Namespace, Number, Quaternion, Vector
+    from frametool.geometry.types import Condition, Four, Functions, N, Three
 
 LOCK = EPS * EPS  # of the squared radii: beyond 1 eps the angles are still known, and dropping them would be an error
 
@@ -32,19 +33,17 @@ AXES = {
 }  # fmt: skip
 
 
-def to_quaternion(
-    first: Number, second: Number, third: Number, axes: str, xp: Namespace, *, degrees: bool = False
-) -> Quaternion:
+def to_quaternion(first: N, second: N, third: N, axes: str, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
     """Return the quaternion x, y, z, w of three angles about the axes of a convention.
 
     Angles in radians, or in degrees with exact results at multiples of 90.
     Source: the product of three elementary quaternions q_i(a) q_j(b) q_k(c), written out.
     """
     i, j, k, parity, symmetric, static = AXES[axes]
-    half = xp.half_sincos_deg if degrees else xp.half_sincos
-    sa, ca = half(third if static else first)
-    sb, cb = half(second)
-    sc, cc = half(first if static else third)
+    half = half_sincos_deg if degrees else half_sincos
+    sa, ca = half(third if static else first, xp)
+    sb, cb = half(second, xp)
+    sc, cc = half(first if static else third, xp)
     cosines, sines, mixed, turned = ca * cc, sa * sc, sa * cc, ca * sc
     vector = [cb, cb, cb]
     if symmetric:
@@ -62,9 +61,7 @@ def to_quaternion(
     return settled(x, y, z, w) if degrees else (x, y, z, w)
 
 
-def from_quaternion(
-    x: Number, y: Number, z: Number, w: Number, axes: str, xp: Namespace, *, degrees: bool = False
-) -> Vector:
+def from_quaternion(x: N, y: N, z: N, w: N, axes: str, xp: Functions[N], *, degrees: bool = False) -> Three[N]:
     """Return the three angles of a convention, in the order of its letters.
 
     The middle angle lies in [-pi/2, pi/2], or in [0, pi] where the outer axes are the same; the others in (-pi, pi].
@@ -78,18 +75,18 @@ def from_quaternion(
     squared_sum, squared_difference = a * a + b * b, c * c + d * d
     radius = xp.sqrt(squared_sum * squared_difference)
     if symmetric:
-        middle = 2.0 * xp.incline(xp.sqrt(squared_difference), xp.sqrt(squared_sum))
+        middle = 2.0 * incline(xp.sqrt(squared_difference), xp.sqrt(squared_sum), xp)
     else:
-        middle = xp.incline(2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity), radius)
+        middle = incline(2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity), radius, xp)
     if xp.some(xp.minimum(squared_sum, squared_difference) <= LOCK * (squared_sum + squared_difference)):
         a, b, c, d, radius = _without_third(a, b, c, d, squared_sum, squared_difference, radius, static, xp)
     ac, bd, ad, bc = a * c, b * d, a * d, b * c
-    outer, inner = xp.bearing(bc + ad + 0.0, ac - bd, radius), xp.bearing(bc - ad + 0.0, ac + bd, radius)
+    outer, inner = bearing(bc + ad + 0.0, ac - bd, radius, xp), bearing(bc - ad + 0.0, ac + bd, radius, xp)
     first, third = (inner, outer) if static else (outer, inner)
-    return (xp.degrees(first), xp.degrees(middle), xp.degrees(third)) if degrees else (first, middle, third)
+    return (first * RADIAN, middle * RADIAN, third * RADIAN) if degrees else (first, middle, third)
 
 
-def locked(x: Number, y: Number, z: Number, w: Number, axes: str) -> Number:
+def locked(x: N, y: N, z: N, w: N, axes: str) -> Condition:
     """Say whether a convention is at gimbal lock here: the first and third axis coincide to 1 eps."""
     i, j, k, parity, symmetric, _ = AXES[axes]
     a, b, c, d = _pairs((x, y, z), w, i, j, k, parity, symmetric)
@@ -99,14 +96,14 @@ def locked(x: Number, y: Number, z: Number, w: Number, axes: str) -> Number:
 
 
 def _pairs(
-    vector: Vector,
-    w: Number,
+    vector: Three[N],
+    w: N,
     i: int,
     j: int,
     k: int,
     parity: float,
     symmetric: bool,  # noqa: FBT001
-) -> Quaternion:
+) -> Four[N]:
     """Return a, b, c, d: (a, b) points along half the sum of the outer angles, (c, d) along half their difference."""
     vi, vj, vk = vector[i], vector[j], vector[k]
     if symmetric:
@@ -116,9 +113,9 @@ def _pairs(
 
 
 def _without_third(
-    a: Number, b: Number, c: Number, d: Number, squared_sum: Number, squared_difference: Number, radius: Number,
-    static: bool, xp: Namespace,  # noqa: FBT001
-) -> tuple[Number, Number, Number, Number, Number]:  # fmt: skip
+    a: N, b: N, c: N, d: N, squared_sum: N, squared_difference: N, radius: N,
+    static: bool, xp: Functions[N],  # noqa: FBT001
+) -> tuple[N, N, N, N, N]:  # fmt: skip
     """Return the pairs, and the product of their lengths, with the pair that vanished at lock set to the other.
 
     To its mirror image where the axes are static: so the third angle becomes 0.

@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from math import atan2, cbrt, copysign, cos, degrees, fmod, frexp, ldexp, radians, sin, sqrt
-from math import hypot as length
+from math import copysign, fmod, frexp, ldexp, sqrt
+
+from frametool.geometry import trig
 
 __all__ = [
-    "all_near_one", "bearing", "canonical_sign", "cbrt", "copysign", "degrees", "first_nonzero", "frexp",
-    "half_sincos", "half_sincos_deg", "incline", "largest", "ldexp", "length", "maximum", "minimum", "radians", "some",
-    "sqrt", "where",
+    "all_near_one", "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp",
+    "largest", "ldexp", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Pair
+    from frametool.geometry.types import Condition
 
-SQRT_HALF = sqrt(0.5)
+S1, S2, S3, S4, S5, S6 = trig.SINE
+A1, A2, A3, A4, A5, A6 = trig.ARC_ABOVE
+B1, B2, B3, B4, B5, B6, _ = trig.ARC_BELOW
+LEVEL, RIGHT_ANGLE, RIGHT_ANGLE_REST = trig.LEVEL, trig.RIGHT_ANGLE, trig.RIGHT_ANGLE_REST
 maximum, minimum = max, min
-incline = atan2
 largest = abs
 some = bool
 
 
-def where(condition: bool, yes: float, no: float) -> float:  # noqa: FBT001 - numpy's signature
+def where(condition: Condition, yes: float, no: float) -> float:
     """Return `yes` if the condition holds, else `no`; both are already computed."""
     return yes if condition else no
 
@@ -34,45 +36,38 @@ def canonical_sign(x: float, y: float, z: float, w: float) -> tuple[float, float
     return x, y, z, w
 
 
-def bearing(y: float, x: float, _radius: float) -> float:
-    """Return the angle of a direction in [-pi, pi]; arrays profit from knowing its length."""
-    return atan2(y, x)
-
-
 def all_near_one(value: float, tolerance: float) -> bool:
     """Say whether a number is within a tolerance of 1."""
     return abs(value - 1.0) <= tolerance
 
 
-def first_nonzero(*values: float) -> float:
+def first_nonzero(a: float, b: float, c: float, d: float) -> float:
     """Return the first value that is not zero, or the last."""
-    for value in values:
-        if value:
-            return value
-    return values[-1]
+    return a or b or c or d
 
 
-def half_sincos(angle: float) -> Pair:
-    """Return sine and cosine of half an angle in radians."""
-    half = 0.5 * angle
-    return sin(half), cos(half)
+def doubled_sincos(y: float) -> tuple[float, float]:
+    """Return sine and cosine of 2y, |y| <= pi/4, by the steps that `arrays` takes."""
+    squared = y * y
+    bend = (((((squared * S6 + S5) * squared + S4) * squared + S3) * squared + S2) * squared + S1) * squared * y
+    sine = y + bend
+    squared_sine = sine * sine + (y - sine + bend) * sine * 2.0
+    cosine = squared_sine * -2.0 + 1.0
+    if cosine < LEVEL:
+        cosine = RIGHT_ANGLE - abs(y + y) + RIGHT_ANGLE_REST
+    return sqrt(1.0 - squared_sine) * 2.0 * sine, cosine
 
 
-def half_sincos_deg(angle: float) -> Pair:
-    """Return sine and cosine of half an angle in degrees.
+def doubled_arctan(tangent: float) -> float:
+    """Return 2 atan(t), |t| <= 1, by the steps that `arrays` takes."""
+    squared = tangent * tangent
+    above = ((((squared * A6 + A5) * squared + A4) * squared + A3) * squared + A2) * squared + A1
+    below = (((((squared + B6) * squared + B5) * squared + B4) * squared + B3) * squared + B2) * squared + B1
+    return (tangent - above / below * squared * tangent) * 2.0
 
-    Exact at multiples of 180; at odd multiples of 90 both have the same double sqrt(1/2) as magnitude, so that
-    products cancel exactly.  The reduction to at most 45 degrees is exact.
-    """
-    half = 0.5 * fmod(angle, 720.0)
-    if -45.0 < half < 45.0:
-        rest = radians(half)
-        return sin(rest), cos(rest)
-    quarter = round(half / 90.0)
-    rest = half - 90.0 * quarter
-    sine, cosine = sin(radians(rest)), cos(radians(rest))
-    if abs(rest) == 45.0:
-        sine, cosine = copysign(SQRT_HALF, rest), SQRT_HALF
-    if quarter & 1:
-        sine, cosine = cosine, 0.0 - sine
-    return (0.0 - sine, 0.0 - cosine) if quarter & 2 else (sine, cosine)
+
+def reduced_exactly(x: float) -> tuple[float, float]:
+    """Return what is left of any angle less the nearest whole number of quarter turns, and that number modulo 2."""
+    from frametool.geometry import far_angles
+
+    return far_angles.reduced_exactly(x)

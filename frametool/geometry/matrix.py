@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+from math import inf, isfinite
+
 from frametool.errors import ValueInvalid, warn
 from frametool.geometry import floats
-from frametool.geometry.quaternion import EPS, SILENT, TOLERATED, to_matrix
+from frametool.geometry.quaternion import EPS, FARTHEST, SILENT, TOLERATED, length
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from typing import Any
+    from collections.abc import Iterable, Sequence
 
-    from frametool.geometry.types import Matrix, Namespace, Number, Quaternion
+    from frametool.geometry.types import Condition, Four, Functions, N, Nine
 
 ORTHONORMAL = 8 * EPS  # of the Gram matrix: what rounding alone leaves on a correctly rounded rotation
 SINGULAR = 1e-12  # of det / (|row 1| |row 2| |row 3|): below, rounding decides which rotation is nearest
 
 
 def to_quaternion(
-    r11: Number, r12: Number, r13: Number, r21: Number, r22: Number, r23: Number,
-    r31: Number, r32: Number, r33: Number, xp: Namespace,
-) -> Quaternion:  # fmt: skip
+    r11: N, r12: N, r13: N, r21: N, r22: N, r23: N,
+    r31: N, r32: N, r33: N, xp: Functions[N],
+) -> Four[N]:  # fmt: skip
     """Return the quaternion of an orthonormal matrix.
 
     Source: Shepperd 1978, from the largest of 4w^2, 4x^2, 4y^2, 4z^2, then normalised.
@@ -39,118 +41,126 @@ def to_quaternion(
     return x * scale, y * scale, z * scale, w * scale
 
 
-def from_quaternion(x: Number, y: Number, z: Number, w: Number) -> Matrix:
-    """Return the matrix of a quaternion."""
-    return to_matrix(x, y, z, w)
-
-
-def determinant(
-    a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number
-) -> Number:
+def determinant(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> N:
     """Return the determinant: 1 for a rotation, negative for what is mirrored."""
     return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
-def defect(
-    a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number, xp: Namespace
-) -> Number:
+def defect(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
     """Return the largest entry of |R R^T - 1|: how far the rows are from orthonormal."""
-    larger = xp.maximum
-    lengths = larger(abs(a * a + b * b + c * c - 1.0), abs(d * d + e * e + f * f - 1.0))
-    lengths = larger(lengths, abs(g * g + h * h + i * i - 1.0))
-    angles = larger(abs(a * d + b * e + c * f), abs(a * g + b * h + c * i))
-    return larger(larger(angles, abs(d * g + e * h + f * i)), lengths)
+    gram = [
+        a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0,
+        a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i,
+    ]  # fmt: skip
+    return _largest([abs(entry) for entry in gram], xp)
 
 
-def nearest(
-    a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number, xp: Namespace
-) -> Matrix:
+def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
     """Return the rotation nearest to a matrix of positive determinant: its orthogonal polar factor.
 
-    Source: Higham 1986, Newton's X <- (X + X^-T)/2 with the inverse by cofactors, started at determinant 1.
-    The convergence is quadratic: a step below 1e-9 leaves 1e-18.
+    Source: Higham 1986, Newton's X <- (X + X^-T)/2 with the inverse by cofactors.  A power of two brings the
+    determinant into [1/2, 4).  The convergence is quadratic: a step below 1e-9 leaves 1e-18, and is a row's last.
     """
-    scale = 1.0 / xp.cbrt(determinant(a, b, c, d, e, f, g, h, i))
-    x: Matrix = tuple(part * scale for part in (a, b, c, d, e, f, g, h, i))
+    x = _scaled(a, b, c, d, e, f, g, h, i, xp)
+    third = xp.frexp(determinant(*x))[1] // 3
+    x = nine(xp.ldexp(part, -third) for part in x)
+    moving: Condition | None = None
     for _ in range(60):
-        x, step = _newton(x, xp)
-        if step < 1e-9:
+        after = _newton(*x)
+        step = _largest([abs(new - old) for new, old in zip(after, x, strict=True)], xp)
+        if moving is None:
+            x, moving = after, step >= 1e-9
+        else:
+            x = nine(xp.where(moving, new, old) for new, old in zip(after, x, strict=True))
+            moving = moving & (step >= 1e-9)
+        if not xp.some(moving):
             break
     return x
 
 
-def _newton(x: Matrix, xp: Namespace) -> tuple[Matrix, float]:
-    """Take one Newton step towards the orthogonal factor; give it with the largest change."""
-    a, b, c, d, e, f, g, h, i = x
+def _newton(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Nine[N]:
+    """Take one Newton step towards the orthogonal factor."""
     cofactors = (
         e * i - f * h, f * g - d * i, d * h - e * g,
         c * h - b * i, a * i - c * g, b * g - a * h,
         b * f - c * e, c * d - a * f, a * e - b * d,
     )  # fmt: skip
     half = 0.5 / (a * cofactors[0] + b * cofactors[1] + c * cofactors[2])
-    after: Matrix = tuple(0.5 * old + cofactor * half for old, cofactor in zip(x, cofactors, strict=True))
-    return after, max(xp.largest(new - old) for new, old in zip(after, x, strict=True))
+    return nine(0.5 * old + half * new for old, new in zip((a, b, c, d, e, f, g, h, i), cofactors, strict=True))
 
 
-def check(*values: float, normalize: bool = False) -> Matrix:
-    """Check one matrix at the door, nine entries row-major, and give the rotation nearest to it.
+def deviation(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
+    """Return how far a matrix is from orthonormal; inf if it is mirrored, singular or not finite."""
+    off = defect(a, b, c, d, e, f, g, h, i, xp)
+    if xp.largest(off) <= TOLERATED:
+        return xp.where(determinant(a, b, c, d, e, f, g, h, i) > SINGULAR, off, inf)
+    volume = relative_volume(a, b, c, d, e, f, g, h, i, xp)
+    return xp.where(volume > SINGULAR, xp.where(off < FARTHEST, off, FARTHEST), inf)
+
+
+def check(*values: float, normalize: bool = False) -> Nine[float]:
+    """Return the rotation nearest to one matrix, nine entries row-major.
 
     Orthonormal to 1e-6 in silence, to 1e-3 with a warning; with `normalize` any of positive determinant.
 
     Raises:
         ValueInvalid: not finite, mirrored, singular or not orthonormal.
     """
-    entries: Matrix = as_nine(values)
-    off = defect(*entries, floats)
-    problem = complaint(entries, off, normalize=normalize)
+    entries = nine(values)
+    problem = complaint(*entries, normalize=normalize)
     if problem:
         raise problem
+    off = defect(*entries, floats)
     if off <= ORTHONORMAL:
         return entries
     if off > SILENT and not normalize:
         warn(f"matrix is orthonormal only to {off:.2g} and was replaced by the nearest rotation", rule="rounded")
-    return nearest(*scaled(*entries, floats), floats)
+    return nearest(*entries, floats)
 
 
-def complaint(entries: Matrix, off: float, *, normalize: bool) -> ValueInvalid | None:
-    """Make the error for a matrix that far from orthonormal; None if it is not refused."""
-    if not all(abs(value) < float("inf") for value in entries):
+def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
+    """Make the error for a matrix that is refused; None if it is not."""
+    matrix = nine(entries)
+    off = defect(*matrix, floats)
+    if not all(map(isfinite, entries)):
         return ValueInvalid(f"matrix {_shown(entries)} is not finite; give nine finite numbers", rule="not-finite")
-    if not normalize and not off <= TOLERATED and not (off < 1.0 and determinant(*entries) < 0.0):
+    if not normalize and not off <= TOLERATED and not (off < 1.0 and determinant(*matrix) < 0.0):
         off_by = f"its rows are orthonormal only to {off:.2g} (normalize it with --normalize)"
         return ValueInvalid(f"matrix is not a rotation: {off_by}", rule="denormalized")
-    volume = relative_volume(*entries, floats)
+    volume = relative_volume(*matrix, floats)
     if volume < -SINGULAR:
-        found = f"matrix has determinant {determinant(*entries):.6g}"
+        found = f"matrix has determinant {determinant(*matrix):.6g}"
         return ValueInvalid(f"{found}: it is left-handed (mirrored); a rotation has 1", rule="mirrored")
     if volume <= SINGULAR:
         return ValueInvalid(f"matrix {_shown(entries)} is singular; no rotation is nearest to it", rule="denormalized")
     return None
 
 
-def scaled(
-    a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number, xp: Namespace
-) -> Matrix:
+def _scaled(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
     """Scale a matrix by the power of two of its largest entry: its rotation stays, its determinant is in range."""
-    larger = xp.maximum
-    largest = larger(larger(larger(abs(a), abs(b)), larger(abs(c), abs(d))), larger(abs(e), abs(f)))
-    shift = -xp.frexp(larger(larger(largest, abs(g)), larger(abs(h), abs(i))))[1]
-    return tuple(xp.ldexp(part, shift) for part in (a, b, c, d, e, f, g, h, i))
+    shift = -xp.frexp(_largest([abs(part) for part in (a, b, c, d, e, f, g, h, i)], xp))[1]
+    return nine(xp.ldexp(part, shift) for part in (a, b, c, d, e, f, g, h, i))
 
 
-def relative_volume(
-    a: Number, b: Number, c: Number, d: Number, e: Number, f: Number, g: Number, h: Number, i: Number, xp: Namespace
-) -> Number:
+def relative_volume(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
     """Return the determinant divided by the lengths of the rows: in [-1, 1], 0 where a row is zero."""
-    a, b, c, d, e, f, g, h, i = scaled(a, b, c, d, e, f, g, h, i, xp)
-    lengths = xp.length(a, b, c) * xp.length(d, e, f) * xp.length(g, h, i)
+    a, b, c, d, e, f, g, h, i = _scaled(a, b, c, d, e, f, g, h, i, xp)
+    lengths = length(a, b, c, xp) * length(d, e, f, xp) * length(g, h, i, xp)
     return determinant(a, b, c, d, e, f, g, h, i) / xp.where(lengths == 0.0, 1.0, lengths)
 
 
-def as_nine(values: Any) -> Matrix:
-    """Name nine values a matrix."""
-    nine: Matrix = values
-    return nine
+def nine(values: Iterable[N]) -> Nine[N]:
+    """Return nine values as the tuple they are."""
+    a, b, c, d, e, f, g, h, i = values
+    return a, b, c, d, e, f, g, h, i
+
+
+def _largest(values: Sequence[N], xp: Functions[N]) -> N:
+    """Return element by element the largest of some numbers."""
+    found = values[0]
+    for value in values[1:]:
+        found = xp.maximum(found, value)
+    return found
 
 
 def _shown(entries: tuple[float, ...]) -> str:

@@ -5,28 +5,33 @@ Knows numbers only. Unless said otherwise the inputs are unit to a few eps; comp
 
 from __future__ import annotations
 
+from math import inf
+
 from frametool.errors import ValueInvalid, warn
 from frametool.geometry import floats
+from frametool.geometry.trig import half_sincos, incline
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Components, Matrix, Namespace, Number, Quaternion, Vector
+    from collections.abc import Sequence
+    from typing import Any
+
+    from frametool.geometry.types import Condition, Four, Functions, N, Nine, Three, Two
 
 EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: what lies within 4 is left alone, bit for bit
 SILENT = 1e-6
 TOLERATED = 1e-3
+FARTHEST = 1e300  # the deviation of what can still be normalised, when squares overflow
 TINY = 1e-150  # the least angle divided by: sin(x)/x is 1 there, and parts down to 1e-308 survive the quotient
 
 
-def squared_norm(x: Number, y: Number, z: Number, w: Number) -> Number:
+def squared_norm(x: N, y: N, z: N, w: N) -> N:
     """Return x^2 + y^2 + z^2 + w^2; right for norms between 1e-150 and 1e150."""
     return x * x + y * y + z * z + w * w
 
 
-def product(
-    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number
-) -> Quaternion:
+def product(ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N) -> Four[N]:
     """Multiply two quaternions of any norm: the rotation b followed by the rotation a (Hamilton 1843)."""
     return (
         aw * bx + ax * bw + ay * bz - az * by,
@@ -36,9 +41,7 @@ def product(
     )
 
 
-def compose(
-    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number
-) -> Quaternion:
+def compose(ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N) -> Four[N]:
     """Multiply two unit quaternions and take the rounding off the norm: multiples of 90 degrees stay exact.
 
     `product` and `settled` written as one: the call every lookup makes at every edge.
@@ -51,7 +54,7 @@ def compose(
     return x / norm, y / norm, z / norm, w / norm
 
 
-def settled(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
+def settled(x: N, y: N, z: N, w: N) -> Four[N]:
     """Take the last rounding off the norm of a quaternion that is unit to 1e-8.
 
     (1 + n^2)/2 is the norm to first order, and needs no root.  Divided by it, the products of 0, 1/2, sqrt(1/2)
@@ -61,12 +64,12 @@ def settled(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
     return x / norm, y / norm, z / norm, w / norm
 
 
-def conjugate(x: Number, y: Number, z: Number, w: Number) -> Quaternion:
+def conjugate(x: N, y: N, z: N, w: N) -> Four[N]:
     """Return the inverse of a unit quaternion; zeros stay +0."""
     return 0.0 - x, 0.0 - y, 0.0 - z, w
 
 
-def unit(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
+def unit(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     """Normalise a quaternion of moderate norm; what is unit to 4 eps keeps its bits."""
     squared = x * x + y * y + z * z + w * w
     if xp.all_near_one(squared, UNIT):
@@ -75,87 +78,96 @@ def unit(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternio
     return x / norm, y / norm, z / norm, w / norm
 
 
-def normalized(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
+def normalized(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     """Normalise a non-zero quaternion of any norm, 1e-310 to 1e300.
 
     Scaling by the power of two of the largest component is exact, so the squares neither overflow nor vanish.
     """
-    largest = xp.maximum(xp.maximum(abs(x), abs(y)), xp.maximum(abs(z), abs(w)))
-    shift = -xp.frexp(largest)[1]
+    shift = -xp.frexp(_largest(x, y, z, w, xp))[1]
     x, y, z, w = xp.ldexp(x, shift), xp.ldexp(y, shift), xp.ldexp(z, shift), xp.ldexp(w, shift)
     norm = xp.sqrt(x * x + y * y + z * z + w * w)
     return x / norm, y / norm, z / norm, w / norm
 
 
-def canonical(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
+def _largest(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
+    """Return the largest magnitude of four numbers."""
+    return xp.maximum(xp.maximum(abs(x), abs(y)), xp.maximum(abs(z), abs(w)))
+
+
+def canonical(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     """Choose between q and -q: w > 0, or w == 0 and the first non-zero of x, y, z positive."""
-    quaternion: Quaternion = xp.canonical_sign(x, y, z, w)
-    return quaternion
+    return xp.canonical_sign(x, y, z, w)
 
 
-def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Quaternion:
+def from_quaternion(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     """Return the quaternion as it leaves: unit, with the canonical sign."""
     return canonical(*unit(x, y, z, w, xp), xp)
 
 
-def angle(x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Number:
-    """Return the rotation angle in [0, pi] radians, accurate at both ends (half the angle by atan2)."""
-    return 2.0 * xp.incline(xp.length(x, y, z), abs(w))
+def angle(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
+    """Return the rotation angle in [0, pi] radians, accurate at both ends: that of a direction, doubled."""
+    return 2.0 * incline(length(x, y, z, xp), abs(w), xp)
 
 
 def arc(
-    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number, xp: Namespace,
-) -> Number:  # fmt: skip
+    ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
+) -> N:  # fmt: skip
     """Return the angle in [0, pi/2] between two quaternions as vectors, q and -q being one: half the rotation's.
 
     Source: Kahan, 2 atan2(|b - a|, |b + a|); it keeps its relative accuracy for the smallest arcs.
     """
+    apart, along = halves(ax, ay, az, aw, bx, by, bz, bw, xp)
+    return 2.0 * incline(apart, along, xp)
+
+
+def halves(
+    ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
+) -> Two[N]:  # fmt: skip
+    """Return sine and cosine of half the arc between two quaternions: half the lengths of difference and sum."""
     apart = xp.sqrt(squared_norm(bx - ax, by - ay, bz - az, bw - aw))
     along = xp.sqrt(squared_norm(bx + ax, by + ay, bz + az, bw + aw))
-    return 2.0 * xp.incline(0.5 * xp.minimum(apart, along), 0.5 * xp.maximum(apart, along))
+    return 0.5 * xp.minimum(apart, along), 0.5 * xp.maximum(apart, along)
 
 
 def distance(
-    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number, xp: Namespace,
-) -> Number:  # fmt: skip
+    ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
+) -> N:  # fmt: skip
     """Return the angle in [0, pi] of the rotation between two."""
     return 2.0 * arc(ax, ay, az, aw, bx, by, bz, bw, xp)
 
 
 def slerp(
-    ax: Number, ay: Number, az: Number, aw: Number, bx: Number, by: Number, bz: Number, bw: Number,
-    fraction: Number, xp: Namespace,
-) -> Quaternion:  # fmt: skip
+    ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N,
+    fraction: N, xp: Functions[N],
+) -> Four[N]:  # fmt: skip
     """Interpolate two unit quaternions along the shorter arc.
 
     fraction: 0 gives a and 1 gives b to the bit; outside is extrapolated.
     Returns x, y, z, w, unit.  At exactly half a turn both arcs are shortest; the sign of b decides.
-    Source: Shoemake 1985, with sin((1-f)a)/sin(a) written as cos(fa) - cos(a) sin(fa)/sin(a): one sine and cosine.
+    Source: Shoemake 1985, from the middle: with s and c the sine and cosine of half the arc and g = fraction - 1/2,
+    cos(g arc) (a + b) / 2c + sin(g arc) (b - a) / 2s, which treats both ends alike.
     """
-    theta = xp.maximum(arc(ax, ay, az, aw, bx, by, bz, bw, xp), TINY)
-    sine, cosine = xp.half_sincos(2.0 * theta)
-    part_sine, part_cosine = xp.half_sincos(2.0 * (fraction * theta))
-    to_b = part_sine / sine
-    to_a = part_cosine - cosine * to_b
-    signed = to_b * xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
-    mixed = unit(
-        to_a * ax + signed * bx, to_a * ay + signed * by, to_a * az + signed * bz, to_a * aw + signed * bw, xp
-    )  # fmt: skip
-    x, y, z, w = ends((ax, ay, az, aw), mixed, (bx, by, bz, bw), fraction, xp)
-    return x, y, z, w
-
-
-def ends(start: Components, between: Components, end: Components, fraction: Number, xp: Namespace) -> Components:
-    """Put the very ends, to the bit, where the fraction is 0 or 1."""
+    apart, along = halves(ax, ay, az, aw, bx, by, bz, bw, xp)
+    theta = xp.maximum(2.0 * incline(apart, along, xp), TINY)
+    sine, cosine = half_sincos(2.0 * ((fraction - 0.5) * theta), xp)
+    mean, across = 0.5 * (cosine / along), 0.5 * (sine / xp.maximum(apart, 0.5 * TINY))
+    to_a, to_b = mean - across, (mean + across) * xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
+    x, y, z, w = unit(to_a * ax + to_b * bx, to_a * ay + to_b * by, to_a * az + to_b * bz, to_a * aw + to_b * bw, xp)
     at_start, at_end = fraction == 0.0, fraction == 1.0
     if not xp.some(at_start | at_end):
-        return between
-    return tuple(
-        xp.where(at_start, a, xp.where(at_end, b, mixed)) for a, mixed, b in zip(start, between, end, strict=True)
-    )
+        return x, y, z, w
+    return (
+        either(at_start, ax, at_end, bx, x, xp), either(at_start, ay, at_end, by, y, xp),
+        either(at_start, az, at_end, bz, z, xp), either(at_start, aw, at_end, bw, w, xp),
+    )  # fmt: skip
 
 
-def to_matrix(x: Number, y: Number, z: Number, w: Number) -> Matrix:
+def either(first: Condition, a: N, second: Condition, b: N, other: N, xp: Functions[N]) -> N:
+    """Return a where the first condition holds, b where the second does, else the other."""
+    return xp.where(first, a, xp.where(second, b, other))
+
+
+def to_matrix(x: N, y: N, z: N, w: N) -> Nine[N]:
     """Return the rotation matrix r11 .. r33, row-major.
 
     Dividing by the norm actually computed makes multiples of 90 degrees exact and forgives a few eps of norm.
@@ -172,51 +184,80 @@ def to_matrix(x: Number, y: Number, z: Number, w: Number) -> Matrix:
     )  # fmt: skip
 
 
-def rotate(x: Number, y: Number, z: Number, w: Number, px: Number, py: Number, pz: Number) -> Vector:
+def rotate(x: N, y: N, z: N, w: N, px: N, py: N, pz: N) -> Three[N]:
     """Rotate a vector, through the matrix: the shorter cross products leave residue at 90 degrees."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = to_matrix(x, y, z, w)
     return r11 * px + r12 * py + r13 * pz, r21 * px + r22 * py + r23 * pz, r31 * px + r32 * py + r33 * pz
 
 
+def deviation(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
+    """Return how far the norm is from 1 (to first order below 1e-6); inf for what has no direction or is not finite."""
+    squared = x * x + y * y + z * z + w * w
+    off = abs(squared - 1.0)
+    if xp.largest(off) <= SILENT:
+        return off
+    size = _largest(x, y, z, w, xp)
+    off = xp.where(off <= SILENT, off, xp.minimum(abs(xp.sqrt(squared) - 1.0), FARTHEST))
+    return xp.where((size > 0.0) & (size < inf), off, inf)
+
+
+def repaired(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
+    """Normalise quaternions that are not unit to 4 eps; only far ones take the longer way."""
+    squared = x * x + y * y + z * z + w * w
+    far = abs(squared - 1.0) > 3.0 * TOLERATED
+    norm = xp.where(far, 1.0, xp.sqrt(squared))
+    near = x / norm, y / norm, z / norm, w / norm
+    if not xp.some(far):
+        return near
+    other = normalized(x, y, z, w, xp)
+    return (
+        xp.where(far, other[0], near[0]), xp.where(far, other[1], near[1]),
+        xp.where(far, other[2], near[2]), xp.where(far, other[3], near[3]),
+    )  # fmt: skip
+
+
 def check(x: float, y: float, z: float, w: float, *, normalize: bool = False) -> tuple[float, float, float, float]:
-    """Check one quaternion at the door and give it unit.
+    """Return one quaternion as a unit one.
 
     Within 1e-6 of norm 1 in silence, within 1e-3 with a warning; with `normalize` any non-zero finite one.
 
     Raises:
         ValueInvalid: zero, not finite, or not of norm 1.
     """
-    squared = x * x + y * y + z * z + w * w
-    if abs(squared - 1.0) <= UNIT:
+    if abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT:
         return x, y, z, w
-    norm = floats.length(x, y, z, w)
-    problem = complaint(x, y, z, w, norm, normalize=normalize)
+    off = deviation(x, y, z, w, floats)
+    problem = complaint(x, y, z, w, normalize=normalize)
     if problem:
         raise problem
-    if abs(norm - 1.0) > SILENT and not normalize:
-        warn(f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown(norm)} and was normalised", rule="rounded")
-    return normalized(x, y, z, w, floats)
+    if off > SILENT and not normalize:
+        warn(
+            f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown_norm(x, y, z, w)} and was normalised", rule="rounded"
+        )
+    return repaired(x, y, z, w, floats)
 
 
-def _shown(norm: float) -> str:
+def _shown_norm(x: float, y: float, z: float, w: float) -> str:
     """Write a norm with six digits, or as many as tell it from 1."""
+    norm = magnitude(magnitude(x, y, z, floats), w, 0.0, floats)
     return f"{norm:.6g}" if f"{norm:.6g}" != "1" else f"{norm:.9g}"
 
 
-def complaint(x: float, y: float, z: float, w: float, norm: float, *, normalize: bool) -> ValueInvalid | None:
-    """Make the error for a quaternion of this norm that is refused; None if it is not."""
+def complaint(x: float, y: float, z: float, w: float, *, normalize: bool = False) -> ValueInvalid | None:
+    """Make the error for a quaternion that is refused; None if it is not."""
     shown = f"quaternion {x:g} {y:g} {z:g} {w:g}"
-    if norm == 0.0:
+    off = deviation(x, y, z, w, floats)
+    if x == y == z == w == 0.0:
         return ValueInvalid(f"{shown} has no direction; give a non-zero one", rule="denormalized")
-    if not all(abs(value) < float("inf") for value in (x, y, z, w)):
+    if not off < inf:
         return ValueInvalid(f"{shown} is not finite; give four finite numbers", rule="not-finite")
-    if normalize or abs(norm - 1.0) <= TOLERATED:
+    if normalize or off <= TOLERATED:
         return None
-    message = f"{shown} has norm {_shown(norm)}; a rotation needs norm 1 (normalize it with --normalize)"
+    message = f"{shown} has norm {_shown_norm(x, y, z, w)}; a rotation needs norm 1 (normalize it with --normalize)"
     return ValueInvalid(message, rule="denormalized")
 
 
-def between(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:
+def between(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[N]:
     """Return the shortest rotation that turns the direction a into the direction b.
 
     The turn by twice the angle between a and the bisector a + b.  Near opposite directions the bisector is all
@@ -225,18 +266,19 @@ def between(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Numb
     """
     ax, ay, az = unit_vector(ax, ay, az, xp)
     bx, by, bz = unit_vector(bx, by, bz, xp)
-    mx, my, mz = ax + bx, ay + by, az + bz
+    cx, cy, cz = ax + bx, ay + by, az + bz
     dx, dy, dz = ax - bx, ay - by, az - bz
     apart = dx * dx + dy * dy + dz * dz
-    along = xp.where(apart > 2.0, mx * dx + my * dy + mz * dz, 0.0) / xp.maximum(apart, 2.0)
-    mx, my, mz = mx - along * dx, my - along * dy, mz - along * dz
-    opposite = abs(mx) + abs(my) + abs(mz) <= EPS
+    along = xp.where(apart > 2.0, cx * dx + cy * dy + cz * dz, 0.0) / xp.maximum(apart, 2.0)
+    cx, cy, cz = cx - along * dx, cy - along * dy, cz - along * dz
+    opposite = abs(cx) + abs(cy) + abs(cz) <= EPS
     sx, sy, sz = _sideways(ax, ay, az, xp)
-    mx, my, mz = unit_vector(xp.where(opposite, sx, mx), xp.where(opposite, sy, my), xp.where(opposite, sz, mz), xp)
-    return *cross(ax, ay, az, mx, my, mz), ax * mx + ay * my + az * mz
+    mx, my, mz = unit_vector(xp.where(opposite, sx, cx), xp.where(opposite, sy, cy), xp.where(opposite, sz, cz), xp)
+    x, y, z = cross(ax, ay, az, mx, my, mz)
+    return x, y, z, ax * mx + ay * my + az * mz
 
 
-def _sideways(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
+def _sideways(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
     """Return a vector at right angles to a unit vector, from the coordinate axis farthest from it."""
     use_x = (abs(x) <= abs(y)) & (abs(x) <= abs(z))
     use_y = abs(y) <= abs(z)
@@ -256,14 +298,54 @@ def check_directions(ax: float, ay: float, az: float, bx: float, by: float, bz: 
             raise ValueInvalid("vector 0 0 0 has no direction; give a non-zero one")
 
 
-def unit_vector(x: Number, y: Number, z: Number, xp: Namespace) -> Vector:
-    """Return the direction of a non-zero vector of any length; the scaling by a power of two is exact."""
-    shift = -xp.frexp(xp.maximum(xp.maximum(abs(x), abs(y)), abs(z)))[1]
-    x, y, z = xp.ldexp(x, shift), xp.ldexp(y, shift), xp.ldexp(z, shift)
-    length = xp.length(x, y, z)
-    return x / length, y / length, z / length
+def unit_vector(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
+    """Return the direction of a non-zero vector of any length."""
+    x, y, z, _ = _scaled(x, y, z, xp)
+    norm = length(x, y, z, xp)
+    return x / norm, y / norm, z / norm
 
 
-def cross(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Vector:
+def direction(x: N, y: N, z: N, xp: Functions[N]) -> Four[N]:
+    """Return the direction and the length of any vector; that of zero is x and 0."""
+    still = (x == 0.0) & (y == 0.0) & (z == 0.0)
+    x, y, z, exponent = _scaled(xp.where(still, 1.0, x), y, z, xp)
+    norm = length(x, y, z, xp)
+    return x / norm, y / norm, z / norm, xp.where(still, 0.0, 2.0 * (norm * xp.ldexp(1.0, exponent - 1)))
+
+
+def magnitude(x: N, y: N, z: N, xp: Functions[N]) -> N:
+    """Return the length of any vector; only squares out of range take the longer way."""
+    squared = x * x + y * y + z * z
+    odd = (squared < 1e-280) | (squared > 1e300)
+    plain = xp.sqrt(squared)
+    return xp.where(odd, direction(x, y, z, xp)[3], plain) if xp.some(odd) else plain
+
+
+def _scaled(x: N, y: N, z: N, xp: Functions[N]) -> tuple[N, N, N, Any]:
+    """Divide a vector by the power of two of its largest component, which is exact; return the exponent, too."""
+    exponent = xp.frexp(xp.maximum(xp.maximum(abs(x), abs(y)), abs(z)))[1]
+    return xp.ldexp(x, -exponent), xp.ldexp(y, -exponent), xp.ldexp(z, -exponent), exponent
+
+
+def length(x: N, y: N, z: N, xp: Functions[N]) -> N:
+    """Return the length of a vector, right between 1e-150 and 1e150; hypot is not the same on every machine."""
+    return xp.sqrt(x * x + y * y + z * z)
+
+
+def cross(ax: N, ay: N, az: N, bx: N, by: N, bz: N) -> Three[N]:
     """Return the vector product."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+def largest_eigenvector(moment: Sequence[Sequence[float]]) -> Four[float]:
+    """Return a unit eigenvector of the largest eigenvalue of a symmetric 4 by 4 matrix without negative ones.
+
+    Squared again and again the matrix becomes the projection on that eigenvector, whose longest column is it.
+    Sixty squarings settle eigenvalues that differ by one eps.
+    """
+    for _ in range(60):
+        trace = moment[0][0] + moment[1][1] + moment[2][2] + moment[3][3]
+        moment = [[part / trace for part in row] for row in moment]
+        moment = [[a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] for b in moment] for a in moment]
+    x, y, z, w = max(moment, key=lambda row: max(map(abs, row)))
+    return normalized(x, y, z, w, floats)

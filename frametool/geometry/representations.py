@@ -6,7 +6,7 @@ kernels this calls, nowhere else. Knows no syntax of any file.
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 
 from frametool.errors import ValueInvalid, alternatives, did_you_mean
 from frametool.geometry import axis_angle, euler, matrix, mrp, quaternion, rotvec, six_d
@@ -16,28 +16,104 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.geometry.types import Components, Namespace, Quaternion
+    from frametool.geometry.types import Components, Kernel, Namespace, Quaternion
 
     Check = Callable[..., Components]
 
+LIST, MAP, NAMED, ROWS = "list", "map", "named", "rows"  # how documents hold the numbers of a rotation
+NAMED_AXES = "AXES"
+
+
+class Whole:
+    """How a notation writes a whole pose, position and rotation in one: the 4x4 matrix.
+
+    columns: names of its numbers, in their order
+    join: the position and the rotation's numbers to those of the pose
+    split: those of the pose to the position and the rotation's numbers
+    tail: what the last of its numbers always are
+    """
+
+    __slots__ = ("columns", "join", "split", "tail")
+
+    def __init__(
+        self, columns: str, join: Callable[..., Components], split: Callable[..., Any], tail: tuple[float, ...] = ()
+    ) -> None:
+        """Describe the numbers of a pose."""
+        self.columns = tuple(columns.split())
+        self.join = join
+        self.split = split
+        self.tail = tail
+
+
+class BatchRule:
+    """How many rows of a notation are checked at once, where not every finite row is a rotation as it stands.
+
+    what: what the rows are, in the plural
+    deviation: kernel (components, xp) of how far each row is from a rotation; inf where nothing can be made of it
+    repair: kernel (components, xp) that makes rotations of rows
+    exact: the deviation up to which a row keeps its bits
+    """
+
+    __slots__ = ("deviation", "exact", "repair", "what")
+
+    def __init__(self, what: str, deviation: Callable[..., Any], repair: Kernel, exact: float) -> None:
+        """Bind the kernels."""
+        self.what = what
+        self.deviation = deviation
+        self.repair = repair
+        self.exact = exact
+
 
 class Representation:
-    """One notation: its name, bare column names, which columns are angles, and a line of help."""
+    """One notation and everything that is known about it: no other list or table names it.
 
-    __slots__ = ("_backward", "_check", "_forward", "angles", "columns", "name", "summary")
+    columns: bare names of its numbers, in tables and messages; angles: which of them are angles
+    summary, label: a line of help; what it is called in text for people
+    names: short names of its numbers, for people and as keys of a map
+    shape: how documents hold the numbers: LIST, MAP (a list is read too), NAMED (a map only), ROWS, or a dict of the
+        keys of a map with how many numbers each holds
+    axes: Euler axes: "" none, NAMED_AXES where the user names them, else the fixed ones
+    whole: how it carries the position too, if it can; searched: whether headers are searched for its columns
+    alone: columns that say the last number where the others are missing and 0
+    batch: how many rows are checked at once; without it those are refused whose quaternion is not finite
+    overview: the units in which an overview shows it ("" for no unit)
+    """
+
+    __slots__ = (
+        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "label", "name",
+        "names", "overview", "searched", "shape", "summary", "whole",
+    )  # fmt: skip
 
     def __init__(
         self, columns: str, angles: tuple[int, ...], summary: str, *,
         forward: Callable[..., Any], backward: Callable[..., Any], check: Check | None = None,
+        kept: Callable[..., Components] | None = None, shape: str | dict[str, int] = LIST, names: str = "",
+        label: str = "", axes: str = "", whole: Whole | None = None, searched: bool = True, alone: str = "",
+        overview: tuple[str, ...] = (), batch: BatchRule | None = None,
     ) -> None:  # fmt: skip
-        """Describe a notation; `forward` and `backward` take (components, xp, degrees, axes)."""
+        """Describe a notation.
+
+        forward, backward: take (components, xp, degrees, axes)
+        check: takes the components of one rotation, and `normalize`; None where any finite numbers are a rotation
+        kept: takes a unit quaternion whose sign stays as it is; None where the notation has no such sign
+        """
         self.name = ""
         self.columns = tuple(columns.split())
         self.angles = angles
         self.summary = summary
+        self.shape = shape
+        self.names = tuple(names.split()) or (("x", "y", "z") if len(self.columns) == 3 else ("",) * len(self.columns))
+        self.label = label
+        self.axes = axes
+        self.whole = whole
+        self.searched = searched
+        self.alone = tuple(alone.split())
+        self.overview = overview
         self._forward = forward
         self._backward = backward
         self._check = check
+        self._kept = kept
+        self.batch = batch
 
     def __repr__(self) -> str:
         """Show the name."""
@@ -48,6 +124,11 @@ class Representation:
         """Tell whether finite numbers may be no rotation: a norm, an axis, a matrix; three angles always are one."""
         return self._check is not None
 
+    @property
+    def spelling(self) -> str:
+        """Return the name as help shows it."""
+        return f"{self.name}:{NAMED_AXES}" if self.axes == NAMED_AXES else self.name
+
     def to_quaternion(
         self, components: Components, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
     ) -> Quaternion:
@@ -56,14 +137,17 @@ class Representation:
         return result
 
     def from_quaternion(
-        self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
-    ) -> Components:
-        """Return the components in column order of a unit quaternion."""
+        self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz",
+        keep_sign: bool = False,
+    ) -> Components:  # fmt: skip
+        """Return the components in column order of a unit quaternion; `keep_sign` leaves a quaternion's sign alone."""
+        if keep_sign and self._kept is not None:
+            return self._kept(x, y, z, w)
         result: Components = self._backward((x, y, z, w), xp, degrees, axes)
         return result
 
     def checked(self, components: Sequence[float], *, normalize: bool = False) -> Components:
-        """Check the floats of one rotation, and give them as near to a rotation as they must be.
+        """Check the floats of one rotation; return them as near to a rotation as they must be.
 
         Raises:
             ValueInvalid: wrong count, not finite, or no rotation.
@@ -95,11 +179,7 @@ def _euler(kernel: Callable[..., Components]) -> Callable[..., Components]:
     return lambda components, xp, degrees, axes: kernel(*components, axes, xp, degrees=degrees)
 
 
-def _rpy(kernel: Callable[..., Components]) -> Callable[..., Components]:
-    return lambda components, xp, degrees, _axes: kernel(*components, "sxyz", xp, degrees=degrees)
-
-
-def _same(x: Any, y: Any, z: Any, w: Any) -> Quaternion:
+def _xyzw(x: Any, y: Any, z: Any, w: Any) -> Quaternion:
     return x, y, z, w
 
 
@@ -107,55 +187,93 @@ def _from_wxyz(w: Any, x: Any, y: Any, z: Any) -> Quaternion:
     return x, y, z, w
 
 
+def _wxyz(x: Any, y: Any, z: Any, w: Any) -> Components:
+    return w, x, y, z
+
+
+def _in_wxyz(kernel: Kernel) -> Kernel:
+    """Let a kernel of x, y, z, w take and return w, x, y, z."""
+    return lambda w, x, y, z, *xp, **options: _wxyz(*kernel(x, y, z, w, *xp, **options))
+
+
 def _as_wxyz(x: Any, y: Any, z: Any, w: Any, xp: Namespace) -> Components:
-    x, y, z, w = quaternion.from_quaternion(x, y, z, w, xp)
-    return w, x, y, z
+    return _wxyz(*quaternion.from_quaternion(x, y, z, w, xp))
 
 
-def _check_wxyz(w: float, x: float, y: float, z: float, *, normalize: bool = False) -> Components:
-    x, y, z, w = quaternion.check(x, y, z, w, normalize=normalize)
-    return w, x, y, z
+def _wxyz_deviation(w: Any, x: Any, y: Any, z: Any, xp: Namespace) -> Any:
+    return quaternion.deviation(x, y, z, w, xp)
 
 
-QUATERNION = {
-    "forward": _arithmetic(_same), "backward": _plain(quaternion.from_quaternion), "check": quaternion.check,
-}  # fmt: skip
+def _check_mrp(*parameters: float, normalize: bool = False) -> Components:
+    return rotvec.check(*parameters, normalize=normalize, what="mrp")
+
+
+def _homogeneous(position: Components, rows: Components) -> Components:
+    upper = [number for row, moved in enumerate(position) for number in (*rows[3 * row : 3 * row + 3], moved)]
+    return (*upper, *LAST_ROW)
+
+
+def _of_homogeneous(m: Components) -> tuple[Components, Components]:
+    return (m[3], m[7], m[11]), (*m[0:3], *m[4:7], *m[8:11])
+
+
+LAST_ROW = (0.0, 0.0, 0.0, 1.0)
+HOMOGENEOUS = Whole(
+    "m11 m12 m13 m14 m21 m22 m23 m24 m31 m32 m33 m34 m41 m42 m43 m44", _homogeneous, _of_homogeneous, LAST_ROW
+)
+QUATERNIONS = BatchRule("quaternions", quaternion.deviation, quaternion.repaired, quaternion.UNIT)
 
 REPRESENTATIONS: dict[str, Representation] = {
-    "quaternion": Representation("qx qy qz qw", (), "unit quaternion, named x y z w", **QUATERNION),
-    "xyzw": Representation("qx qy qz qw", (), "unit quaternion, scalar last", **QUATERNION),
+    "quaternion": Representation(
+        "qx qy qz qw", (), "unit quaternion, named x y z w", names="x y z w", shape=NAMED, overview=("",),
+        forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), check=quaternion.check, kept=_xyzw,
+        batch=QUATERNIONS,
+    ),
+    "xyzw": Representation(
+        "qx qy qz qw", (), "unit quaternion, scalar last", names="x y z w", label="quaternion",
+        forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), check=quaternion.check, kept=_xyzw,
+        batch=QUATERNIONS,
+    ),
     "wxyz": Representation(
-        "qw qx qy qz", (), "unit quaternion, scalar first",
-        forward=_arithmetic(_from_wxyz), backward=_plain(_as_wxyz), check=_check_wxyz,
+        "qw qx qy qz", (), "unit quaternion, scalar first", names="w x y z", label="quaternion",
+        forward=_arithmetic(_from_wxyz), backward=_plain(_as_wxyz), check=_in_wxyz(quaternion.check), kept=_wxyz,
+        batch=BatchRule("quaternions", _wxyz_deviation, _in_wxyz(quaternion.repaired), quaternion.UNIT),
     ),
     "rpy": Representation(
         "roll pitch yaw", (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
-        forward=_rpy(euler.to_quaternion), backward=_rpy(euler.from_quaternion),
+        names="roll pitch yaw", shape=MAP, axes="sxyz", alone="yaw theta", overview=("_rad", "_deg"),
+        forward=_euler(euler.to_quaternion), backward=_euler(euler.from_quaternion),
     ),
     "euler": Representation(
         "euler_1 euler_2 euler_3", (0, 1, 2), "three angles in the order of euler:AXES, s fixed or r rotating axes",
+        names="euler_1 euler_2 euler_3", shape={"angles": 3}, axes=NAMED_AXES, searched=False,
         forward=_euler(euler.to_quaternion), backward=_euler(euler.from_quaternion),
     ),
     "axis_angle": Representation(
         "axis_x axis_y axis_z angle", (3,), "axis of any length, then the angle about it",
+        names="x y z angle", label="axis-angle", shape={"axis": 3, "angle": 1}, overview=("_rad",),
         forward=_angular(axis_angle.to_quaternion), backward=_angular(axis_angle.from_quaternion),
         check=axis_angle.check,
     ),
     "rotvec": Representation(
-        "rotvec_x rotvec_y rotvec_z", (0, 1, 2), "rotation vector: unit axis times angle",
+        "rotvec_x rotvec_y rotvec_z", (0, 1, 2), "rotation vector: unit axis times angle", label="rotation vector",
         forward=_angular(rotvec.to_quaternion), backward=_angular(rotvec.from_quaternion), check=rotvec.check,
     ),
     "matrix": Representation(
         "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "rotation matrix, row by row",
-        forward=_plain(matrix.to_quaternion), backward=_arithmetic(matrix.from_quaternion), check=matrix.check,
+        shape=ROWS, whole=HOMOGENEOUS, overview=("",),
+        forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
+        batch=BatchRule("matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL),
     ),
     "mrp": Representation(
         "mrp_x mrp_y mrp_z", (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
-        forward=_arithmetic(mrp.to_quaternion), backward=_plain(mrp.from_quaternion), check=mrp.check,
+        forward=_arithmetic(mrp.to_quaternion), backward=_plain(mrp.from_quaternion), check=_check_mrp,
     ),
     "six_d": Representation(
-        "r11 r21 r31 r12 r22 r32", (), "first two columns of the matrix (Zhou's continuous 6D)",
+        "r11 r21 r31 r12 r22 r32", (), "first two columns of the matrix (Zhou's continuous 6D)", label="6d",
+        searched=False,
         forward=_plain(six_d.to_quaternion), backward=_arithmetic(six_d.from_quaternion), check=six_d.check,
+        batch=BatchRule("pairs of columns", six_d.deviation, six_d.repaired, inf),
     ),
 }  # fmt: skip
 for _name, _row in REPRESENTATIONS.items():
@@ -177,26 +295,53 @@ class Notation:
     @property
     def columns(self) -> tuple[str, ...]:
         """Name the columns; angles carry the unit where it was said."""
-        if self.degrees is None:
-            return self.representation.columns
-        suffix = "_deg" if self.degrees else "_rad"
-        angles = self.representation.angles
-        return tuple(name + suffix * (index in angles) for index, name in enumerate(self.representation.columns))
+        return self.columns_in(degrees=None)
+
+    def columns_in(self, *, degrees: bool | None) -> tuple[str, ...]:
+        """Name the columns; angles carry the notation's unit, else say that they are `degrees`."""
+        row = self.representation
+        suffix = "_deg" if (self.degrees or (degrees and self.degrees is None)) else "_rad" * (self.degrees is False)
+        return tuple(name + suffix * (index in row.angles) for index, name in enumerate(row.columns))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return short names of the numbers, for people."""
+        row = self.representation
+        return tuple((self.axes or "")[1:]) if row.axes == NAMED_AXES else row.names
+
+    @property
+    def label(self) -> str:
+        """Return what the notation is called in text for people."""
+        row = self.representation
+        return (row.label or row.name) + (f" {self.axes}" if self.axes else "")
+
+    @property
+    def euler_axes(self) -> str | None:
+        """Return the Euler axes, fixed or named; None for a notation without."""
+        fixed = self.representation.axes
+        return self.axes if fixed == NAMED_AXES else fixed or None
+
+    def in_degrees(self, default: bool) -> bool:  # noqa: FBT001 - the one thing it is about
+        """Tell whether angles are degrees: as the notation says, else as `default`."""
+        return default if self.degrees is None else self.degrees
 
     def to_quaternion(self, components: Components, xp: Namespace, *, degrees: bool = False) -> Quaternion:
         """Return x, y, z, w; `degrees` counts where the notation itself says no unit."""
-        unit = degrees if self.degrees is None else self.degrees
+        unit = self.in_degrees(degrees)
         return self.representation.to_quaternion(components, xp, degrees=unit, axes=self.bound_axes())
 
-    def from_quaternion(self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False) -> Components:
+    def from_quaternion(
+        self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, keep_sign: bool = False
+    ) -> Components:
         """Return the components of a unit quaternion; `degrees` counts where the notation itself says no unit."""
-        unit = degrees if self.degrees is None else self.degrees
-        return self.representation.from_quaternion(x, y, z, w, xp, degrees=unit, axes=self.bound_axes())
+        return self.representation.from_quaternion(
+            x, y, z, w, xp, degrees=self.in_degrees(degrees), axes=self.bound_axes(), keep_sign=keep_sign
+        )
 
     def checked_quaternion(
         self, components: Sequence[float], xp: Namespace, *, degrees: bool = False, normalize: bool = False
     ) -> Quaternion:
-        """Check the floats of one rotation and give its quaternion.
+        """Check the floats of one rotation and return its quaternion.
 
         Raises:
             ValueInvalid: wrong count, not finite, or no rotation.
@@ -204,8 +349,8 @@ class Notation:
         return self.to_quaternion(self.representation.checked(components, normalize=normalize), xp, degrees=degrees)
 
     def bound_axes(self) -> str:
-        """Return the Euler axes; raise ValueInvalid where `euler` was named without them."""
-        if self.representation.name == "euler" and self.axes is None:
+        """Return the Euler axes; raise ValueInvalid where they have to be named and were not."""
+        if self.representation.axes == NAMED_AXES and self.axes is None:
             raise ValueInvalid(f"{self.spec} needs its axes: write euler:rzyx (one of {', '.join(sorted(euler.AXES))})")
         return self.axes or "sxyz"
 
@@ -225,7 +370,7 @@ def notation(spec: str) -> Notation:
         raise ValueInvalid(f"unknown representation {bare!r}{alternatives(bare, REPRESENTATIONS, 'representations')}")
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
-    if colon and bare != "euler":
+    if colon and row.axes != NAMED_AXES:
         raise ValueInvalid(f"{bare} has no axes to name; only euler has: euler:{axes or 'rzyx'}")
     return Notation(spec, row, checked_axes(axes) if colon else None, degrees=degrees)
 

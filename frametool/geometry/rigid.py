@@ -9,11 +9,12 @@ from math import isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rotvec
-from frametool.geometry.quaternion import cross
+from frametool.geometry.quaternion import cross, either, length
+from frametool.geometry.trig import half_sincos, incline
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Components, Namespace, Number, Pair, Rigid, Vector
+    from frametool.geometry.types import Components, Functions, N, Seven, Six, Three, Twelve, Two
 
 SERIES_EXP = 1.5  # rad: above, a - sin(a) loses less than a digit; below, ten terms of its series are exact
 SERIES_LOG = 0.6  # rad: the same for 1 - (a/2) cot(a/2) and six terms
@@ -26,9 +27,9 @@ COTANGENT_REST = (1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1
 
 
 def compose(
-    atx: Number, aty: Number, atz: Number, ax: Number, ay: Number, az: Number, aw: Number,
-    btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number,
-) -> Rigid:  # fmt: skip
+    atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
+    btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N,
+) -> Seven[N]:  # fmt: skip
     """Return a_from_c of a_from_b and b_from_c."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(ax, ay, az, aw)
     x, y, z, w = quaternion.compose(ax, ay, az, aw, bx, by, bz, bw)
@@ -38,72 +39,75 @@ def compose(
     )  # fmt: skip
 
 
-def inverse(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number) -> Rigid:
+def inverse(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> Seven[N]:
     """Return b_from_a of a_from_b."""
-    x, y, z, w = quaternion.conjugate(x, y, z, w)
-    rx, ry, rz = quaternion.rotate(x, y, z, w, tx, ty, tz)
-    return 0.0 - rx, 0.0 - ry, 0.0 - rz, x, y, z, w
+    ix, iy, iz, iw = quaternion.conjugate(x, y, z, w)
+    rx, ry, rz = quaternion.rotate(ix, iy, iz, iw, tx, ty, tz)
+    return 0.0 - rx, 0.0 - ry, 0.0 - rz, ix, iy, iz, iw
 
 
-def apply(
-    tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, px: Number, py: Number, pz: Number
-) -> Vector:
+def apply(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, px: N, py: N, pz: N) -> Three[N]:
     """Move a point: rotate, then shift."""
     rx, ry, rz = quaternion.rotate(x, y, z, w, px, py, pz)
     return rx + tx, ry + ty, rz + tz
 
 
 def relative(
-    atx: Number, aty: Number, atz: Number, ax: Number, ay: Number, az: Number, aw: Number,
-    btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number,
-) -> Rigid:  # fmt: skip
+    atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
+    btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N,
+) -> Seven[N]:  # fmt: skip
     """Return inverse(a) b; the translations are subtracted first, so that near poses keep their digits."""
     x, y, z, w = quaternion.conjugate(ax, ay, az, aw)
     tx, ty, tz = quaternion.rotate(x, y, z, w, btx - atx, bty - aty, btz - atz)
-    return tx, ty, tz, *quaternion.compose(x, y, z, w, bx, by, bz, bw)
+    qx, qy, qz, qw = quaternion.compose(x, y, z, w, bx, by, bz, bw)
+    return tx, ty, tz, qx, qy, qz, qw
 
 
 def interpolate(
-    atx: Number, aty: Number, atz: Number, ax: Number, ay: Number, az: Number, aw: Number,
-    btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number,
-    fraction: Number, xp: Namespace,
-) -> Rigid:  # fmt: skip
+    atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
+    btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N,
+    fraction: N, xp: Functions[N],
+) -> Seven[N]:  # fmt: skip
     """Return the pose between two: the translation along the straight line, the rotation by slerp, as tf2 does.
 
     fraction: 0 gives a and 1 gives b to the bit; outside is extrapolated.
     """
-    rotation = quaternion.slerp(ax, ay, az, aw, bx, by, bz, bw, fraction, xp)
-    between = tuple(_line(a, b, fraction, xp) for a, b in ((atx, btx), (aty, bty), (atz, btz)))
-    tx, ty, tz = quaternion.ends((atx, aty, atz), between, (btx, bty, btz), fraction, xp)
-    return tx, ty, tz, *rotation
+    x, y, z, w = quaternion.slerp(ax, ay, az, aw, bx, by, bz, bw, fraction, xp)
+    tx, ty, tz = _line(atx, btx, fraction, xp), _line(aty, bty, fraction, xp), _line(atz, btz, fraction, xp)
+    return tx, ty, tz, x, y, z, w
 
 
-def _line(start: Number, end: Number, fraction: Number, xp: Namespace) -> Number:
-    """Interpolate two numbers from the nearer end."""
+def _line(start: N, end: N, fraction: N, xp: Functions[N]) -> N:
+    """Interpolate two numbers from the nearer end; the ends to the bit."""
     step = end - start
-    return xp.where(fraction < 0.5, start + fraction * step, end - (1.0 - fraction) * step)
+    between = xp.where(fraction < 0.5, start + fraction * step, end - (1.0 - fraction) * step)
+    return either(fraction == 0.0, start, fraction == 1.0, end, between, xp)
 
 
 def distance(
-    atx: Number, aty: Number, atz: Number, ax: Number, ay: Number, az: Number, aw: Number,
-    btx: Number, bty: Number, btz: Number, bx: Number, by: Number, bz: Number, bw: Number, xp: Namespace,
-) -> Pair:  # fmt: skip
+    atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
+    btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
+) -> Two[N]:  # fmt: skip
     """Return the metres and the radians between two poses."""
-    metres = xp.length(btx - atx, bty - aty, btz - atz)
+    metres = quaternion.magnitude(btx - atx, bty - aty, btz - atz, xp)
     return metres, quaternion.distance(ax, ay, az, aw, bx, by, bz, bw, xp)
 
 
-def to_matrix(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number) -> Components:
+def extent(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Two[N]:
+    """Return how far a transform shifts, in metres, and turns, in [0, pi] radians."""
+    return quaternion.magnitude(tx, ty, tz, xp), quaternion.angle(x, y, z, w, xp)
+
+
+def to_matrix(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> Twelve[N]:
     """Return the upper twelve entries m11 .. m34 of the homogeneous matrix, row-major; the last row is 0 0 0 1."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(x, y, z, w)
     return r11, r12, r13, tx, r21, r22, r23, ty, r31, r32, r33, tz
 
 
-def to_homogeneous(
-    tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, _xp: Namespace
-) -> Components:
-    """Return the sixteen entries of the homogeneous matrix, row-major."""
-    return *to_matrix(tx, ty, tz, x, y, z, w), 0.0, 0.0, 0.0, 1.0
+def to_homogeneous(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, _xp: Functions[N]) -> Components:
+    """Return the sixteen entries of the homogeneous matrix, row-major; floats stand for every row."""
+    upper: Components = to_matrix(tx, ty, tz, x, y, z, w)
+    return *upper, 0.0, 0.0, 0.0, 1.0
 
 
 def check_twist(vx: float, vy: float, vz: float, wx: float, wy: float, wz: float) -> None:
@@ -113,14 +117,14 @@ def check_twist(vx: float, vy: float, vz: float, wx: float, wy: float, wz: float
     rotvec.check(wx, wy, wz)
 
 
-def exp(vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number, xp: Namespace) -> Rigid:
+def exp(vx: N, vy: N, vz: N, wx: N, wy: N, wz: N, xp: Functions[N]) -> Seven[N]:
     """Return the transform reached by a constant twist in unit time.
 
     v in metres, w in radians, linear part first as in ROS messages.
     Source: Murray, Li & Sastry 1994: t = v + B w x v + C w x (w x v), B = (1 - cos a)/a^2, C = (a - sin a)/a^3.
     """
-    angle = xp.maximum(xp.length(wx, wy, wz), quaternion.TINY)
-    half_sine, half_cosine = xp.half_sincos(angle)
+    angle = xp.maximum(length(wx, wy, wz, xp), quaternion.TINY)
+    half_sine, half_cosine = half_sincos(angle, xp)
     low = angle < SERIES_EXP
     ratio = half_sine / angle
     low_square, high = xp.where(low, angle, 0.0), xp.where(low, SERIES_EXP, angle)
@@ -135,14 +139,14 @@ def exp(vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number, 
     )  # fmt: skip
 
 
-def log(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, xp: Namespace) -> Components:
+def log(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Six[N]:
     """Return the twist vx, vy, vz, wx, wy, wz whose `exp` is this transform, with an angle up to pi.
 
     Source: v = t - w x t / 2 + D w x (w x t), D = (1 - (a/2) cot(a/2))/a^2, by its series below 0.6 rad.
     """
     wx, wy, wz = rotvec.from_quaternion(x, y, z, w, xp)
-    sine, cosine = xp.length(x, y, z), abs(w)
-    half = xp.incline(sine, cosine)
+    sine, cosine = length(x, y, z, xp), abs(w)
+    half = incline(sine, cosine, xp)
     squared = 4.0 * half * half
     low = 2.0 * half < SERIES_LOG
     series = _polynomial(xp.where(low, squared, 0.0), COTANGENT_REST)
@@ -152,9 +156,11 @@ def log(tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: 
     return tx + (factor * dx - 0.5 * cx), ty + (factor * dy - 0.5 * cy), tz + (factor * dz - 0.5 * cz), wx, wy, wz
 
 
-def _polynomial(x: Number, coefficients: tuple[float, ...]) -> Number:
+def _polynomial(x: N, coefficients: tuple[float, ...]) -> N:
     """Evaluate a polynomial by Horner's rule, lowest coefficient first."""
-    value = coefficients[-1]
-    for coefficient in coefficients[-2::-1]:
-        value = value * x + coefficient
+    value = x * coefficients[-1]
+    for coefficient in coefficients[-2:0:-1]:
+        value += coefficient
+        value *= x
+    value += coefficients[0]
     return value

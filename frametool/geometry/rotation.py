@@ -5,31 +5,33 @@ Knows no text and no files; radians only. One item is four Python floats and nee
 
 from __future__ import annotations
 
+from functools import cache
+
 from frametool.errors import ValueInvalid
-from frametool.geometry import axis_angle, dispatch, euler, floats, matrix, mrp, quaternion, rotvec, six_d, validation
-from frametool.geometry.representations import checked_axes
+from frametool.geometry import dispatch, euler, floats, quaternion, validation
+from frametool.geometry.batched import Batched
+from frametool.geometry.representations import checked_axes, notation
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from typing import Any
 
-    from frametool.geometry.types import Array, Components, Kernel, Numbers, Quaternion
+    from frametool.geometry.types import Array, Components, Numbers, Quaternion
 
 NEAR = 1e-9  # rad: rotations closer than this count as close, three digits above the rounding of long chains
 
 _new = object.__new__
+_form = cache(notation)
 
 
-class Rotation:
+class Rotation(Batched):
     """One rotation, or an array of them of any shape; frozen.
 
     Active, right-handed; quaternions are Hamilton's, x, y, z, w.  `@` composes (the right one acts first), `apply`
     turns vectors.  Every `from_X` takes leading axes (..., k), every `as_X` gives them; nothing given is changed.
     """
 
-    __slots__ = ("_components",)
-    __array_ufunc__ = None  # an array times a rotation is refused, not tried element by element
+    __slots__ = ()
     _components: Quaternion
 
     def __init__(self, xyzw: Numbers) -> None:
@@ -73,12 +75,7 @@ class Rotation:
         Raises:
             ValueInvalid: wrong shape, not finite, zero, or not of norm 1; names the first such row.
         """
-        given = validation.columns(xyzw, 4, "xyzw")
-        if validation.single(given):
-            return cls.of(*quaternion.check(*given, normalize=normalize))
-        from frametool.geometry.batch_validation import unit_quaternions
-
-        return cls._of_columns(unit_quaternions(given, "xyzw", normalize=normalize))
+        return cls.from_columns("xyzw", validation.columns(xyzw, 4, "xyzw"), "xyzw", normalize=normalize)
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Rotation:
@@ -89,45 +86,38 @@ class Rotation:
         Raises:
             ValueInvalid: wrong shape, not finite, mirrored, singular, not orthonormal; names the first such row.
         """
-        given = validation.matrices(matrices, 3, "matrix")
-        if validation.single(given):
-            return cls.of(*matrix.to_quaternion(*matrix.check(*given, normalize=normalize), floats))
-        from frametool.geometry.batch_validation import rotation_quaternions
-
-        return cls._of_columns(rotation_quaternions(given, "matrix", normalize=normalize))
+        return cls.from_columns("matrix", validation.matrices(matrices, 3, "matrix"), "matrix", normalize=normalize)
 
     @classmethod
     def from_rotvec(cls, rotvec_xyz: Numbers) -> Rotation:
         """Take rotation vectors, axis times angle in radians, of shape (..., 3)."""
-        return cls._from(rotvec_xyz, 3, "rotvec", rotvec.to_quaternion, rotvec.check)
+        return cls.from_columns("rotvec", validation.columns(rotvec_xyz, 3, "rotvec"), "rotvec")
 
     @classmethod
     def from_axis_angle(cls, axis: Numbers, angle: Numbers) -> Rotation:
         """Take axes of shape (..., 3), of any length but 0, and angles in radians of shape (...); they broadcast."""
         given = (*validation.columns(axis, 3, "axis"), validation.scalars(angle, "angle"))
-        return cls._checked(given, "axis", axis_angle.to_quaternion, axis_angle.check)
+        return cls.from_columns("axis_angle", given, "axis")
 
     @classmethod
     def from_euler(cls, axes: str, angles: Numbers) -> Rotation:
         """Take angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`."""
-        given = validation.columns(angles, 3, "angles")
-        return cls._of_columns(dispatch.convert(euler.to_quaternion, 4, given, "angles", checked_axes(axes)))
+        return cls.from_columns(f"euler:{axes}", validation.columns(angles, 3, "angles"), "angles")
 
     @classmethod
     def from_rpy(cls, rpy: Numbers) -> Rotation:
         """Take roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
-        angles = validation.columns(rpy, 3, "rpy")
-        return cls._of_columns(dispatch.convert(euler.to_quaternion, 4, angles, "rpy", "sxyz"))
+        return cls.from_columns("rpy", validation.columns(rpy, 3, "rpy"), "rpy")
 
     @classmethod
     def from_mrp(cls, parameters: Numbers) -> Rotation:
         """Take modified Rodrigues parameters, axis times tan(angle/4), of shape (..., 3)."""
-        return cls._from(parameters, 3, "mrp", lambda px, py, pz, _xp: mrp.to_quaternion(px, py, pz), mrp.check)
+        return cls.from_columns("mrp", validation.columns(parameters, 3, "mrp"), "mrp")
 
     @classmethod
     def from_six_d(cls, columns: Numbers) -> Rotation:
         """Take the first two matrix columns, one after the other, of shape (..., 6); they are orthonormalised."""
-        return cls._from(columns, 6, "six_d", six_d.to_quaternion, six_d.check)
+        return cls.from_columns("six_d", validation.columns(columns, 6, "six_d"), "six_d")
 
     @classmethod
     def between(cls, start: Numbers, end: Numbers) -> Rotation:
@@ -136,37 +126,39 @@ class Rotation:
         For opposite directions the axis is at right angles to the start and to the coordinate axis farthest from it.
         """
         parts = (*validation.columns(start, 3, "start"), *validation.columns(end, 3, "end"))
-        return cls._checked(parts, "start, end", quaternion.between, quaternion.check_directions)
+        made = dispatch.checked(quaternion.between, 4, parts, "start, end", quaternion.check_directions)
+        return cls._of_columns(made)
 
     @classmethod
-    def _from(cls, value: Numbers, width: int, name: str, kernel: Kernel, check: Any) -> Rotation:
-        return cls._checked(validation.columns(value, width, name), name, kernel, check)
+    def from_columns(cls, spec: str, given: Components, name: str, *, normalize: bool = False) -> Rotation:
+        """Check and convert the columns of a notation; errors call them `name`."""
+        form = _form(spec)
+        if validation.single(given):
+            return cls.of(*form.checked_quaternion(given, floats, normalize=normalize))
+        from frametool.geometry.batch_validation import require_rotations
 
-    @classmethod
-    def _checked(cls, given: Components, name: str, kernel: Kernel, check: Any) -> Rotation:
-        return cls._of_columns(dispatch.checked(kernel, 4, given, name, check))
+        return cls._of_columns(require_rotations(form, given, name, normalize=normalize))
 
-    @classmethod
-    def _of_columns(cls, components: Components) -> Rotation:
-        x, y, z, w = components
-        return cls.of(x, y, z, w)
+    def _as(self, spec: str) -> Array:
+        """Return rows of the columns of a notation."""
+        form = _form(spec)
+        return dispatch.rows(form.from_quaternion, len(form.columns), self._components)
 
     def as_quaternion(self) -> Array:
         """Return x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""
-        return dispatch.rows(quaternion.from_quaternion, 4, self._components)
+        return self._as("xyzw")
 
     def as_matrix(self) -> Array:
         """Return matrices of shape (..., 3, 3); columns are the turned axes."""
-        nine = dispatch.rows(lambda x, y, z, w, _xp: quaternion.to_matrix(x, y, z, w), 9, self._components)
-        return nine.reshape(*self.shape, 3, 3)
+        return self._as("matrix").reshape(*self.shape, 3, 3)
 
     def as_rotvec(self) -> Array:
         """Return rotation vectors of shape (..., 3), radians, of length 0 to pi."""
-        return dispatch.rows(rotvec.from_quaternion, 3, self._components)
+        return self._as("rotvec")
 
     def as_axis_angle(self) -> tuple[Array, Any]:
         """Return unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x."""
-        four = dispatch.rows(axis_angle.from_quaternion, 4, self._components)
+        four = self._as("axis_angle")
         return four[..., :3], four[..., 3] if four.ndim > 1 else float(four[3])
 
     def as_euler(self, axes: str) -> Array:
@@ -175,19 +167,19 @@ class Rotation:
         The middle one lies in [-pi/2, pi/2], or in [0, pi] where first and third axis are the same; at gimbal lock
         (see `gimbal_lock`) the third is 0.
         """
-        return dispatch.rows(euler.from_quaternion, 3, self._components, checked_axes(axes))
+        return self._as(f"euler:{axes}")
 
     def as_rpy(self) -> Array:
         """Return roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
-        return self.as_euler("sxyz")
+        return self._as("rpy")
 
     def as_mrp(self) -> Array:
         """Return modified Rodrigues parameters of shape (..., 3), of length 0 to 1."""
-        return dispatch.rows(mrp.from_quaternion, 3, self._components)
+        return self._as("mrp")
 
     def as_six_d(self) -> Array:
         """Return the first two matrix columns, one after the other, of shape (..., 6)."""
-        return dispatch.rows(lambda x, y, z, w, _xp: six_d.from_quaternion(x, y, z, w), 6, self._components)
+        return self._as("six_d")
 
     def gimbal_lock(self, axes: str) -> Any:
         """Say per element whether the angles of a convention are at gimbal lock, to 1 eps."""
@@ -216,7 +208,7 @@ class Rotation:
     def apply(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
         given = validation.columns(vectors, 3, "vectors")
-        return dispatch.moved(quaternion.rotate, self._components, quaternion.to_matrix, given, "vectors")
+        return dispatch.moved(quaternion.rotate, self._components, given, "vectors", flatten=quaternion.to_matrix)
 
     def angle(self) -> Any:
         """Return the angle of rotation in [0, pi] radians."""
@@ -243,34 +235,10 @@ class Rotation:
 
         Source: Markley et al. 2007, the eigenvector of the largest eigenvalue of sum(w q q^T).
         """
-        import numpy as np
-
-        if validation.single(self._components):
+        if not self.shape:
             return self
-        heavy = None if weights is None else validation.weights(weights, self.shape)
-        moment = dispatch.second_moment(self._components, heavy)
-        return Rotation.from_quaternion(np.linalg.eigh(moment)[1][:, 3], normalize=True).canonical()
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape of the batch; () for one rotation."""
-        return getattr(self._components[3], "shape", ())
-
-    def __len__(self) -> int:
-        """Count along the first axis; one rotation has no length."""
-        if not self.shape:
-            raise TypeError("one rotation has no length")
-        return self.shape[0]
-
-    def __getitem__(self, index: Any) -> Rotation:
-        """Choose elements as numpy does."""
-        if not self.shape:
-            raise TypeError("one rotation has no elements")
-        return self._of_columns(dispatch.chosen(self._components, index))
-
-    def __iter__(self) -> Iterator[Rotation]:
-        """Go along the first axis."""
-        return (self[index] for index in range(len(self)))
+        moment = dispatch.second_moment(self._components, dispatch.masses(weights, self.shape))
+        return Rotation.of(*quaternion.largest_eigenvector(moment)).canonical()
 
     def __repr__(self) -> str:
         """Show one rotation's quaternion, or the shape of many."""

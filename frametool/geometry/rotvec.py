@@ -2,52 +2,48 @@
 
 from __future__ import annotations
 
-from frametool.errors import ValueInvalid
-from frametool.geometry.quaternion import TINY
+from math import inf
 
-LIMIT = 1e150  # beyond, the square of the length overflows (and no digit of a turn is left)
+from frametool.errors import ValueInvalid
+from frametool.geometry.quaternion import TINY, length
+from frametool.geometry.trig import RADIAN, half_sincos, half_sincos_deg, incline
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Namespace, Number, Quaternion, Vector
+    from frametool.geometry.types import Components, Four, Functions, N, Three
 
 
-def to_quaternion(rx: Number, ry: Number, rz: Number, xp: Namespace, *, degrees: bool = False) -> Quaternion:
+def to_quaternion(rx: N, ry: N, rz: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
     """Return the quaternion x, y, z, w of a rotation vector in radians or degrees.
 
     Exact down to 1e-300: an angle too small to be divided by stands for all smaller ones, with the same quotient.
     The unit axis is taken first, so that multiples of 90 degrees about a coordinate axis are exact.
     """
-    angle = xp.maximum(xp.length(rx, ry, rz), TINY)
-    sine, cosine = xp.half_sincos_deg(angle) if degrees else xp.half_sincos(angle)
+    angle = xp.maximum(length(rx, ry, rz, xp), TINY)
+    sine, cosine = half_sincos_deg(angle, xp) if degrees else half_sincos(angle, xp)
     return rx / angle * sine, ry / angle * sine, rz / angle * sine, cosine
 
 
-def from_quaternion(x: Number, y: Number, z: Number, w: Number, xp: Namespace, *, degrees: bool = False) -> Vector:
+def from_quaternion(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False) -> Three[N]:
     """Return the rotation vector of a unit quaternion, of length 0 to pi (or 180 degrees).
 
     Relative accuracy holds down to 1e-300.  Half a turn leaves with the sign the quaternion has.
     """
-    sine = xp.maximum(xp.length(x, y, z), TINY)
-    angle = xp.copysign(2.0 * xp.incline(sine, abs(w)), w)
+    sine = xp.maximum(length(x, y, z, xp), TINY)
+    angle = xp.copysign(2.0 * incline(sine, abs(w), xp), w)
     if degrees:
-        angle = xp.degrees(angle)
+        angle *= RADIAN
     return x / sine * angle, y / sine * angle, z / sine * angle
 
 
-def check(
-    rx: float,
-    ry: float,
-    rz: float,
-    *,
-    normalize: bool = False,  # noqa: ARG001 - every length is one
-) -> tuple[float, float, float]:
-    """Check one at the door.
+def check(*vector: float, what: str = "rotation vector", normalize: bool = False) -> Components:  # noqa: ARG001
+    """Return one back.
 
     Raises:
         ValueInvalid: not finite, or so long that its square overflows.
     """
-    if not all(abs(value) <= LIMIT for value in (rx, ry, rz)):
-        shown = f"rotation vector {rx:g} {ry:g} {rz:g}"
-        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below {LIMIT:g}", rule="not-finite")
-    return rx, ry, rz
+    x, y, z = vector
+    if not x * x + y * y + z * z < inf:
+        shown = f"{what} {x:g} {y:g} {z:g}"
+        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below 1e+150", rule="not-finite")
+    return vector

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats, matrix
-from frametool.geometry.quaternion import cross, to_matrix, unit_vector
+from frametool.geometry.quaternion import cross, length, to_matrix, unit_vector
 
 PARALLEL = 1e-12  # sine between the columns: below, rounding decides the plane they span
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Components, Namespace, Number, Quaternion
+    from frametool.geometry.types import Components, Four, Functions, N, Six
 
 
-def to_quaternion(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace) -> Quaternion:
+def to_quaternion(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[N]:
     """Return the quaternion of two columns, orthonormalised by Gram and Schmidt.
 
     The columns need be neither unit nor at right angles, but not parallel.
@@ -30,33 +30,35 @@ def to_quaternion(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz
     return matrix.to_quaternion(ax, bx, cx, ay, by, cy, az, bz, cz, xp)
 
 
-def from_quaternion(x: Number, y: Number, z: Number, w: Number) -> Components:
+def from_quaternion(x: N, y: N, z: N, w: N) -> Six[N]:
     """Return r11, r21, r31 and r12, r22, r32."""
     r11, r12, _, r21, r22, _, r31, r32, _ = to_matrix(x, y, z, w)
     return r11, r21, r31, r12, r22, r32
 
 
-def check(
-    ax: float,
-    ay: float,
-    az: float,
-    bx: float,
-    by: float,
-    bz: float,
-    *,
-    normalize: bool = False,  # noqa: ARG001
-) -> Components:
-    """Check one pair of columns at the door; any two that span a plane will do.
+def deviation(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> N:
+    """Return 0 where two columns span a plane, else inf."""
+    sine = length(*cross(*unit_vector(ax, ay, az, xp), *unit_vector(bx, by, bz, xp)), xp)
+    return xp.where(sine > PARALLEL, 0.0, inf)
+
+
+def repaired(ax: N, ay: N, az: N, bx: N, by: N, bz: N, _xp: Functions[N]) -> Six[N]:
+    """Return two columns as they are: `to_quaternion` takes any that span a plane."""
+    return ax, ay, az, bx, by, bz
+
+
+def check(*columns: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any two that span a plane
+    """Return one pair of columns back.
 
     Raises:
         ValueInvalid: not finite, zero or parallel.
     """
+    ax, ay, az, bx, by, bz = columns
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
-    if not all(map(isfinite, (ax, ay, az, bx, by, bz))):
+    if not all(map(isfinite, columns)):
         raise ValueInvalid(f"{shown} are not finite; give six finite numbers", rule="not-finite")
     if not (ax or ay or az) or not (bx or by or bz):
         raise ValueInvalid(f"{shown} span no plane: one is zero", rule="denormalized")
-    first, second = unit_vector(ax, ay, az, floats), unit_vector(bx, by, bz, floats)
-    if floats.length(*cross(*first, *second)) <= PARALLEL:
+    if deviation(ax, ay, az, bx, by, bz, floats):
         raise ValueInvalid(f"{shown} span no plane: they are parallel", rule="denormalized")
-    return ax, ay, az, bx, by, bz
+    return columns

@@ -12,38 +12,37 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import TypeAlias
 
-    from frametool.geometry.types import Number
+    from frametool.geometry.types import N, Six
 
-    Six: TypeAlias = tuple[Number, Number, Number, Number, Number, Number]
     Rows: TypeAlias = Sequence[Sequence[float]]
 
 
 def move_wrench(
-    tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number,
-    fx: Number, fy: Number, fz: Number, mx: Number, my: Number, mz: Number,
-) -> Six:  # fmt: skip
+    tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N,
+    fx: N, fy: N, fz: N, mx: N, my: N, mz: N,
+) -> Six[N]:  # fmt: skip
     """Return force and torque about the target's origin: f' = R f, m' = R m + t x f'.
 
     f in N and m in Nm about the source's origin. Source: Murray, Li, Sastry 1994, eq. 2.66.
     """
-    force = quaternion.rotate(x, y, z, w, fx, fy, fz)
-    torque = quaternion.rotate(x, y, z, w, mx, my, mz)
-    lever = quaternion.cross(tx, ty, tz, *force)
-    return (*force, torque[0] + lever[0], torque[1] + lever[1], torque[2] + lever[2])
+    ax, ay, az = quaternion.rotate(x, y, z, w, fx, fy, fz)
+    bx, by, bz = quaternion.rotate(x, y, z, w, mx, my, mz)
+    cx, cy, cz = quaternion.cross(tx, ty, tz, ax, ay, az)
+    return ax, ay, az, bx + cx, by + cy, bz + cz
 
 
 def move_twist(
-    tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number,
-    vx: Number, vy: Number, vz: Number, wx: Number, wy: Number, wz: Number,
-) -> Six:  # fmt: skip
+    tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N,
+    vx: N, vy: N, vz: N, wx: N, wy: N, wz: N,
+) -> Six[N]:  # fmt: skip
     """Return the velocity of the same rigid body at the target's origin: w' = R w, v' = R v + t x w'.
 
     v in m/s is that of the body's point at the source's origin. Source: Murray, Li, Sastry 1994, eq. 2.58.
     """
-    linear = quaternion.rotate(x, y, z, w, vx, vy, vz)
-    angular = quaternion.rotate(x, y, z, w, wx, wy, wz)
-    arm = quaternion.cross(tx, ty, tz, *angular)
-    return (linear[0] + arm[0], linear[1] + arm[1], linear[2] + arm[2], *angular)
+    ax, ay, az = quaternion.rotate(x, y, z, w, vx, vy, vz)
+    bx, by, bz = quaternion.rotate(x, y, z, w, wx, wy, wz)
+    cx, cy, cz = quaternion.cross(tx, ty, tz, bx, by, bz)
+    return ax + cx, ay + cy, az + cz, bx, by, bz
 
 
 def rotate_covariance(x: float, y: float, z: float, w: float, covariance: Sequence[float]) -> list[float]:
@@ -74,7 +73,15 @@ def move_twist_covariance(
 
 def _product(a: Rows, b: Rows) -> list[list[float]]:
     columns = _transposed(b)
-    return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in columns] for row in a]
+    return [[_inner(row, column) for column in columns] for row in a]
+
+
+def _inner(row: Sequence[float], column: Sequence[float]) -> float:
+    """Return the sum of the products in their order: `sum` compensates its rounding from Python 3.12 on."""
+    total = 0.0
+    for x, y in zip(row, column, strict=True):
+        total += x * y
+    return total
 
 
 def _transposed(a: Rows) -> list[list[float]]:

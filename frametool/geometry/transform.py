@@ -6,28 +6,27 @@ Knows no names and no time. `a_from_b` takes points seen in b to the same points
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import dispatch, floats, matrix, rigid, validation
+from frametool.geometry import dispatch, rigid, spatial, validation
+from frametool.geometry.batched import Batched
 from frametool.geometry.rotation import NEAR, Rotation, require
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from typing import Any
 
-    from frametool.geometry.types import Array, Components, Numbers, Rigid
+    from frametool.geometry.types import Array, Numbers, Rigid
 
 NEAR_BY = 1e-9  # metres: translations closer than this count as close
 _new = object.__new__
 
 
-class Transform:
+class Transform(Batched):
     """One rigid transform, or an array of them of any shape; frozen.
 
     `a_from_c = a_from_b @ b_from_c`; `point_in_a = a_from_b.apply(point_in_b)`.  Metres and radians.
     """
 
-    __slots__ = ("_components",)
-    __array_ufunc__ = None  # an array times a transform is refused, not tried element by element
+    __slots__ = ()
     _components: Rigid
 
     def __init__(self, rotation: Rotation, translation: Numbers) -> None:
@@ -82,14 +81,8 @@ class Transform:
         """
         m = validation.matrices(matrices, 4, "matrix")
         validation.check_last_row(m, "matrix")
-        turned = (*m[0:3], *m[4:7], *m[8:11])
-        if validation.single(m):
-            rotation: Any = matrix.to_quaternion(*matrix.check(*turned, normalize=normalize), floats)
-        else:
-            from frametool.geometry.batch_validation import rotation_quaternions
-
-            rotation = rotation_quaternions(turned, "matrix", normalize=normalize)
-        return cls._of_columns(validation.joined((m[3], m[7], m[11], *rotation), "matrix"))
+        rotation = Rotation.from_columns("matrix", (*m[0:3], *m[4:7], *m[8:11]), "matrix", normalize=normalize)
+        return cls._of_columns(validation.joined((m[3], m[7], m[11], *rotation.components), "matrix"))
 
     @classmethod
     def exp(cls, twist: Numbers) -> Transform:
@@ -99,11 +92,6 @@ class Transform:
         """
         given = validation.columns(twist, 6, "twist")
         return cls._of_columns(dispatch.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
-
-    @classmethod
-    def _of_columns(cls, components: Components) -> Transform:
-        tx, ty, tz, x, y, z, w = components
-        return cls.of(tx, ty, tz, x, y, z, w)
 
     @property
     def xyz(self) -> Array:
@@ -155,11 +143,21 @@ class Transform:
     def apply(self, points: Numbers) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
         given = validation.columns(points, 3, "points")
-        return dispatch.moved(rigid.apply, self._components, rigid.to_matrix, given, "points")
+        return dispatch.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix)
 
     def apply_vector(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
         return self.rotation.apply(vectors)
+
+    def apply_twist(self, twists: Numbers) -> Array:
+        """Move velocities (vx, vy, vz, wx, wy, wz), shape (..., 6): that of the same body at this side's origin."""
+        given = validation.columns(twists, 6, "twists")
+        return dispatch.moved(spatial.move_twist, self._components, given, "twists")
+
+    def apply_wrench(self, wrenches: Numbers) -> Array:
+        """Move wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to this side's origin."""
+        given = validation.columns(wrenches, 6, "wrenches")
+        return dispatch.moved(spatial.move_wrench, self._components, given, "wrenches")
 
     def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
         """Interpolate: translation along the line, rotation by slerp; fractions 0 and 1 give the ends to the bit.
@@ -188,28 +186,10 @@ class Transform:
         """Return the weighted mean of all elements: of the translations, and the chordal one of the rotations."""
         if not self.shape:
             return self
-        return Transform(self.rotation.mean(weights), dispatch.mean_rows(self._components[:3], weights))
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape of the batch; () for one transform."""
-        return getattr(self._components[6], "shape", ())
-
-    def __len__(self) -> int:
-        """Count along the first axis; one transform has no length."""
-        if not self.shape:
-            raise TypeError("one transform has no length")
-        return self.shape[0]
-
-    def __getitem__(self, index: Any) -> Transform:
-        """Choose elements as numpy does."""
-        if not self.shape:
-            raise TypeError("one transform has no elements")
-        return self._of_columns(dispatch.chosen(self._components, index))
-
-    def __iter__(self) -> Iterator[Transform]:
-        """Go along the first axis."""
-        return (self[index] for index in range(len(self)))
+        mass = dispatch.masses(weights, self.shape)
+        whole = dispatch.total(mass, 1.0)
+        x, y, z = (dispatch.total(part, mass) / whole for part in self._components[:3])
+        return Transform.of(x, y, z, *self.rotation.mean(weights).components)
 
     def __repr__(self) -> str:
         """Show one transform's numbers, or the shape of many."""

@@ -1,28 +1,62 @@
 """Name the kinds of numbers the kernels take; nothing here exists at run time.
 
-A kernel's components are either all Python floats or float64 arrays of one shape (a float among arrays stands for
-every element). `xp` is `frametool.geometry.floats` for the one and `frametool.geometry.arrays` for the other.
+A kernel is written once, for floats and for float64 arrays of one shape: `N` is the one or the other, and mypy checks
+a kernel's body for each.  `Functions[N]` is what it finds in `xp`: the module `floats` or the module `arrays`.  A float
+among arrays stands for every element.
 """
+
+# ruff: noqa: D102 - the functions of a namespace are those of `math`; the others say what they do where they stand
 
 from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import ModuleType
-    from typing import Any, TypeAlias
+    from typing import Any, Protocol, TypeAlias, TypeVar
 
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    Number: TypeAlias = Any  # float or float64 array: operators between the two have no type mypy can follow
-    Namespace: TypeAlias = ModuleType
-    Pair: TypeAlias = tuple[Number, Number]
+    Array: TypeAlias = NDArray[np.float64]
+    Indices: TypeAlias = NDArray[np.int64]
+    Numbers: TypeAlias = ArrayLike
+    N = TypeVar("N", float, Array)
+    Condition: TypeAlias = bool | NDArray[np.bool_]
+
+    Two: TypeAlias = tuple[N, N]
+    Three: TypeAlias = tuple[N, N, N]
+    Four: TypeAlias = tuple[N, N, N, N]
+    Six: TypeAlias = tuple[N, N, N, N, N, N]
+    Seven: TypeAlias = tuple[N, N, N, N, N, N, N]
+    Eight: TypeAlias = tuple[N, N, N, N, N, N, N, N]
+    Nine: TypeAlias = tuple[N, N, N, N, N, N, N, N, N]
+    Twelve: TypeAlias = tuple[N, N, N, N, N, N, N, N, N, N, N, N]
+
+    class Functions(Protocol[N]):
+        """The functions a kernel needs beyond arithmetic; all are exact or rounded right on every machine."""
+
+        def sqrt(self, x: N, /) -> N: ...
+        def copysign(self, x: N | float, sign: N, /) -> N: ...
+        def maximum(self, x: N, y: N | float, /) -> N: ...
+        def minimum(self, x: N, y: N | float, /) -> N: ...
+        def fmod(self, x: N, y: float, /) -> N: ...
+        def frexp(self, x: N, /) -> tuple[N, Any]: ...  # exponents: an int, or an array of them
+        def ldexp(self, x: N | float, exponent: Any, /) -> N: ...
+        def where(self, condition: Condition, yes: N | float, no: N | float, /) -> N: ...
+        def some(self, condition: Condition, /) -> bool | np.bool_: ...
+        def largest(self, x: N, /) -> float: ...
+        def all_near_one(self, x: N, tolerance: float, /) -> bool: ...
+        def first_nonzero(self, a: N, b: N, c: N, d: N, /) -> N: ...
+        def canonical_sign(self, x: N, y: N, z: N, w: N, /) -> Four[N]: ...
+        def doubled_sincos(self, y: N, /) -> Two[N]: ...
+        def doubled_arctan(self, tangent: N, /) -> N: ...
+        def reduced_exactly(self, x: N, /) -> Two[N]: ...
+
+    # Outside the kernels a value holds floats or arrays, which of them only its maker knows: no type tells.
+    Number: TypeAlias = Any
+    Namespace: TypeAlias = Functions[Any]
     Vector: TypeAlias = tuple[Number, Number, Number]
     Quaternion: TypeAlias = tuple[Number, Number, Number, Number]
-    Matrix: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number, Number, Number]
     Rigid: TypeAlias = tuple[Number, Number, Number, Number, Number, Number, Number]
     Components: TypeAlias = tuple[Number, ...]
     Kernel: TypeAlias = Callable[..., Components]
-    Array: TypeAlias = NDArray[np.float64]
-    Numbers: TypeAlias = ArrayLike

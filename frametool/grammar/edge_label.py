@@ -22,11 +22,11 @@ MOST_PLAIN = 1e9
 def edge_label(transform: Transform, style: Style) -> tuple[str, str]:
     """Return two lines: `xyz 0.1 0 1.2` and `rpy_deg 0 15 0`, or the first representation asked for."""
     pose = Pose.of(transform.components)
-    form = style.notations[0] if style.notations else notation("rpy_deg")
-    degrees = bool(form.representation.angles) and style.in_degrees(form)
+    chosen = style.notations[0] if style.notations else notation("rpy_deg")
+    degrees = bool(chosen.representation.angles) and style.in_degrees(chosen)
     position = _short(pose.components[:3], style.precision if style.precision is not None else METRES)
     decimals = style.precision if style.precision is not None else DEGREES if degrees else METRES
-    return f"xyz {position}", f"{form.spec} {_short(rotation_numbers(pose, form, style), decimals)}"
+    return f"xyz {position}", f"{chosen.spec} {_short(rotation_numbers(pose, chosen, style), decimals)}"
 
 
 def graphviz(text: str) -> str:

@@ -12,10 +12,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean
-from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry import rigid
 from frametool.geometry.representations import REPRESENTATIONS
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
-from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_rotation
+from frametool.grammar.rotation import AGREEMENT, AXES_KEY, ROTATION_KEYS, agreeing_rotation, read_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -29,7 +29,6 @@ TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg"))
 NAMES = frozenset(("name", "parent"))
 POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", AXES_KEY))
-AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie apart
 
 
 class Pose(NamedTuple):
@@ -78,7 +77,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
                 position = _agreeing_position(position, read_position(value, POSITION_KEYS[key]))
             elif key in ROTATION_KEYS or key == AXES_KEY:
                 moved, turned = read_rotation(key, value, reading)
-                rotation = turned if rotation is None else _agreeing_rotation(rotation, turned)
+                rotation = turned if rotation is None else agreeing_rotation(rotation, turned)
                 if moved is not None:
                     position = _only_position(position, moved)
     except Misfit as error:
@@ -148,16 +147,6 @@ def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
     apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
     if apart > AGREEMENT * (1.0 + max(map(abs, first))):
         raise NotARotation(f"two positions in one entry disagree by {apart:.6g} m; keep one")
-    return first
-
-
-def _agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
-    """Accept a second spelling of the rotation if it says the same."""
-    import math
-
-    apart = quaternion.distance(*first, *second, floats)
-    if apart > AGREEMENT:
-        raise NotARotation(f"two rotations in one entry disagree by {math.degrees(apart):.6g} degrees; keep one")
     return first
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry import floats, rigid
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 
@@ -50,8 +50,7 @@ def relative(a: Pose, b: Pose) -> Result:
     Raises ValueInvalid where the two are given in different frames.
     """
     components = rigid.relative(*a.components, *b.components)
-    distance = floats.length(*components[:3])
-    angle = quaternion.angle(*components[3:], floats)
+    distance, angle = rigid.extent(*components, floats)
     extras = dict(zip(RELATIVE_EXTRAS, (distance, angle, math.degrees(angle)), strict=True))
     parent, name = relative_names(a, b)
     return Result(Pose.of(components, name, parent), extras)

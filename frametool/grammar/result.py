@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import ValueInvalid
 from frametool.geometry import euler, floats, quaternion
 from frametool.grammar.pose import Pose
+from frametool.grammar.rotation import spelled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -16,19 +17,11 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
 
 
-# --keep-sign: the components as they come out of the arithmetic; other notations have no such sign
-KEPT = {
-    "quaternion": lambda x, y, z, w: (x, y, z, w),
-    "xyzw": lambda x, y, z, w: (x, y, z, w),
-    "wxyz": lambda x, y, z, w: (w, x, y, z),
-}
-
-
 INFINITE = float("inf")
 
 
 class Style:
-    """How results are written: form, representations, unit of bare angles, digits, sign of quaternions."""
+    """How results are written: format, notations, unit of bare angles, digits, sign of quaternions."""
 
     __slots__ = ("degrees", "form", "keep_sign", "notations", "precision")
 
@@ -60,9 +53,9 @@ class Style:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
         return repr(value) if self.precision is None else f"{value:.{self.precision}f}"
 
-    def in_degrees(self, form: Notation) -> bool:
-        """Tell whether a representation's angles are written in degrees: its own suffix wins."""
-        return self.degrees if form.degrees is None else form.degrees
+    def in_degrees(self, notation: Notation) -> bool:
+        """Tell whether a notation's angles are written in degrees: its own suffix wins."""
+        return notation.in_degrees(self.degrees)
 
 
 class Result:
@@ -81,14 +74,24 @@ class Result:
         entry: dict[str, Any] = {key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name}
         if pose.rotation is None:
             return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | self.extras
-        if pose.position is not None and not any(is_matrix(form) for form in style.notations):
+        if pose.position is not None and not any(carries_position(each) for each in style.notations):
             entry["xyz"] = list(pose.position)
-        for form in style.notations:
-            key, value = rotation_entry(pose, form, style)
-            entry[key] = value
-        if any(is_locked(pose, form) for form in style.notations):
+        for each in style.notations:
+            key, value = rotation_entry(pose, each, style)
+            _add(entry, key, value)
+        if any(is_locked(pose, each) for each in style.notations):
             entry["gimbal_lock"] = True
         return entry | self.extras
+
+
+def _add(entry: dict[str, Any], key: str, value: Any) -> None:
+    """Add a rotation; Euler angles about different axes share their key and make a list."""
+    if key not in entry:
+        entry[key] = value
+        return
+    several = entry[key] if type(entry[key]) is list and type(value) is dict else [entry[key]]
+    if value not in several:
+        entry[key] = [*several, value]
 
 
 def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
@@ -116,57 +119,36 @@ def sample_results(tree: Frames) -> Iterator[Result]:
             yield Result(Pose.of(components, track.child, parent), extras)
 
 
-def columns_of(form: Notation, style: Style) -> Sequence[str]:
-    """Name a representation's columns; angles in degrees say so."""
-    if form.degrees is not None or not style.degrees:
-        return form.columns
-    angles = form.representation.angles
-    return [f"{name}_deg" if index in angles else name for index, name in enumerate(form.columns)]
+def carries_position(notation: Notation) -> bool:
+    """Tell whether a notation takes the position of a pose into itself."""
+    return notation.representation.whole is not None
 
 
-def is_matrix(form: Notation) -> bool:
-    """Tell whether a representation takes the position into itself."""
-    return form.representation.name == "matrix"
-
-
-def is_locked(pose: Pose, form: Notation) -> bool:
+def is_locked(pose: Pose, notation: Notation) -> bool:
     """Tell whether the Euler angles asked for are not unique here: the third was set to 0."""
-    axes = "sxyz" if form.representation.name == "rpy" else form.axes
+    axes = notation.euler_axes
     return axes is not None and pose.rotation is not None and bool(euler.locked(*pose.rotation, axes))
 
 
-def rotation_numbers(pose: Pose, form: Notation, style: Style) -> Sequence[float]:
-    """Return a pose's rotation as the numbers of one representation, in column order."""
-    x, y, z, w = quaternion.unit(*pose.components[3:], floats)
-    if style.keep_sign and form.representation.name in KEPT:
-        return KEPT[form.representation.name](x, y, z, w)
-    numbers: Sequence[float] = form.from_quaternion(x, y, z, w, floats, degrees=style.in_degrees(form))
+def rotation_numbers(pose: Pose, notation: Notation, style: Style) -> Sequence[float]:
+    """Return a pose's rotation as the numbers of one notation, in column order."""
+    unit = quaternion.unit(*pose.components[3:], floats)
+    numbers: Sequence[float] = notation.from_quaternion(
+        *unit, floats, degrees=style.in_degrees(notation), keep_sign=style.keep_sign
+    )
     return numbers
 
 
-def rotation_entry(pose: Pose, form: Notation, style: Style) -> tuple[str, Any]:
-    """Return the key and the value of one representation, in the shape the grammar reads."""
-    name = form.representation.name
-    numbers = list(rotation_numbers(pose, form, style))
-    key = f"{name}_deg" if form.representation.angles and style.in_degrees(form) else name
-    columns = form.representation.columns
-    match name:
-        case "quaternion":
-            return key, dict(zip("xyzw", numbers, strict=True))
-        case "rpy":
-            return key, dict(zip(columns, numbers, strict=True))
-        case "euler":
-            return key, {"axes": form.axes, "angles": numbers}
-        case "axis_angle":
-            return key, {"axis": numbers[:3], "angle": numbers[3]}
-        case "matrix":
-            return key, _rows(numbers, pose.position)
-    return key, numbers
+def pose_numbers(pose: Pose, notation: Notation, style: Style) -> tuple[Sequence[str], Sequence[float]]:
+    """Return the columns and the numbers of one notation: of the whole pose where it carries the position."""
+    numbers, whole = rotation_numbers(pose, notation, style), notation.representation.whole
+    if whole is None or pose.position is None:
+        return notation.columns_in(degrees=style.degrees), numbers
+    return whole.columns, whole.join(pose.position, numbers)
 
 
-def _rows(numbers: list[float], position: Sequence[float] | None) -> list[list[float]]:
-    """Return the 3x3 rows of a rotation, or the 4x4 rows of a pose."""
-    rows = [numbers[0:3], numbers[3:6], numbers[6:9]]
-    if position is None:
-        return rows
-    return [[*row, moved] for row, moved in zip(rows, position, strict=True)] + [[0.0, 0.0, 0.0, 1.0]]
+def rotation_entry(pose: Pose, notation: Notation, style: Style) -> tuple[str, Any]:
+    """Return the key and the value of one notation, in the shape the grammar reads."""
+    row = notation.representation
+    key = f"{row.name}_deg" if row.angles and style.in_degrees(notation) else row.name
+    return key, spelled(notation, pose_numbers(pose, notation, style)[1])

@@ -1,4 +1,4 @@
-"""The shapes a rotation takes in YAML and JSON, one for each representation, and the unit of its angles."""
+"""A rotation in YAML and JSON: the shapes that representations name, and the unit of its angles."""
 
 from __future__ import annotations
 
@@ -6,9 +6,19 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, overheard
-from frametool.geometry import floats
-from frametool.geometry.representations import REPRESENTATIONS, Notation, axes_name, notation
-from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_texts
+from frametool.geometry import floats, quaternion
+from frametool.geometry.representations import (
+    LIST,
+    MAP,
+    NAMED,
+    NAMED_AXES,
+    REPRESENTATIONS,
+    ROWS,
+    Notation,
+    axes_name,
+    notation,
+)  # fmt: skip
+from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_texts, within
 from frametool.text.numbers import NotFinite, parse_angle, parse_number
 
 if TYPE_CHECKING:
@@ -16,11 +26,12 @@ if TYPE_CHECKING:
 
     from frametool.grammar.readers import Path, Quaternion, Vector
 
-    Shape = tuple[Notation, Sequence[Any], Sequence[Path]]  # what it is, one text a component, and where each stands
+    Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # what it is, one text a component, and where each stands
 
 ALIASES = {"rotation": "quaternion", "orientation": "quaternion"}  # as ROS messages name it
 AXES_KEY = "axes"  # a constant rotation by name instead of numbers
 TURN = 2.0 * math.pi
+AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie apart
 
 
 def _rotation_keys() -> dict[str, Notation]:
@@ -38,22 +49,45 @@ ROTATION_KEYS = _rotation_keys()
 def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None, Quaternion]:
     """Read the value of a rotation key as x, y, z, w; a 4x4 matrix also gives a position.
 
-    Raises Misfit or ValueInvalid: wrong shape, no number, no rotation.
+    Raises Misfit or ValueInvalid: wrong shape, no number, no rotation, or several that do not agree.
     """
     if key == AXES_KEY:
         return None, _read_axes(value)
-    form, texts, places = shape_of(key, value)
-    if len(texts) == 16:
-        return read_homogeneous(form, texts, places, reading)
-    return None, rotation_of(form, texts, places, reading)
+    if not _is_several(key, value):
+        return read_spelled(*shape_of(key, value), reading)
+    read = [within((index,), read_rotation, key, each, reading) for index, each in enumerate(value)]
+    for _, turned in read[1:]:
+        agreeing_rotation(read[0][1], turned)
+    return None, read[0][1]
 
 
-def shape_of(key: str, value: Any) -> Shape:
-    """Take the value of a rotation key apart: its notation, one text a component, and where each stands below it."""
+def agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
+    """Accept a second spelling of the rotation if it says the same; return the first."""
+    apart = quaternion.distance(*first, *second, floats)
+    if apart > AGREEMENT:
+        raise NotARotation(f"two rotations in one entry disagree by {math.degrees(apart):.6g} degrees; keep one")
+    return first
+
+
+def _is_several(key: str, value: Any) -> bool:
+    """Tell a list of Euler angles about different axes from what is one rotation."""
+    row = ROTATION_KEYS[key].representation
+    return row.axes == NAMED_AXES and type(value) is list and bool(value) and all(type(each) is dict for each in value)
+
+
+def shape_of(key: str, value: Any) -> Spelled:
+    """Take the value of a rotation key apart: its notation, one text a component, and where each stands below it.
+
+    Of several under one key it takes the first; its numbers then stand nowhere, so that nobody replaces them alone.
+    """
     if key == AXES_KEY:
         return notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
+    if _is_several(key, value):
+        bound, texts, places = shape_of(key, value[0])
+        return bound, texts, [("", *place) for place in places]
     form = ROTATION_KEYS[key]
-    return SHAPES.get(form.representation.name, _list_or_map)(form, value)
+    shape = form.representation.shape
+    return _take_parts(form, value, shape) if isinstance(shape, dict) else SHAPES[shape](form, value)
 
 
 def _read_axes(value: Any) -> Quaternion:
@@ -64,6 +98,23 @@ def _read_axes(value: Any) -> Quaternion:
         raise Misfit(f"expected the name of axes like optical or ned_from_enu, found {kind(value)}")
     rotation: Quaternion = named_rotation(value).components
     return rotation
+
+
+def read_spelled(
+    form: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
+) -> tuple[Vector | None, Quaternion]:
+    """Read one text a component: a rotation, or as many as a notation has for the whole pose."""
+    whole = form.representation.whole
+    if whole is None or len(texts) != len(whole.columns):
+        return None, rotation_of(form, texts, places, reading)
+    numbers, degrees = read_components(form, texts, places, reading)
+    end = len(numbers) - len(whole.tail)
+    if tuple(numbers[end:]) != whole.tail:
+        found = " ".join(f"{number:g}" for number in numbers[end:])
+        tail = " ".join(f"{number:g}" for number in whole.tail)
+        raise NotARotation(f"the last row of a 4x4 pose is {tail}, found {found}", rule="denormalized")
+    position, rotation = whole.split(numbers)
+    return position, _checked(form, rotation, reading, degrees=degrees)
 
 
 def rotation_of(form: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
@@ -153,78 +204,99 @@ def _note_degrees(form: Notation, numbers: Sequence[float], places: Sequence[Pat
         reading.note(message, form.spec, *places[index], rule="degrees")
 
 
-def _list_or_map(form: Notation, value: Any) -> Shape:
-    """Take a list in column order, or a mapping by column names where every name counts as 0 if missing."""
-    columns = form.representation.columns
-    texts = read_texts(value, columns, partial=bool(form.representation.angles))
+def _list_or_map(form: Notation, value: Any) -> Spelled:
+    """Take a list in column order, or a mapping by column names where every angle counts as 0 if missing."""
+    row = form.representation
+    is_whole = row.whole is not None and type(value) is list and len(value) == len(row.whole.columns)
+    columns = row.whole.columns if row.whole and is_whole else row.columns
+    texts = read_texts(value, columns, partial=bool(row.angles))
     return form, texts, INDICES if type(value) is list else [(name,) for name in columns]
 
 
-def _quaternion(form: Notation, value: Any) -> Shape:
+def _take_named(form: Notation, value: Any) -> Spelled:
+    """Take a mapping by short names; a list would not say its order."""
+    names = form.names
     if type(value) is list:
         numbers = ", ".join(map(str, value))
-        raise Misfit(f"quaternion [{numbers}] has no order; write xyzw: [..], wxyz: [..] or {{x:, y:, z:, w:}}")
-    texts = read_texts(value, ("x", "y", "z", "w"))
-    return form, texts, (("x",), ("y",), ("z",), ("w",))
-
-
-def _euler(form: Notation, value: Any) -> Shape:
-    if type(value) is not dict:
-        raise Misfit(f"expected {{axes: rzyx, angles: [..]}}, found {kind(value)}")
-    if unknown := [key for key in value if key not in ("axes", "order", "frame", "angles")]:
+        others = [
+            f"{name}: [..]" for name, row in REPRESENTATIONS.items()
+            if row.shape == LIST and set(row.columns) == set(form.representation.columns)
+        ]  # fmt: skip
+        named = ", ".join(f"{name}:" for name in names)
         raise Misfit(
-            f"unknown key {unknown[0]!r}; expected axes and angles, or order, frame and angles", (unknown[0],), key=True
+            f"{form.representation.name} [{numbers}] has no order; write {', '.join(others)} or {{{named}}}"
         )
+    return form, read_texts(value, names), [(name,) for name in names]
+
+
+def _take_parts(form: Notation, value: Any, parts: dict[str, int]) -> Spelled:
+    """Take a mapping whose keys hold so many numbers each, beside `axes` where Euler axes are named."""
+    named = form.representation.axes == NAMED_AXES
+    if type(value) is not dict:
+        shown = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: a" for key, count in parts.items())
+        example = "axes: rzyx, " * named + shown
+        raise Misfit(f"expected {{{example}}}, found {kind(value)}")
+    expected = " and ".join([*["axes"] * named, *parts])
+    if named:
+        expected += f", or order, frame and {' and '.join(parts)}"
+    known = {*parts, *(("axes", "order", "frame") if named else ())}
+    if unknown := [key for key in value if key not in known]:
+        hint = " (90deg has its unit)" if form.representation.angles and not named else ""
+        raise Misfit(f"unknown key {unknown[0]!r}; expected {expected}{hint}", (unknown[0],), key=True)
     try:
-        axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
-        angles = value["angles"]
+        bound = _with_axes(form, value) if named else form
+        held = [(key, value[key], count) for key, count in parts.items()]
     except KeyError as missing:
-        raise Misfit(f"missing {missing.args[0]}; expected axes and angles, or order, frame and angles") from None
+        raise Misfit(f"missing {missing.args[0]}; expected {expected}") from None
+    texts: list[Any] = []
+    places: list[Path] = []
+    for key, each, count in held:
+        names = form.representation.names[len(texts) : len(texts) + count]
+        texts += within((key,), read_texts, each, names) if count > 1 else [each]
+        steps = range(count) if type(each) is list else names
+        places += [(key, step) for step in steps] if count > 1 else [(key,)]
+    return bound, texts, places
+
+
+def _with_axes(form: Notation, value: dict[str, Any]) -> Notation:
+    """Bind the Euler axes that a mapping names: `axes`, or `order` and `frame`; raises KeyError for what is missing."""
+    axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
     if type(axes) is not str:
         raise Misfit(f"expected axes like rzyx, found {kind(axes)}", ("axes",))
-    bound = notation(f"{form.spec}:{axes}")
-    texts = read_texts(angles, bound.representation.columns)
-    return bound, texts, [("angles", index) for index in range(3)]
+    return notation(f"{form.spec}:{axes}")
 
 
-def _axis_angle(form: Notation, value: Any) -> Shape:
-    if type(value) is not dict:
-        raise Misfit(f"expected {{axis: [x, y, z], angle: a}}, found {kind(value)}")
-    if wrong := [key for key in value if key not in ("axis", "angle")]:
-        raise Misfit(f"unknown key {wrong[0]!r}; expected axis and angle (90deg has its unit)", (wrong[0],), key=True)
-    if missing := [key for key in ("axis", "angle") if key not in value]:
-        raise Misfit(f"missing {missing[0]}; expected axis and angle")
-    axis = value["axis"]
-    places = [("axis", index if type(axis) is list else name) for index, name in enumerate("xyz")]
-    return form, [*read_texts(axis, ("x", "y", "z")), value["angle"]], [*places, ("angle",)]
-
-
-def _matrix(form: Notation, value: Any) -> Shape:
+def _take_rows(form: Notation, value: Any) -> Spelled:
+    """Take the rows of a rotation or of a whole pose, or all their numbers in one list."""
+    row = form.representation
+    counts = {len(each): math.isqrt(len(each)) for each in (row.columns, *([row.whole.columns] if row.whole else []))}
+    expected = " or ".join(f"{size} rows of {size}{' numbers' * (not at)}" for at, size in enumerate(counts.values()))
     if type(value) is not list:
-        raise Misfit(f"expected 3 rows of 3 numbers or 4 rows of 4, found {kind(value)}")
-    if len(value) in (9, 16) and not any(type(row) is list for row in value):
+        raise Misfit(f"expected {expected}, found {kind(value)}")
+    if len(value) in counts and not any(type(each) is list for each in value):
         return form, value, INDICES
     size = len(value)
-    if size not in (3, 4) or any(type(row) is not list or len(row) != size for row in value):
-        lengths = ", ".join(str(len(row)) if type(row) is list else "no list" for row in value)
-        raise Misfit(f"expected 3 rows of 3 numbers or 4 rows of 4, found {size} rows of lengths {lengths}")
-    places = [(row, column) for row in range(size) for column in range(size)]
-    return form, [text for row in value for text in row], places
+    if size not in counts.values() or any(type(each) is not list or len(each) != size for each in value):
+        lengths = ", ".join(str(len(each)) if type(each) is list else "no list" for each in value)
+        raise Misfit(f"expected {expected}, found {size} rows of lengths {lengths}")
+    places = [(at, column) for at in range(size) for column in range(size)]
+    return form, [text for each in value for text in each], places
 
 
-SHAPES = {"quaternion": _quaternion, "euler": _euler, "axis_angle": _axis_angle, "matrix": _matrix}
+SHAPES = {LIST: _list_or_map, MAP: _list_or_map, NAMED: _take_named, ROWS: _take_rows}
 
 
-def read_homogeneous(
-    form: Notation,
-    texts: Sequence[Any],
-    places: Sequence[Path],
-    reading: Reading,
-) -> tuple[Vector, Quaternion]:
-    """Read a 4x4 matrix: the whole pose."""
-    m, _ = read_components(form, texts, places, reading)
-    if m[12:] != [0.0, 0.0, 0.0, 1.0]:
-        found = " ".join(f"{number:g}" for number in m[12:])
-        raise NotARotation(f"the last row of a 4x4 pose is 0 0 0 1, found {found}", rule="denormalized")
-    rows = [*m[0:3], *m[4:7], *m[8:11]]
-    return (m[3], m[7], m[11]), _checked(form, rows, reading)
+def spelled(form: Notation, numbers: Sequence[float]) -> Any:
+    """Write the numbers of a rotation, or of a whole pose, in the shape that `shape_of` takes apart."""
+    row = form.representation
+    if isinstance(row.shape, dict):
+        entry: dict[str, Any] = {"axes": form.axes} if row.axes == NAMED_AXES else {}
+        first = 0
+        for key, count in row.shape.items():
+            entry[key] = list(numbers[first : first + count]) if count > 1 else numbers[first]
+            first += count
+        return entry
+    if row.shape == ROWS:
+        size = math.isqrt(len(numbers))
+        return [list(numbers[first : first + size]) for first in range(0, len(numbers), size)]
+    return list(numbers) if row.shape == LIST else dict(zip(form.names, numbers, strict=True))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION
-from frametool.geometry import floats, quaternion
+from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Note
 from frametool.ros.echo_blocks import unit_components
@@ -152,6 +152,5 @@ def _complaint(parent: str, child: str, numbers: tuple[float, ...]) -> ValueInva
     """Say what is wrong with a transform that was refused."""
     if not parent or not child:
         return ValueInvalid("an empty frame name")
-    x, y, z, w = numbers[3:]
-    problem = quaternion.complaint(x, y, z, w, floats.length(x, y, z, w), normalize=False)
+    problem = quaternion.complaint(*numbers[3:])
     return problem or ValueInvalid("its position is not finite", rule="not-finite")

@@ -1,4 +1,4 @@
-"""Velocity commands in: leader files and streams, one command at a time, each with its line.
+"""Read velocity commands: leader files and streams, one command at a time, each with its line.
 
     t,linear,angular                                     CSV: columns by name, also linear_y and those of sim's own CSV
     - {t: 0.5, linear: 2.0, angular: 0.0}                YAML or JSON: mappings, in a list or as documents
@@ -11,30 +11,37 @@ Metres and radians a second, times in seconds. What has no time comes one period
 from __future__ import annotations
 
 import re
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import Source, error_at
-from frametool.errors import FormatError, ValueInvalid, alternatives
-from frametool.frames.stamps import BILLION, format_stamp, parse_stamp
-from frametool.grammar.readers import Misfit, as_mapping, kind, read_number, read_numbers, within
+from frametool.errors import FormatError, alternatives
+from frametool.formats.detect import detect
+from frametool.frames.stamps import BILLION, format_stamp
+from frametool.grammar.readers import Misfit, read_numbers, within
 from frametool.ros.noise import NOISE
+from frametool.sim.field_readers import known_keys, read_number, read_stamp
 from frametool.sim.leaders import KEYS
 from frametool.sim.turtle import Twist
-from frametool.text.numbers import parse_number
+from frametool.text.csv_line import split_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.grammar.readers import Path
     from frametool.sim.leaders import TimedTwist
 
-    Found = tuple[int | None, Twist, "Chunk", Path]  # nanoseconds if given, command, where it stands
+    NumberedLines = Iterator[tuple[int, str]]
 
 COLUMNS = {
-    "t": "t", "linear": "linear", "angular": "angular", "linear_y": "linear_y",
-    "linear_x": "linear", "angular_z": "angular",
-}  # fmt: skip
+    "t": "t",
+    "linear": "linear",
+    "angular": "angular",
+    "linear_y": "linear_y",
+    "linear_x": "linear",
+    "angular_z": "angular",
+}
 NEEDED = ("t", "linear", "angular")
 RECORDED = ("turtle", "distance", "leader_x", "leader_y", "leader_theta", "x", "y", "theta")  # not looked at
 ENTRY_KEYS = ("t", "turtle", "linear", "angular", "linear_y")
@@ -42,30 +49,37 @@ AXES = ("x", "y", "z")
 COMMAND = f"{{t: 0.5, linear: 2.0, angular: 0.0}}, a Twist message, or a key: {', '.join(KEYS)}"
 EXPECTED = f"a command is {COMMAND}"
 _WORD = re.compile(r"[A-Za-z_]+\s*").fullmatch
-_CSV_HEADER = re.compile(r"[^-{\[:,][^:,]*(,[^:,]*)+").fullmatch
 
 
-class Chunk:
-    """A piece of the input that is read at once: a document, a word, a row of CSV; `line` is that of its begin."""
+class CommandText:
+    """A piece of the input that is read at once, and the number of its first line: a document, a word, a row of CSV."""
 
-    def __init__(self, name: str, text: str, line: int, columns: dict[str, int] | None = None) -> None:
-        """Keep the text; `columns` says which cell is what, in a row of CSV."""
+    def __init__(self, name: str, text: str, line: int, columns: Sequence[str] | None = None) -> None:
+        """Keep the text; `columns` names the cells of a row of CSV, "" those that are not looked at."""
         self.source = Source(name, text)
         self.line = line
         self.columns = columns
 
-    @property
-    def is_word(self) -> bool:
-        """Tell whether it is the name of a key."""
-        return self.columns is None and _WORD(self.source.text) is not None
+    def values(self) -> list[tuple[Path, Any]]:
+        """Return the values in it, each with its path; a row of CSV is a mapping."""
+        text = self.source.text
+        if self.columns is not None:
+            cells = split_line(text)
+            if len(cells) != len(self.columns):
+                raise Misfit(f"expected {len(self.columns)} cells, found {len(cells)}")
+            return [((), {name: cell.text for name, cell in zip(self.columns, cells, strict=True) if name})]
+        if _WORD(text):
+            return [((0,), text.strip())]
+        return [((document.index,), document.value) for document in parse_documents(text, self.source.name)]
 
     def error(self, message: str, path: Path = (), *, key: bool = False) -> FormatError:
-        """Make the error for a place in it; a path is that of a document, or the cell's number."""
-        if self.columns is None and not self.is_word:
+        """Build the error for a place in it: a path in a document, or the name or number of a column."""
+        if self.columns is None:
             error = format_error(self.source, path, message, key=key)
         else:
-            before = self.source.text.split(",")[: int(path[0]) if path else 0]
-            error = error_at(self.source, sum(map(len, before)) + len(before), message)
+            first = path[0] if path else 0
+            index = first if isinstance(first, int) else self.columns.index(first)
+            error = error_at(self.source, split_line(self.source.text)[index].column - 1, message)
         error.line += self.line - 1
         return error
 
@@ -75,10 +89,26 @@ def read_script(source: Source, *, period_ns: int = BILLION) -> list[TimedTwist]
 
     Raises FormatError with the line.
     """
-    commands = list(read_twists(source.text.split("\n"), source.name, period_ns=period_ns))
+    commands = list(read_commands(source.text.split("\n"), source.name, period_ns=period_ns))
     if not commands:
         raise FormatError(f"no commands in it; {EXPECTED}", source=source.name, line=1)
     return commands
+
+
+def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) -> Iterator[TimedTwist]:
+    """Read commands from lines as they come, one document in memory at a time; otherwise as `read_script`."""
+    last_ns: int | None = None
+    for piece in _pieces(lines, name):
+        try:
+            for path, value in piece.values():
+                for t_ns, twist in _timed(value, path, last_ns, period_ns):
+                    yield t_ns, twist
+                    last_ns = t_ns
+        except Misfit as misfit:
+            raise piece.error(str(misfit), misfit.path, key=misfit.key) from None
+        except FormatError as error:
+            error.line += piece.line - 1
+            raise
 
 
 def read_entries(value: Any) -> list[TimedTwist]:
@@ -86,63 +116,68 @@ def read_entries(value: Any) -> list[TimedTwist]:
 
     Raises Misfit.
     """
-    chunk = Chunk("", "", 1)
-    last_ns, commands = None, []
-    for stamp_ns, twist, _, path in _entries(value, (), chunk):
-        last_ns = _next_time(stamp_ns, last_ns, BILLION, path)
-        commands.append((last_ns, twist))
-    return commands
+    return list(_timed(value, (), None, BILLION))
 
 
-def read_twists(lines: Iterable[str], name: str, *, period_ns: int = BILLION) -> Iterator[TimedTwist]:
-    """Read commands from lines as they come, one document in memory at a time; otherwise as `read_script`."""
-    last_ns: int | None = None
-    for chunk in _chunks(lines, name):
-        try:
-            for stamp_ns, twist, _, path in _commands(chunk):
-                last_ns = _next_time(stamp_ns, last_ns, period_ns, path)
-                yield last_ns, twist
-        except Misfit as misfit:
-            raise chunk.error(str(misfit), misfit.path, key=misfit.key) from None
-        except FormatError as error:
-            error.line += chunk.line - 1
-            raise
+def _timed(value: Any, path: Path, last_ns: int | None, period_ns: int) -> Iterator[TimedTwist]:
+    """Read the commands of a value, each with its time, which may not lie before that of the last one."""
+    for stamp_ns, twist, place in _entries(value, path):
+        if stamp_ns is None:
+            last_ns = 0 if last_ns is None else last_ns + period_ns
+        elif stamp_ns < 0:
+            raise Misfit("t is before the start, which is 0", place)
+        elif last_ns is not None and stamp_ns < last_ns:
+            late = f"t {format_stamp(stamp_ns)} comes after {format_stamp(last_ns)}"
+            raise Misfit(f"{late}; sort the commands by time", place)
+        else:
+            last_ns = stamp_ns
+        yield last_ns, twist
 
 
-def _next_time(stamp_ns: int | None, last_ns: int | None, period_ns: int, path: Path) -> int:
-    """Settle the time of a command, which may not lie before the last one's."""
-    if stamp_ns is None:
-        return 0 if last_ns is None else last_ns + period_ns
-    if stamp_ns < 0:
-        raise Misfit("t is before the start, which is 0", path)
-    if last_ns is not None and stamp_ns < last_ns:
-        raise Misfit(f"t {format_stamp(stamp_ns)} comes after {format_stamp(last_ns)}; sort the commands by time", path)
-    return stamp_ns
+def _pieces(lines: Iterable[str], name: str) -> Iterator[CommandText]:
+    """Cut lines into pieces that can be read one by one; the first line that says something tells CSV from the rest."""
+    numbered = ((number, _without_noise(line.rstrip("\r\n"))) for number, line in enumerate(lines, 1))
+    for number, text in numbered:
+        if not _says_something(text):
+            continue
+        if detect(text.encode(), "rows", "records", otherwise="yaml")[0] == "csv":
+            yield from _rows(numbered, name, _columns(CommandText(name, text, number, ())))
+        else:
+            yield from _documents(chain(((number, text),), numbered), name)
 
 
-def _chunks(lines: Iterable[str], name: str) -> Iterator[Chunk]:
-    """Cut lines into pieces that can be read one by one."""
+def _rows(numbered: NumberedLines, name: str, columns: Sequence[str]) -> Iterator[CommandText]:
+    """Yield the rows of CSV; a line end may stand in a quoted cell."""
+    for number, text in numbered:
+        lines, quotes = [text], text.count('"')
+        while quotes % 2 and (more := next(numbered, None)):
+            lines.append(more[1])
+            quotes += more[1].count('"')
+        if _says_something(text):
+            yield CommandText(name, "\n".join(lines), number, columns)
+
+
+def _documents(numbered: NumberedLines, name: str) -> Iterator[CommandText]:
+    """Yield documents, each when the line that ends it has come, and lines that need none of the following."""
     pending: list[str] = []
-    columns: dict[str, int] | None = None
-    begun = False
-    for number, line in enumerate(lines, 1):
-        text = _without_noise(line.rstrip("\r\n"))
-        if columns is not None:
-            if text.strip() and not text.startswith("#"):
-                yield Chunk(name, text, number, columns)
-        elif not begun and _CSV_HEADER(text):
-            columns = _header(Chunk(name, text, number, {}))
-        elif text.startswith(("---", "...")) or _stands_alone(text):
+    number = 0
+    for number, text in numbered:
+        alone = _stands_alone(text)
+        if alone or text.startswith(("---", "...")):
             if any(map(str.strip, pending)):
-                yield Chunk(name, "\n".join(pending), number - len(pending))
-            pending = []
-            if _stands_alone(text):
-                yield Chunk(name, text, number)
-        elif pending or (text.strip() and not text.startswith("#")):
+                yield CommandText(name, "\n".join(pending), number - len(pending))
+            pending.clear()
+            if alone:
+                yield CommandText(name, text, number)
+        elif pending or _says_something(text):
             pending.append(text)
-        begun = begun or bool(text.strip() and not text.startswith("#"))
     if pending:
-        yield Chunk(name, "\n".join(pending), number - len(pending) + 1)
+        yield CommandText(name, "\n".join(pending), number - len(pending) + 1)
+
+
+def _says_something(line: str) -> bool:
+    """Tell data from blank lines and comments."""
+    return bool(line.strip()) and not line.startswith("#")
 
 
 def _without_noise(text: str) -> str:
@@ -155,114 +190,58 @@ def _stands_alone(text: str) -> bool:
     return _WORD(text) is not None or (text.startswith("{") and text.rstrip().endswith("}"))
 
 
-def _header(chunk: Chunk) -> dict[str, int]:
-    """Find the columns of a CSV file by name."""
-    names = [name.strip() for name in chunk.source.text.split(",")]
-    columns: dict[str, int] = {}
-    for index, name in enumerate(names):
-        if name in COLUMNS:
-            if COLUMNS[name] in columns:
-                raise chunk.error(f"two columns for {COLUMNS[name]}", (index,))
-            columns[COLUMNS[name]] = index
+def _columns(header: CommandText) -> list[str]:
+    """Name the columns of CSV by what they hold; "" for those that are not looked at."""
+    names = [cell.text for cell in split_line(header.source.text)]
+    columns = [COLUMNS.get(name, "") for name in names]
     if missing := [name for name in NEEDED if name not in columns]:
-        raise chunk.error(f"no column {', '.join(missing)}; columns: {', '.join(names)}")
-    for index, name in enumerate(names):
-        if name not in COLUMNS and name not in RECORDED:
-            raise chunk.error(f"unknown column {name!r}{alternatives(name, COLUMNS, 'columns')}", (index,))
-    return columns | {"": len(names)}
+        raise header.error(f"no column {', '.join(missing)}; columns: {', '.join(names)}")
+    for index, (name, column) in enumerate(zip(names, columns, strict=True)):
+        if column and columns.index(column) < index:
+            raise header.error(f"two columns for {column}", (index,))
+        if not column and name not in RECORDED:
+            raise header.error(f"unknown column {name!r}{alternatives(name, COLUMNS, 'columns')}", (index,))
+    return columns
 
 
-def _commands(chunk: Chunk) -> Iterator[Found]:
-    """Read what a piece says."""
-    if chunk.columns is not None:
-        yield _row(chunk, chunk.columns)
-    elif chunk.is_word:
-        yield None, _key(chunk.source.text.strip()), chunk, ()
-    else:
-        for document in parse_documents(chunk.source.text, chunk.source.name):
-            yield from _entries(document.value, (document.index,), chunk)
-
-
-def _row(chunk: Chunk, columns: dict[str, int]) -> Found:
-    cells = [cell.strip() for cell in chunk.source.text.split(",")]
-    if len(cells) != columns[""]:
-        raise Misfit(f"expected {columns['']} cells, found {len(cells)}")
-    stamp_ns = _cell(parse_stamp, cells, columns["t"])
-    ahead, turning = (_cell(parse_number, cells, columns[name]) for name in ("linear", "angular"))
-    aside = _cell(parse_number, cells, columns["linear_y"]) if "linear_y" in columns else 0.0
-    return stamp_ns, Twist(ahead, turning, aside), chunk, (columns["t"],)
-
-
-def _cell(parse: Any, cells: list[str], index: int) -> Any:
-    try:
-        return parse(cells[index])
-    except ValueInvalid as error:
-        raise Misfit(str(error), (index,)) from None
-
-
-def _key(word: str) -> Twist:
-    """Return the command of an arrow key."""
-    if word.lower() not in KEYS:
-        raise Misfit(f"unknown key {word!r}{alternatives(word, KEYS, 'keys')}")
-    return KEYS[word.lower()]
-
-
-def _entries(value: Any, path: Path, chunk: Chunk) -> Iterator[Found]:
-    """Read one command, or a list of them."""
+def _entries(value: Any, path: Path) -> Iterator[tuple[int | None, Twist, Path]]:
+    """Read one command, or a list of them: nanoseconds if given, the command, and where its time stands."""
     if type(value) is list and not (value and all(type(item) is str for item in value)):
         for index, item in enumerate(value):
-            yield from _entries(item, (*path, index), chunk)
+            yield from _entries(item, (*path, index))
     else:
         stamp_ns, twist = within(path, _entry, value)
-        yield stamp_ns, twist, chunk, (*path, "t")
+        yield stamp_ns, twist, (*path, "t")
 
 
 def _entry(value: Any) -> tuple[int | None, Twist]:
-    """Read {t, linear, angular, linear_y}, a Twist message, or [t, linear, angular]."""
+    """Read {t, linear, angular, linear_y}, a Twist message, [t, linear, angular], or the name of an arrow key."""
     if type(value) is list:
-        t, linear, angular = _listed(value)
+        if len(value) != len(NEEDED):
+            raise Misfit(f"expected [{', '.join(NEEDED)}], found {len(value)} items")
+        t, linear, angular = (within((index,), read, value[index]) for index, read in enumerate(LISTED))
         return t, Twist(linear, angular)
-    entry = as_mapping(value, f"a command {COMMAND}")
-    if unknown := [key for key in entry if key not in ENTRY_KEYS]:
-        known = alternatives(unknown[0], ENTRY_KEYS, "keys")
-        raise Misfit(f"unknown key {unknown[0]!r}{known}", (unknown[0],), key=True)
+    if type(value) is str and _WORD(value):
+        if value.lower() not in KEYS:
+            raise Misfit(f"unknown key {value!r}{alternatives(value, KEYS, 'keys')}")
+        return None, KEYS[value.lower()]
+    entry = known_keys(value, ENTRY_KEYS, f"a command {COMMAND}")
     if "linear" not in entry and "angular" not in entry:
         raise Misfit(f"neither linear nor angular; {EXPECTED}")
     ahead, aside = within(("linear",), _axes, entry.get("linear", "0"), 0, 1)
     turning, _ = within(("angular",), _axes, entry.get("angular", "0"), 2, 2)
     if "linear_y" in entry:
-        aside = within(("linear_y",), _number, entry["linear_y"])
-    stamp_ns = within(("t",), _stamp, entry["t"]) if "t" in entry else None
+        aside = within(("linear_y",), read_number, entry["linear_y"])
+    stamp_ns = within(("t",), read_stamp, entry["t"]) if "t" in entry else None
     return stamp_ns, Twist(ahead, turning, aside)
-
-
-def _listed(value: list[Any]) -> tuple[int, float, float]:
-    if len(value) != 3:
-        raise Misfit(f"expected [t, linear, angular], found {len(value)} items")
-    return within((0,), _stamp, value[0]), within((1,), _number, value[1]), within((2,), _number, value[2])
 
 
 def _axes(value: Any, first: int, second: int) -> tuple[float, float]:
     """Read one number, or two axes of a vector; the others mean nothing to a turtle."""
     if type(value) is str:
-        return _number(value), 0.0
+        return read_number(value), 0.0
     numbers = read_numbers(value, AXES, partial=True)
     return numbers[first], numbers[second]
 
 
-def _number(value: Any) -> float:
-    """Read a number; what is none is placed by the caller."""
-    try:
-        return read_number(value)
-    except ValueInvalid as error:
-        raise Misfit(str(error)) from None
-
-
-def _stamp(value: Any) -> int:
-    """Read a time in seconds."""
-    if type(value) is not str:
-        raise Misfit(f"expected a time in seconds, found {kind(value)}")
-    try:
-        return parse_stamp(value)
-    except ValueInvalid as error:
-        raise Misfit(str(error)) from None
+LISTED = (read_stamp, read_number, read_number)

@@ -1,11 +1,13 @@
-"""Leaders: who drives the first turtle. Scripts of timed commands, and those that are built in.
+"""Leaders, which drive a turtle without following another: scripts of timed commands, and those that are built in.
 
-A leader acts at `due_ns`, is shown its turtle's pose, gives a command or None, and moves `due_ns` on (None: no more).
+A leader is asked at `due_ns` with the pose of its turtle, returns a command or None, and sets the next `due_ns` (None:
+no more).
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
@@ -24,8 +26,8 @@ CIRCLING = Twist(2.0, 1.8)  # the command of the turtlesim tutorial
 KEYS = {"up": Twist(2.0, 0.0), "down": Twist(-2.0, 0.0), "left": Twist(0.0, 2.0), "right": Twist(0.0, -2.0)}
 
 
-class Curtain(Exception):
-    """Raised by a leader to end the play."""
+class EndOfRun(Exception):
+    """Raised by a leader to end the simulation."""
 
 
 class Heading(NamedTuple):
@@ -47,7 +49,7 @@ class Leader(Protocol):
     due_ns: int | None
 
     def command(self, pose: TurtlePose) -> Twist | Heading | None:
-        """Return the command that is due, if any, and settle when the next one is."""
+        """Return the command that is due, if any, and set when the next one is."""
 
 
 class Script:
@@ -84,9 +86,9 @@ class Mailbox:
     """
 
     def __init__(self) -> None:
-        """Begin empty."""
+        """Create an empty one."""
         self.due_ns: int | None = 0
-        self._posted: list[tuple[int, Twist | Heading]] = []
+        self._posted: deque[tuple[int, Twist | Heading]] = deque()
         self._failure: BaseException | None = None
 
     def post(self, command: Twist | Heading, t_ns: int = 0) -> None:
@@ -94,8 +96,8 @@ class Mailbox:
         self._posted.append((t_ns, command))
 
     def close(self) -> None:
-        """End the play."""
-        self._failure = Curtain()
+        """End the simulation."""
+        self._failure = EndOfRun()
 
     def fill_from(self, commands: Iterable[TimedTwist]) -> None:
         """Post commands from a thread of their own, as they come."""
@@ -113,23 +115,23 @@ class Mailbox:
     def command(self, pose: TurtlePose) -> Twist | Heading | None:  # noqa: ARG002 - whoever posts does the looking
         """Return the newest command whose time has come.
 
-        Raises Curtain when it was closed.
+        Raises EndOfRun when it was closed.
         """
         now_ns = self.due_ns or 0
         self.due_ns = now_ns + TICK_NS
         newest = None
         while self._posted and self._posted[0][0] <= now_ns:
-            newest = self._posted.pop(0)[1]
+            newest = self._posted.popleft()[1]
         if newest is None and self._failure is not None:
             raise self._failure
         return newest
 
 
 class Periodic:
-    """A leader that is asked at a fixed period: drive(nanoseconds, pose) gives the command."""
+    """A leader that is asked at a fixed period: drive(nanoseconds, pose) returns the command."""
 
     def __init__(self, period_ns: int, drive: Callable[[int, TurtlePose], Twist]) -> None:
-        """Begin at time 0."""
+        """Keep what drives; the first command is due at time 0."""
         self.due_ns: int | None = 0
         self._period_ns = period_ns
         self._drive = drive
@@ -159,7 +161,7 @@ class Square:
     """
 
     def __init__(self) -> None:
-        """Begin before the first side."""
+        """Create the driver in front of the first side."""
         self._moves = True
         self._stopping = True
         self._goal: TurtlePose | None = None

@@ -1,4 +1,4 @@
-"""What is on stage: turtles with their drivers, service calls at times, how long it runs."""
+"""What a simulation starts from: turtles with their drivers, service calls at times, the duration."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid
-from frametool.frames.stamps import BILLION
+from frametool.frames.stamps import BILLION, FURTHEST_NS
 from frametool.sim.controllers import FollowController
 from frametool.sim.leaders import built_in
 from frametool.sim.targets import TARGETS
-from frametool.sim.turtle import CENTRE
+from frametool.sim.turtle import CENTRE, TICK_NS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -20,10 +20,12 @@ if TYPE_CHECKING:
     Place = tuple[float, float, float]
 
 TUTORIAL_SPAWN: Place = (4.0, 2.0, 0.0)
+LONGEST_NS = FURTHEST_NS  # of any time in a scene: stamps of the buffer reach so far
+LONGEST = LONGEST_NS // BILLION  # seconds
 
 
 class Follow(NamedTuple):
-    """A driver: follow another turtle through tf.
+    """A driver that follows another turtle through tf.
 
     target: the leader itself, a carrot 2 m to its left (+y of its frame), or one that circles it at 10 m.
     delay_ns: follow where it was that long ago (the time travel of the tutorial).
@@ -35,15 +37,15 @@ class Follow(NamedTuple):
     delay_ns: int = 0
 
 
-class Actor(NamedTuple):
-    """A turtle of the scene: name, where it is spawned (metres, radians), and who drives it."""
+class SceneTurtle(NamedTuple):
+    """A turtle of a scene: name, where it is spawned (metres, radians), and who drives it."""
 
     name: str
     spawn: Place
     driver: MakeLeader | Follow | None = None
 
 
-class Call(NamedTuple):
+class ServiceCall(NamedTuple):
     """A service call at a time; `place` says in messages where it was read."""
 
     t_ns: int
@@ -55,8 +57,8 @@ class Call(NamedTuple):
 class Scene(NamedTuple):
     """All that a simulation needs; duration_ns None runs for ever."""
 
-    actors: Sequence[Actor]
-    calls: Sequence[Call] = ()
+    turtles: Sequence[SceneTurtle]
+    calls: Sequence[ServiceCall] = ()
     duration_ns: int | None = 20 * BILLION
     variant: str = "ros1"
     holonomic: bool = False
@@ -64,7 +66,14 @@ class Scene(NamedTuple):
     @property
     def followers(self) -> dict[str, Follow]:
         """Return the turtles that follow another, by name."""
-        return {actor.name: actor.driver for actor in self.actors if isinstance(actor.driver, Follow)}
+        return {turtle.name: turtle.driver for turtle in self.turtles if isinstance(turtle.driver, Follow)}
+
+    def late_calls(self) -> list[ServiceCall]:
+        """Return the calls that the end comes before: a call acts at the first tick after its time."""
+        if self.duration_ns is None:
+            return []
+        last_ns = self.duration_ns // TICK_NS * TICK_NS
+        return [call for call in self.calls if call.t_ns >= last_ns]
 
 
 def tutorial(
@@ -72,25 +81,42 @@ def tutorial(
     spawn: Place = TUTORIAL_SPAWN, followers: int = 1, target: str = "leader", delay: float = 0.0,
     duration: float | None = 20.0, turtlesim: str = "ros1", holonomic: bool = False, seed: int = 0,
 ) -> Scene:
-    """Set the tutorial's scene: turtle1 in the centre, turtle2 at `spawn` follows it, turtle3 follows turtle2, ...
+    """Return the tutorial's scene: turtle1 in the centre, turtle2 at `spawn` follows it, turtle3 follows turtle2, ...
 
-    leader: a name of LEADERS or what `built_in`, `scripted` give.  law: "ros1", "ros2" or a controller.
+    leader: a name of LEADERS or what `built_in`, `scripted` return.  law: "ros1", "ros2" or a controller.
     spawn: x, y (m), theta (rad) of turtle2; each further follower begins 1 m further left, wrapped into the world.
     delay, duration: seconds; duration None runs for ever.
     Raises ValueInvalid.
     """
     if target not in TARGETS:
         raise ValueInvalid(f"no target {target!r}; targets: {', '.join(TARGETS)}")
-    if followers < 0 or not delay >= 0.0 or delay == math.inf:
-        raise ValueInvalid(f"followers and delay must be 0 or more, found {followers} and {delay}")
+    if followers < 0:
+        raise ValueInvalid(f"followers must be 0 or more, found {followers}")
     controller = FollowController(law) if isinstance(law, str) else law
     drive = built_in(leader, seed) if isinstance(leader, str) else leader
-    actors = [Actor("turtle1", (CENTRE, CENTRE, 0.0), drive)]
+    turtles = [SceneTurtle("turtle1", (CENTRE, CENTRE, 0.0), drive)]
     for count in range(followers):
-        chase = Follow(actors[-1].name, controller, target, round(delay * BILLION))
-        actors.append(Actor(f"turtle{count + 2}", _beside(spawn, count), chase))
-    duration_ns = None if duration is None or duration == math.inf else round(duration * BILLION)
-    return Scene(actors, (), duration_ns, turtlesim, holonomic)
+        follow = Follow(turtles[-1].name, controller, target, nanoseconds("delay", delay))
+        turtles.append(SceneTurtle(f"turtle{count + 2}", _beside(spawn, count), follow))
+    return Scene(turtles, (), duration_ns(duration), turtlesim, holonomic)
+
+
+def duration_ns(seconds: float | None) -> int | None:
+    """Return a scene's duration in nanoseconds; None, for ever, for None and infinity.
+
+    Raises ValueInvalid.
+    """
+    return None if seconds is None or seconds == math.inf else nanoseconds("duration", seconds)
+
+
+def nanoseconds(name: str, seconds: float) -> int:
+    """Return a span of time in nanoseconds.
+
+    Raises ValueInvalid, which names the span, for what is negative or longer than stamps reach.
+    """
+    if not 0.0 <= seconds <= LONGEST:
+        raise ValueInvalid(f"{name} must be 0 .. {LONGEST} s, found {seconds:g}")
+    return round(seconds * BILLION)
 
 
 def _beside(spawn: Place, count: int) -> Place:

@@ -1,4 +1,4 @@
-"""The play: ticks, broadcasts, leaders and followers, each at its time; everything seen goes through tf.
+"""Run a scene in simulated time: ticks, broadcasts, leaders and followers, each when it is due; all is seen through tf.
 
 At equal times: tick, then carrots, service calls, leaders, controllers. Commands and calls act at the first tick
 strictly later. Poses enter the buffer as float32, the stamp is the tick's time, nothing is late on its way.
@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import math
 from heapq import heapify, heappop, heapreplace
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from itertools import count
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import LookupFailed, UnknownFrame, ValueInvalid
+from frametool.errors import LookupFailed, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
-from frametool.sim.leaders import Curtain, Heading
+from frametool.sim.leaders import EndOfRun, Heading
 from frametool.sim.scene import Follow
 from frametool.sim.targets import CARROT_NS, frame_of, offset, planar
-from frametool.sim.turtle import TICK_NS, State, TurtlePose
+from frametool.sim.turtle import TICK_NS, TurtlePose, TurtleState
 from frametool.sim.world import ServiceRefused, World
 
 if TYPE_CHECKING:
@@ -24,23 +25,34 @@ if TYPE_CHECKING:
 
     from frametool.geometry.transform import Transform
     from frametool.sim.leaders import Leader
-    from frametool.sim.scene import Actor, Call, Scene
+    from frametool.sim.scene import Scene, ServiceCall
     from frametool.sim.turtle import Pen, Twist
     from frametool.sim.world import WallHit
 
+    Process = Iterator[int]  # yields the nanoseconds at which it is to be resumed; ends when it has nothing more to do
+
 WORLD = "world"
 CACHE_NS = 10 * BILLION  # tf's own default
+TICKS, CARROTS, CALLS, LEADERS, CONTROLLERS = range(5)  # the order of processes that are due at one time
 
 
-class Command(NamedTuple):
-    """What a follower or a leader commanded; what it saw: distance (m) to its target, the two turtles' states."""
+class IssuedCommand(NamedTuple):
+    """What a follower or a leader commanded, and what a follower saw.
+
+    t_ns: when, in nanoseconds.
+    turtle: the name of the turtle that is to move.
+    twist: the command.
+    distance: metres to the target; None for leaders.
+    leader: where the followed turtle is; None for leaders.
+    state: where the turtle itself is.
+    """
 
     t_ns: int
     turtle: str
     twist: Twist
     distance: float | None
-    leader: State | None
-    state: State
+    leader: TurtleState | None
+    state: TurtleState
 
 
 class Broadcast(NamedTuple):
@@ -52,203 +64,84 @@ class Broadcast(NamedTuple):
     transform: Transform
 
 
-class Step:
-    """One instant at which something happened; what did not is empty."""
+class SimulationStep:
+    """One instant at which something happened; what did not is empty.
 
-    __slots__ = (
-        "broadcasts", "clears", "commands", "is_tick", "led", "log", "pens", "poses", "states", "t_ns", "walls",
-    )  # fmt: skip
+    t_ns: when, in nanoseconds.
+    is_tick: whether turtlesim's timer fired.
+    poses: of every turtle by name, if this is a tick; at time 0 where they were spawned.
+    states: the same before rounding to float32.
+    pens: what each turtle draws with.
+    commands: those of followers.
+    led: those of leaders.
+    walls: turtles that were put back to the wall.
+    broadcasts: transforms that were published.
+    log: what turtlesim and the followers logged.
+    clears: how often the drawing has been cleared so far.
+    """
 
     def __init__(self, t_ns: int) -> None:
-        """Begin an instant."""
+        """Create an instant at which nothing has happened yet."""
         self.t_ns = t_ns
         self.is_tick = False
-        self.poses: dict[str, TurtlePose] = {}  # of every turtle, if this is a tick; at time 0 where they were spawned
-        self.states: dict[str, State] = {}  # the same before rounding
+        self.poses: dict[str, TurtlePose] = {}
+        self.states: dict[str, TurtleState] = {}
         self.pens: dict[str, Pen] = {}
-        self.commands: list[Command] = []  # of followers
-        self.led: list[Command] = []  # of leaders
+        self.commands: list[IssuedCommand] = []
+        self.led: list[IssuedCommand] = []
         self.walls: list[WallHit] = []
         self.broadcasts: list[Broadcast] = []
         self.log: list[str] = []
-        self.clears = 0  # how often the drawing has been cleared so far
+        self.clears = 0
 
 
-class Part(Protocol):
-    """Whoever acts at times."""
-
-    rank: int
-
-    def act(self, now_ns: int, stage: Stage, step: Step) -> int | None:
-        """Act, and say when to be called again; None: never."""
-
-
-class Stage:
-    """What the parts share: the world, the buffer, where turtles were last seen."""
+class Simulation:
+    """What the processes share: the world, tf's buffer, the instant in progress, where turtles were last seen."""
 
     def __init__(self, scene: Scene) -> None:
         """Spawn the turtles of a scene."""
         longest = max((follow.delay_ns for follow in scene.followers.values()), default=0)
         self.world = World(scene.variant, holonomic=scene.holonomic)
         self.buffer = TransformBuffer(keep_ns=max(CACHE_NS, longest + BILLION))
-        self.states: dict[str, State] = {}
-        self.calls: list[Call] = []
-        for actor in scene.actors:
-            self.world.spawn(*actor.spawn, actor.name)
+        self.step = SimulationStep(0)
+        self.states: dict[str, TurtleState] = {}
+        self.calls: list[ServiceCall] = []
+        for turtle in scene.turtles:
+            self.world.spawn(*turtle.spawn, turtle.name)
 
-    def broadcast(self, step: Step, parent: str, child: str, transform: Transform) -> None:
+    def broadcast(self, parent: str, child: str, transform: Transform) -> None:
         """Publish a transform: into the buffer, and into the step for whoever watches."""
-        self.buffer.insert(parent, child, transform, step.t_ns)
-        step.broadcasts.append(Broadcast(step.t_ns, parent, child, transform))
+        self.buffer.insert(parent, child, transform, self.step.t_ns)
+        self.step.broadcasts.append(Broadcast(self.step.t_ns, parent, child, transform))
 
-
-class Ticker:
-    """turtlesim's timer: calls, motion, poses; at time 0 only poses."""
-
-    rank = 0
-
-    def act(self, now_ns: int, stage: Stage, step: Step) -> int:
-        """Move the world on by one tick."""
-        world = stage.world
-        self._serve(stage, step)
+    def tick(self) -> None:
+        """Advance turtlesim by one tick: service calls, motion, poses; at time 0 only poses."""
+        step, world = self.step, self.world
+        self._answer_calls()
         step.is_tick = True
-        if now_ns:
-            step.walls = world.tick(now_ns)
+        if step.t_ns:
+            step.walls = world.tick(step.t_ns)
         step.clears = world.clears
         for name, turtle in world.turtles.items():
             pose = step.poses[name] = turtle.pose
             step.states[name] = turtle.state
             step.pens[name] = turtle.pen
-            stage.broadcast(step, WORLD, name, planar(pose.x, pose.y, pose.theta))
-        stage.states.update(step.states)
-        return now_ns + TICK_NS
+            self.broadcast(WORLD, name, planar(pose.x, pose.y, pose.theta))
+        self.states.update(step.states)
 
-    def _serve(self, stage: Stage, step: Step) -> None:
+    def _answer_calls(self) -> None:
         """Answer the service calls that have come in since the last tick."""
-        for call in stage.calls:
+        for call in self.calls:
             try:
-                message = stage.world.call(call.service, **call.arguments)
+                message = self.world.call(call.service, **call.arguments)
             except ServiceRefused as refusal:
                 message = f"{call.place}: {refusal}" if call.place else str(refusal)
-            step.log += [message] if message else []
-        stage.calls.clear()
+            self.step.log += [message] if message else []
+        self.calls.clear()
 
 
-class Carrot:
-    """The broadcaster of a carrot frame beside a turtle, fixed or moving, ten times a second."""
-
-    rank = 1
-
-    def __init__(self, turtle: str, target: str) -> None:
-        """Hang the carrot on a turtle."""
-        self.turtle = turtle
-        self.target = target
-
-    def act(self, now_ns: int, stage: Stage, step: Step) -> int:
-        """Publish where the carrot is."""
-        x, y = offset(self.target, now_ns)
-        stage.broadcast(step, self.turtle, frame_of(self.turtle, self.target), planar(x, y, 0.0))
-        return now_ns + CARROT_NS
-
-
-class Caller:
-    """Whoever makes one service call."""
-
-    rank = 2
-
-    def __init__(self, call: Call) -> None:
-        """Keep the call."""
-        self.call = call
-
-    def act(self, now_ns: int, stage: Stage, step: Step) -> None:  # noqa: ARG002
-        """Send it; the world answers at its next tick."""
-        stage.calls.append(self.call)
-
-
-class Drive:
-    """A leader at the wheel of its turtle; when the turtle is gone its commands reach nobody."""
-
-    rank = 3
-
-    def __init__(self, turtle: str, leader: Leader) -> None:
-        """Let a leader drive a turtle."""
-        self.turtle = turtle
-        self.leader = leader
-        self._pose = TurtlePose(0.0, 0.0, 0.0, 0.0, 0.0)
-
-    def act(self, now_ns: int, stage: Stage, step: Step) -> int | None:
-        """Send the leader's command."""
-        turtle = stage.world.turtles.get(self.turtle)
-        if turtle is not None:
-            self._pose = turtle.pose
-        given = self.leader.command(self._pose)
-        if turtle is None or given is None:
-            return self.leader.due_ns
-        if isinstance(given, Heading):
-            turtle.rotate_absolute(given.theta)
-        else:
-            turtle.command(given)
-            step.led.append(Command(now_ns, self.turtle, given, None, None, turtle.state))
-        return self.leader.due_ns
-
-
-class Chase:
-    """A follower: looks its target up, and drives there; where tf has no answer, it lets the step pass."""
-
-    rank = 4
-
-    def __init__(self, turtle: str, follow: Follow) -> None:
-        """Let a turtle follow."""
-        self.turtle = turtle
-        self.follow = follow
-        self.frame = frame_of(follow.leader, follow.target)
-        self._count = 0
-        self._failing = ""
-
-    def act(self, now_ns: int, stage: Stage, step: Step) -> int:
-        """Look, command, and wait for the next control step."""
-        self._count += 1
-        if self.turtle in stage.world.turtles:
-            self._steer(now_ns, stage, step)
-        return self.follow.controller.due_ns(self._count)
-
-    def _steer(self, now_ns: int, stage: Stage, step: Step) -> None:
-        try:
-            x, y = self._look(stage.buffer)
-        except LookupFailed as error:
-            self._tell(error, step)
-            return
-        self._failing = ""
-        try:
-            twist = self.follow.controller.command(x, y)
-        except ValueInvalid as error:
-            raise ValueInvalid(f"{self.turtle}: {error}") from None
-        stage.world.turtles[self.turtle].command(twist)
-        states = stage.states
-        distance = math.sqrt(x * x + y * y)
-        step.commands.append(
-            Command(now_ns, self.turtle, twist, distance, states.get(self.follow.leader), states[self.turtle]),
-        )
-
-    def _look(self, buffer: TransformBuffer) -> tuple[float, float]:
-        """Return the target as the turtle sees it: at the latest common time, or where it was a while ago."""
-        if not self.follow.delay_ns:
-            return buffer.lookup(self.turtle, self.frame).components[:2]
-        now_ns = buffer.latest(WORLD, self.turtle)
-        if now_ns is None:
-            raise UnknownFrame(self.turtle, known=())
-        past_ns = now_ns - self.follow.delay_ns
-        return buffer.lookup_across(self.turtle, now_ns, self.frame, past_ns, WORLD).components[:2]
-
-    def _tell(self, error: LookupFailed, step: Step) -> None:
-        """Say once why there is no command, until there is one again."""
-        if type(error).__name__ != self._failing:
-            self._failing = type(error).__name__
-            step.log.append(f"Could not transform {self.turtle} to {self.frame}: {error}")
-
-
-def simulate(scene: Scene) -> Iterator[Step]:
-    """Play a scene: give every instant at which something happens, in order, the last one included.
+def simulate(scene: Scene) -> Iterator[SimulationStep]:
+    """Run a scene: yield every instant at which something happens, in order, the last one included.
 
         for step in simulate(tutorial(spawn=(1.0, 1.0, 0.0))):
             for command in step.commands:
@@ -257,40 +150,122 @@ def simulate(scene: Scene) -> Iterator[Step]:
     Pure and deterministic: simulated time, no sleep, the same scene gives the same steps. Memory does not grow.
     Raises ValueInvalid when a scene is impossible.
     """
-    stage = Stage(scene)
-    queue = [(due_ns, part.rank, order, part) for order, (due_ns, part) in enumerate(_parts(scene))]
+    simulation = Simulation(scene)
+    begun = ((next(process, None), rank, process) for rank, process in _processes(simulation, scene))
+    queue = [(due_ns, rank, order, each) for order, (due_ns, rank, each) in enumerate(begun) if due_ns is not None]
     heapify(queue)
     while queue and (scene.duration_ns is None or queue[0][0] <= scene.duration_ns):
-        step = Step(queue[0][0])
+        step = simulation.step = SimulationStep(queue[0][0])
         while queue and queue[0][0] == step.t_ns:
-            _, rank, order, part = queue[0]
+            _, rank, order, process = queue[0]
             try:
-                due_ns = part.act(step.t_ns, stage, step)
-            except Curtain:
+                due_ns = next(process, None)
+            except EndOfRun:
                 return
             if due_ns is None:
                 heappop(queue)
             else:
-                heapreplace(queue, (due_ns, rank, order, part))
+                heapreplace(queue, (due_ns, rank, order, process))
         yield step
 
 
-def _parts(scene: Scene) -> Iterator[tuple[int, Part]]:
-    """Yield everybody who acts, with the time of the first act."""
-    yield 0, Ticker()
+def _processes(simulation: Simulation, scene: Scene) -> Iterator[tuple[int, Process]]:
+    """Yield all that acts in a scene, each with its rank."""
+    yield TICKS, _ticks(simulation)
     carrots = {(follow.leader, follow.target) for follow in scene.followers.values() if follow.target != "leader"}
-    yield from ((0, Carrot(leader, target)) for leader, target in sorted(carrots))
-    yield from ((call.t_ns, Caller(call)) for call in scene.calls)
-    for actor in scene.actors:
-        yield from _driver(actor)
+    yield from ((CARROTS, _carrot(simulation, leader, target)) for leader, target in sorted(carrots))
+    yield from ((CALLS, _service_call(simulation, call)) for call in scene.calls)
+    for turtle in scene.turtles:
+        if isinstance(turtle.driver, Follow):
+            if turtle.driver.leader == turtle.name:
+                raise ValueInvalid(f"{turtle.name} cannot follow itself")
+            yield CONTROLLERS, _controller(FollowerNode(turtle.name, turtle.driver), simulation)
+        elif turtle.driver is not None:
+            yield LEADERS, _leader(simulation, turtle.name, turtle.driver())
 
 
-def _driver(actor: Actor) -> Iterator[tuple[int, Part]]:
-    if isinstance(actor.driver, Follow):
-        if actor.driver.leader == actor.name:
-            raise ValueInvalid(f"{actor.name} cannot follow itself")
-        yield 0, Chase(actor.name, actor.driver)
-    elif actor.driver is not None:
-        leader = actor.driver()
-        if leader.due_ns is not None:
-            yield leader.due_ns, Drive(actor.name, leader)
+def _ticks(simulation: Simulation) -> Process:
+    """Fire turtlesim's timer."""
+    for now_ns in count(0, TICK_NS):
+        yield now_ns
+        simulation.tick()
+
+
+def _carrot(simulation: Simulation, turtle: str, target: str) -> Process:
+    """Broadcast a carrot frame beside a turtle, fixed or moving, ten times a second."""
+    for now_ns in count(0, CARROT_NS):
+        yield now_ns
+        x, y = offset(target, now_ns)
+        simulation.broadcast(turtle, frame_of(turtle, target), planar(x, y, 0.0))
+
+
+def _service_call(simulation: Simulation, call: ServiceCall) -> Process:
+    """Send one service call; the world answers at its next tick."""
+    yield call.t_ns
+    simulation.calls.append(call)
+
+
+def _leader(simulation: Simulation, name: str, leader: Leader) -> Process:
+    """Send a leader's commands to its turtle; when the turtle is gone they reach nobody."""
+    pose = TurtlePose(0.0, 0.0, 0.0, 0.0, 0.0)
+    while leader.due_ns is not None:
+        yield leader.due_ns
+        turtle = simulation.world.turtles.get(name)
+        pose = pose if turtle is None else turtle.pose
+        given = leader.command(pose)
+        if turtle is None or given is None:
+            continue
+        if isinstance(given, Heading):
+            turtle.rotate_absolute(given.theta)
+        else:
+            turtle.command(given)
+            step = simulation.step
+            step.led.append(IssuedCommand(step.t_ns, name, given, None, None, turtle.state))
+
+
+def _controller(follower: FollowerNode, simulation: Simulation) -> Process:
+    """Let a follower steer at the rate of its law."""
+    for number in count():
+        yield follower.follow.controller.due_ns(number)
+        if follower.turtle in simulation.world.turtles:
+            follower.steer(simulation)
+
+
+class FollowerNode:
+    """The tutorial's listener: looks its target up in tf, and drives there; without an answer it skips the cycle."""
+
+    def __init__(self, turtle: str, follow: Follow) -> None:
+        """Let a turtle follow."""
+        self.turtle = turtle
+        self.follow = follow
+        self.frame = frame_of(follow.leader, follow.target)
+        self._failing = ""
+
+    def steer(self, simulation: Simulation) -> None:
+        """Look the target up and command the turtle; log once why there is no command, until there is one again."""
+        step = simulation.step
+        try:
+            x, y = self._look(simulation.buffer, step.t_ns)
+        except LookupFailed as error:
+            if type(error).__name__ != self._failing:
+                self._failing = type(error).__name__
+                step.log.append(f"Could not transform {self.turtle} to {self.frame}: {error}")
+            return
+        self._failing = ""
+        try:
+            twist = self.follow.controller.command(x, y)
+        except ValueInvalid as error:
+            raise ValueInvalid(f"{self.turtle}: {error}") from None
+        simulation.world.turtles[self.turtle].command(twist)
+        leader, state = simulation.states.get(self.follow.leader), simulation.states[self.turtle]
+        step.commands.append(IssuedCommand(step.t_ns, self.turtle, twist, math.sqrt(x * x + y * y), leader, state))
+
+    def _look(self, buffer: TransformBuffer, now_ns: int) -> tuple[float, float]:
+        """Return the target as the turtle sees it: at the latest common time, or where it was `delay_ns` before now.
+
+        Looking back, the turtle itself counts as standing where tf saw it last (tf2's lookup across time).
+        """
+        if not self.follow.delay_ns:
+            return buffer.lookup(self.turtle, self.frame).components[:2]
+        past_ns = now_ns - self.follow.delay_ns
+        return buffer.lookup_across(self.turtle, None, self.frame, past_ns, WORLD).components[:2]

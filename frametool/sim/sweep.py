@@ -1,6 +1,6 @@
 """Thousands of followers of one leader at once, on arrays; the same rules as `simulate`, without the buffer.
 
-The leader does not see its followers, so it is played once; each follower is then a row of every array.
+The leader does not see its followers, so it is run once; each follower is then a row of every array.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from frametool.frames.stamps import BILLION
 from frametool.sim.controllers import ARRIVED, FollowController, unbounded
 from frametool.sim.scene import TUTORIAL_SPAWN, tutorial
 from frametool.sim.simulate import simulate
-from frametool.sim.turtle import DT, PI, SIZE, TICK_NS, TIMEOUT_NS
+from frametool.sim.turtle import DT, FASTEST_TURN, SIZE, TICK_NS, TIMEOUT_NS, turned
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from frametool.sim.leaders import MakeLeader
-    from frametool.sim.turtle import State, TurtlePose
+    from frametool.sim.turtle import TurtlePose, TurtleState
 
-    Way = list[tuple[State, TurtlePose]]
+    LeaderTrack = list[tuple[TurtleState, TurtlePose]]
     Floats = NDArray[np.float64]
 
 NUMBERS = ("gain_linear", "gain_angular", "max_linear", "max_angular")
-BLOCK = 1 << 14  # followers at a time; smaller blocks spend their time on calls
+BLOCK = 16384  # followers at a time; smaller blocks spend their time on calls
 
 
-class Many(NamedTuple):
+class SweepResult(NamedTuple):
     """What became of the followers; every field has their common shape.
 
     x, y (m), theta (rad): where they ended.  distance (m): to the leader, at the end.
@@ -55,7 +55,7 @@ def simulate_many(
     rate: float | None = None, gain_linear: ArrayLike | None = None, gain_angular: ArrayLike | None = None,
     max_linear: ArrayLike | None = None, max_angular: ArrayLike | None = None,
     duration: float = 20.0, reach: float = 0.5, seed: int = 0,
-) -> Many:  # fmt: skip
+) -> SweepResult:  # fmt: skip
     """Let many followers chase one leader, each on its own.
 
     spawn: (..., 3) of x, y (m), theta (rad); gains and limits: arrays that broadcast with its leading shape.
@@ -71,29 +71,36 @@ def simulate_many(
     numbers = [_checked(name, getattr(law_itself, name) if value is None else value) for name, value in given.items()]
     columns = np.broadcast_arrays(*np.moveaxis(_places(spawn), -1, 0), *numbers)
     shape, flat = columns[0].shape, [column.reshape(-1) for column in columns]
-    way = _way(leader, duration, seed)
+    track = _leader_track(leader, duration, seed)
     blocks = [
-        _chase([column[at : at + BLOCK] for column in flat], way, law_itself, reach)
+        _follow([column[at : at + BLOCK] for column in flat], track, law_itself, reach)
         for at in range(0, max(flat[0].size, 1), BLOCK)
     ]
-    return Many(*(np.concatenate(parts).reshape(shape) for parts in zip(*blocks, strict=True)))
+    return SweepResult(*(np.concatenate(parts).reshape(shape) for parts in zip(*blocks, strict=True)))
 
 
-def grid(gain_linear: ArrayLike, gain_angular: ArrayLike, leader: MakeLeader | str = "still", **options: Any) -> Many:
+def grid(
+    gain_linear: ArrayLike, gain_angular: ArrayLike, leader: MakeLeader | str = "still", **options: Any,
+) -> SweepResult:  # fmt: skip
     """Try every pair of gains; the fields have a row for each linear gain and a column for each angular one."""
     linear, angular = (np.asarray(gains, dtype=float).reshape(-1) for gains in (gain_linear, gain_angular))
     return simulate_many(leader, gain_linear=linear[:, None], gain_angular=angular[None, :], **options)
 
 
-def rows(gain_linear: Sequence[float], gain_angular: Sequence[float], many: Many) -> Iterator[dict[str, float | None]]:
-    """Yield a grid as records, nan as None."""
-    columns = [many.time_to_reach.tolist(), many.overshoot.tolist(), many.distance.tolist(), many.wall_hits.tolist()]
-    names = ("time_to_reach", "overshoot", "final_distance", "wall_hits")
-    for row, linear in enumerate(gain_linear):
-        for column, angular in enumerate(gain_angular):
-            cells = (values[row][column] for values in columns)
-            known = {name: None if cell != cell else cell for name, cell in zip(names, cells, strict=True)}  # noqa: PLR0124 - nan
-            yield {"gain_linear": linear, "gain_angular": angular, **known}
+def rows(
+    gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult,
+) -> Iterator[dict[str, float | None]]:  # fmt: skip
+    """Yield the result of `grid` as one record a pair of gains; None where there is no number."""
+    columns = {
+        "time_to_reach": result.time_to_reach,
+        "overshoot": result.overshoot,
+        "final_distance": result.distance,
+        "wall_hits": result.wall_hits,
+    }
+    for row, column in np.ndindex(len(gain_linear), len(gain_angular)):
+        cells = {name: values[row, column].item() for name, values in columns.items()}
+        known = {name: None if math.isnan(cell) else cell for name, cell in cells.items()}
+        yield {"gain_linear": gain_linear[row], "gain_angular": gain_angular[column], **known}
 
 
 def _checked(name: str, value: ArrayLike) -> Floats:
@@ -112,9 +119,11 @@ def _places(spawn: ArrayLike) -> Floats:
     places = np.asarray(spawn, dtype=float)
     if places.shape[-1:] != (3,):
         raise ValueInvalid(f"spawn must have the shape (..., 3) of x, y, theta, found {places.shape}")
-    if not np.isfinite(places).all():
-        raise ValueInvalid("spawn must be finite")
-    return _single(places)
+    with np.errstate(over="ignore"):
+        rounded = _single(places)
+    if not np.isfinite(rounded).all():
+        raise ValueInvalid("spawn must be finite float32 numbers")
+    return rounded
 
 
 def _single(values: Floats) -> Floats:
@@ -122,75 +131,59 @@ def _single(values: Floats) -> Floats:
     return values.astype(np.float32).astype(float)
 
 
-def _way(leader: MakeLeader | str, duration: float, seed: int) -> Way:
-    """Play the leader alone: where it is at time 0 and after every tick, and what it publishes of that."""
+def _leader_track(leader: MakeLeader | str, duration: float, seed: int) -> LeaderTrack:
+    """Run the leader alone: where it is at time 0 and after every tick, and what it publishes of that."""
     if not 0.0 <= duration < math.inf:
         raise ValueInvalid(f"duration must be finite and 0 or more, found {duration}")
     steps = simulate(tutorial(leader=leader, followers=0, duration=duration, seed=seed))
     return [(step.states["turtle1"], step.poses["turtle1"]) for step in steps if step.is_tick]
 
 
-def _chase(columns: list[Floats], way: Way, law: FollowController, reach: float) -> tuple[Any, ...]:
-    """Play one block of followers: x, y, theta, gains, limits in, the fields of Many out."""
-    crowd = _Crowd(columns, reach)
+def _follow(columns: list[Floats], track: LeaderTrack, law: FollowController, reach: float) -> tuple[Any, ...]:
+    """Run one block of followers: x, y, theta, gains, limits in, the fields of SweepResult out."""
+    block = _FollowerBlock(columns, reach)
     count, commanded_ns = 0, 0
-    for tick, (state, pose) in enumerate(way):
+    for tick, (state, pose) in enumerate(track):
         now_ns = tick * TICK_NS
         if tick:
-            crowd.move(still=now_ns - commanded_ns > TIMEOUT_NS)
-        crowd.measure(state, now_ns / BILLION)
+            block.move(still=now_ns - commanded_ns > TIMEOUT_NS)
+        block.measure(state, now_ns / BILLION)
         if law.due_ns(count) < now_ns + TICK_NS:
-            crowd.steer(pose)
+            block.steer(pose)
             commanded_ns = now_ns + TICK_NS
         while law.due_ns(count) < now_ns + TICK_NS:
             count += 1
-    return crowd.result(way[-1][0])
+    return block.result(track[-1][0])
 
 
-class _Crowd:
-    """The followers of one block: the turtle's arithmetic and the law's, on arrays that are written in place."""
+class _FollowerBlock:
+    """The followers of one block: the turtle's arithmetic and the law's, on arrays."""
 
     def __init__(self, columns: list[Floats], reach: float) -> None:
-        self.x, y, self.theta = (column.copy() for column in columns[:3])
+        self.x, y, self.theta = (column.copy() for column in columns[:3])  # changed in place
         self.down = _single(SIZE - y)
         self.gain_linear, self.gain_angular, self.max_linear, self.max_angular = columns[3:]
         self.reach = reach
-        self.speed, self.turn, self.sine, self.cosine = (np.zeros_like(self.x) for _ in range(4))
-        self.reached, self.nearest, self.overshoot = (np.full_like(self.x, np.nan) for _ in range(3))
-        self.hits = np.zeros(self.x.shape, np.int64)
+        self.speed, self.turn = np.zeros_like(y), np.zeros_like(y)
+        self.reached, self.nearest, self.overshoot = (np.full_like(y, np.nan) for _ in range(3))
+        self.hits = np.zeros(y.shape, np.int64)
         self.unreached = True
-        self._one, self._two = np.empty_like(self.x), np.empty_like(self.x)
 
     def move(self, *, still: bool) -> None:
-        """Live through one tick: `Turtle.update`, without what followers never do."""
+        """Advance one tick: `Turtle.update`, without what followers never do."""
         if still:
-            self.speed[:] = self.turn[:] = 0.0
-        one, two = self._one, self._two
-        np.multiply(self.turn, DT, out=one)
-        self.theta += one
-        np.add(self.theta, PI, out=one)
-        one /= 2.0 * PI
-        np.floor(one, out=one)
-        one *= 2.0 * PI
-        self.theta -= one
-        np.cos(self.theta, out=self.cosine)
-        np.sin(self.theta, out=self.sine)
-        np.multiply(np.multiply(self.cosine, self.speed, out=one), DT, out=one)
-        np.multiply(np.multiply(self.sine, self.speed, out=two), DT, out=two)
-        self.x += one
-        self.down -= two
-        self._stay_inside()
-
-    def _stay_inside(self) -> None:
+            self.speed, self.turn = np.zeros_like(self.x), np.zeros_like(self.x)
+        self.theta, cosine, sine = turned(self.theta, self.turn, np)
+        self.x += cosine * self.speed * DT
+        self.down -= sine * self.speed * DT
         if all(axis.min(initial=0.0) >= 0.0 and axis.max(initial=SIZE) <= SIZE for axis in (self.x, self.down)):
             return
         self.hits += (self.x < 0.0) | (self.x > SIZE) | (self.down < 0.0) | (self.down > SIZE)
-        np.clip(self.x, 0.0, SIZE, out=self.x)
-        np.clip(self.down, 0.0, SIZE, out=self.down)
+        self.x, self.down = np.clip(self.x, 0.0, SIZE), np.clip(self.down, 0.0, SIZE)
 
-    def measure(self, leader: State, t: float) -> None:
+    def measure(self, leader: TurtleState, t: float) -> None:
         """Compare the distances with the reach, and with the nearest since that was reached."""
-        distance = self._distance(leader, self._one, self._two)
+        distance = self._distance(leader)
         if self.unreached:
             new = np.isnan(self.reached) & (distance <= self.reach)
             self.reached[new] = t
@@ -198,16 +191,11 @@ class _Crowd:
             self.overshoot[new] = 0.0
             self.unreached = bool(np.isnan(self.reached).any())
         np.minimum(self.nearest, distance, out=self.nearest)
-        distance -= self.nearest
-        np.maximum(self.overshoot, distance, out=self.overshoot)
+        np.maximum(self.overshoot, distance - self.nearest, out=self.overshoot)
 
-    def _distance(self, leader: State, one: Floats, two: Floats) -> Floats:
-        np.subtract(self.x, leader.x, out=one)
-        np.subtract(SIZE - leader.y, self.down, out=two)
-        one *= one
-        two *= two
-        one += two
-        return np.sqrt(one, out=one)
+    def _distance(self, leader: TurtleState) -> Floats:
+        across, down = self.x - leader.x, SIZE - leader.y - self.down
+        return np.sqrt(across * across + down * down)
 
     def steer(self, leader: TurtlePose) -> None:
         """Follow the published pose: what `lookup` and `FollowController.command` give, from float32 poses."""
@@ -221,15 +209,12 @@ class _Crowd:
             self.speed = np.clip(self.gain_linear * distance * moving, -self.max_linear, self.max_linear)
             turn = self.gain_angular * np.arctan2(left, ahead) * moving
         self.turn = np.clip(turn, -self.max_angular, self.max_angular)
-        self._check_finite(distance)
-
-    def _check_finite(self, distance: Floats) -> None:
-        finite = np.isfinite(self.speed) & np.isfinite(self.turn)
+        finite = np.isfinite(self.speed) & (abs(self.turn) <= FASTEST_TURN)
         if not finite.all():
             first = int(np.argmin(finite))
             raise ValueInvalid(unbounded(self.gain_linear[first], self.gain_angular[first], distance[first]))
 
-    def result(self, leader: State) -> tuple[Any, ...]:
-        """Return the fields of Many."""
-        distance = self._distance(leader, np.empty_like(self.x), self._two)
+    def result(self, leader: TurtleState) -> tuple[Any, ...]:
+        """Return the fields of SweepResult."""
+        distance = self._distance(leader)
         return self.x, SIZE - self.down, self.theta, distance, self.reached, self.overshoot, self.hits

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from struct import Struct
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 
@@ -23,6 +23,7 @@ SIZE = 11.088889122009277  # metres: float32 of 499 pixels / 45 pixels a metre
 CENTRE = SIZE / 2.0
 TURN_SPEED = 1.0  # radians a second, of rotate_absolute
 TURN_NEAR = 0.02  # radians, where rotate_absolute ends
+FASTEST_TURN = 1e15  # radians a second; beyond, what is left of an angle after wrapping is rounding
 
 _ONE_SINGLE = Struct("f")
 _FIVE_SINGLES = Struct("5f")
@@ -38,26 +39,28 @@ class Twist(_Components):
     """A velocity command: metres and radians a second, in the turtle's own frame; x ahead, y to its left.
 
     Raises:
-        ValueInvalid: a component is nan or infinite; turtlesim would take it and lose the turtle for good.
+        ValueInvalid: a component is nan or infinite, or a turn so fast that no heading is left; turtlesim would take it
+            and lose the turtle for good.
     """
 
     __slots__ = ()
 
     def __new__(cls, linear_x: float, angular_z: float, linear_y: float = 0.0) -> Self:
-        """Check that every component is finite."""
-        if not (math.isfinite(linear_x) and math.isfinite(angular_z) and math.isfinite(linear_y)):
-            raise ValueInvalid(f"a velocity must be finite, found linear {linear_x} {linear_y}, angular {angular_z}")
+        """Check that every component can be used."""
+        if not (math.isfinite(linear_x) and abs(angular_z) <= FASTEST_TURN and math.isfinite(linear_y)):
+            limits = f"must be finite, and turns at most {FASTEST_TURN:g} rad/s"
+            raise ValueInvalid(f"a velocity {limits}, found linear {linear_x} {linear_y}, angular {angular_z}")
         return super().__new__(cls, linear_x, angular_z, linear_y)
 
 
-class State(NamedTuple):
+class TurtleState(NamedTuple):
     """Where a turtle is, in double precision: metres, radians."""
 
     x: float
     y: float
     theta: float
 
-    def distance(self, other: State) -> float:
+    def distance(self, other: TurtleState) -> float:
         """Return the metres to another turtle."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
@@ -90,9 +93,28 @@ def single(value: float) -> float:
         return math.copysign(math.inf, value)
 
 
-def wrapped(theta: float) -> float:
+def check_single(**numbers: float) -> None:
+    """Refuse numbers that a message of float32 cannot hold.
+
+    Raises ValueInvalid, which names the first of them.
+    """
+    for name, value in numbers.items():
+        if not math.isfinite(single(value)):
+            raise ValueInvalid(f"{name} must be a number within float32, found {value:g}")
+
+
+def wrapped(theta: Any, xp: Any = math) -> Any:
     """Bring an angle into [-PI, PI) by turtlesim's formula."""
-    return theta - 2.0 * PI * math.floor((theta + PI) / (2.0 * PI))
+    return theta - 2.0 * PI * xp.floor((theta + PI) / (2.0 * PI))
+
+
+def turned(theta: Any, turning: Any, xp: Any) -> tuple[Any, Any, Any]:
+    """Return the heading after one tick at a turn rate (rad/s), its cosine and its sine.
+
+    Floats with `math` as xp, or arrays with numpy.
+    """
+    theta = wrapped(theta + turning * DT, xp)
+    return theta, xp.cos(theta), xp.sin(theta)
 
 
 class Turtle:
@@ -111,7 +133,11 @@ class Turtle:
         self, x: float = CENTRE, y: float = CENTRE, theta: float = 0.0, *,
         name: str = "turtle1", holonomic: bool = True,
     ) -> None:  # fmt: skip
-        """Put a turtle into the world; x, y, theta are float32, as in the spawn service."""
+        """Put a turtle into the world; x, y, theta are float32, as in the spawn service.
+
+        Raises ValueInvalid for what is no finite float32.
+        """
+        check_single(x=x, y=y, theta=theta)
         self.name = name
         self.holonomic = holonomic
         self.pen = Pen()
@@ -123,9 +149,9 @@ class Turtle:
         self._heading: float | None = None
 
     @property
-    def state(self) -> State:
+    def state(self) -> TurtleState:
         """Return where the turtle is, in double precision, y up."""
-        return State(self._x, SIZE - self._down, self._theta)
+        return TurtleState(self._x, SIZE - self._down, self._theta)
 
     @property
     def pose(self) -> TurtlePose:
@@ -138,12 +164,16 @@ class Turtle:
         self._inbox = twist
 
     def teleport_absolute(self, x: float, y: float, theta: float) -> None:
-        """Be somewhere else from the next tick on; float32, as the service takes it."""
+        """Jump to a place at the next tick; float32, as the service takes it."""
         self._teleports.append((False, single(x), single(y), single(theta)))
 
     def teleport_relative(self, linear: float, angular: float) -> None:
         """Turn, then jump ahead, at the next tick."""
         self._teleports.append((True, single(linear), 0.0, single(angular)))
+
+    def set_pen(self, r: float, g: float, b: float, width: float, off: float) -> None:
+        """Draw with another pen from the next tick on; the service's numbers, `off` is 0 or 1."""
+        self.pen = Pen(int(r), int(g), int(b), int(width), bool(off))
 
     def rotate_absolute(self, theta: float | None) -> None:
         """Turn to a heading at 1 rad/s (ROS 2); a velocity command aborts it, None gives it up."""
@@ -151,8 +181,8 @@ class Turtle:
             self._velocity = Twist(0.0, 0.0)
         self._heading = None if theta is None else single(theta)
 
-    def update(self, now_ns: int) -> State | None:
-        """Live through one tick.
+    def update(self, now_ns: int) -> TurtleState | None:
+        """Advance one tick.
 
         Returns where the turtle would have been outside the world before it was put back to the wall, else None.
         """
@@ -163,7 +193,10 @@ class Turtle:
         self._turn_to_heading(now_ns)
         if now_ns - self._commanded_ns > TIMEOUT_NS:
             self._velocity = Twist(0.0, 0.0)
-        self._move()
+        ahead, turning, aside = self._velocity
+        self._theta, cosine, sine = turned(self._theta, turning, math)
+        self._x += cosine * ahead * DT - sine * aside * DT
+        self._down -= cosine * aside * DT + sine * ahead * DT
         return self._stay_inside()
 
     def _take_command(self, now_ns: int) -> None:
@@ -194,15 +227,7 @@ class Turtle:
             self._velocity = Twist(0.0, math.copysign(TURN_SPEED, remaining))
             self._commanded_ns = now_ns
 
-    def _move(self) -> None:
-        """Turn first, then go along the new heading."""
-        ahead, turning, aside = self._velocity
-        self._theta = wrapped(self._theta + turning * DT)
-        cosine, sine = math.cos(self._theta), math.sin(self._theta)
-        self._x += cosine * ahead * DT - sine * aside * DT
-        self._down -= cosine * aside * DT + sine * ahead * DT
-
-    def _stay_inside(self) -> State | None:
+    def _stay_inside(self) -> TurtleState | None:
         if 0.0 <= self._x <= SIZE and 0.0 <= self._down <= SIZE:
             return None
         outside = self.state

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid
-from frametool.sim.turtle import CENTRE, Pen, Turtle, single
+from frametool.errors import ValueInvalid, listing, printable
+from frametool.sim.turtle import CENTRE, Turtle, check_single, single
 
 if TYPE_CHECKING:
-    from frametool.sim.turtle import State
+    from frametool.sim.turtle import TurtleState
 
 VARIANTS = ("ros1", "ros2")
+FAR = 1e9  # metres, from where on a place is written with an exponent
 # service -> its arguments and what they are when left out (None: must be given)
 SERVICES: dict[str, dict[str, float | str | None]] = {
     "spawn": {"x": None, "y": None, "theta": 0.0, "name": ""},
@@ -33,15 +34,16 @@ class WallHit(NamedTuple):
 
     t_ns: int
     turtle: str
-    place: State
+    place: TurtleState
 
     def __str__(self) -> str:
         """Warn as turtlesim does, with y up."""
-        return f"{self.turtle}: Oh no! I hit the wall! (Clamping from [x={self.place.x:f}, y={self.place.y:f}])"
+        x, y = (f"{each:f}" if abs(each) < FAR else f"{each:g}" for each in self.place[:2])
+        return f"{printable(self.turtle)}: Oh no! I hit the wall! (Clamping from [x={x}, y={y}])"
 
 
 class World:
-    """Hold the turtles and move them all, in the order of their names, at every tick.
+    """The turtles by name, moved one after another in the order of their names at every tick.
 
         world = World()
         world.spawn(4.0, 2.0, 0.0, "turtle2")
@@ -51,42 +53,51 @@ class World:
     """
 
     def __init__(self, variant: str = "ros1", *, holonomic: bool = False) -> None:
-        """Begin an empty world; `reset` gives it turtle1, as the node does when it starts."""
+        """Create an empty world; `reset` gives it turtle1, as the node does when it starts."""
         if variant not in VARIANTS:
             raise ValueInvalid(f"no turtlesim {variant!r}; there are {', '.join(VARIANTS)}")
         self.variant = variant
         self.holonomic = holonomic or variant == "ros1"
-        self.turtles: dict[str, Turtle] = {}
         self.clears = 0  # how often the drawing was cleared
+        self._turtles: dict[str, Turtle] = {}
+        self._in_order = True
         self._count = 0
 
+    @property
+    def turtles(self) -> dict[str, Turtle]:
+        """Return the turtles in the order of their names; sorted once after any number of spawns."""
+        if not self._in_order:
+            self._turtles = dict(sorted(self._turtles.items()))
+            self._in_order = True
+        return self._turtles
+
     def spawn(self, x: float = CENTRE, y: float = CENTRE, theta: float = 0.0, name: str = "") -> str:
-        """Put a turtle into the world; without a name it gets the next free turtleN. Returns its name.
+        """Create a turtle; without a name it gets the next free turtleN. Returns its name.
 
         Raises ServiceRefused when the name is taken.
         """
-        if name in self.turtles:
+        if name in self._turtles:
             article = "turtled" if self.variant == "ros1" else "turtle"
             raise ServiceRefused(f"A {article} named [{name}] already exists")
-        while not name or name in self.turtles:
+        while not name or name in self._turtles:
             self._count += 1
             name = f"turtle{self._count}"
-        self.turtles[name] = Turtle(x, y, theta, name=name, holonomic=self.holonomic)
-        self.turtles = dict(sorted(self.turtles.items()))
+        self._turtles[name] = Turtle(x, y, theta, name=name, holonomic=self.holonomic)
+        self._in_order = False
         return name
 
     def kill(self, name: str) -> None:
-        """Take a turtle out of the world.
+        """Remove a turtle.
 
         Raises ServiceRefused when there is none of that name.
         """
-        if name not in self.turtles:
+        if name not in self._turtles:
             raise ServiceRefused(f"Tried to kill turtle [{name}], which does not exist")
-        self.turtles = {each: turtle for each, turtle in self.turtles.items() if each != name}
+        del self._turtles[name]
 
     def reset(self) -> None:
-        """Take all turtles out, begin to count anew, and put turtle1 in the centre; the drawing is cleared."""
-        self.turtles = {}
+        """Remove all turtles, restart their numbering, clear the drawing, and spawn turtle1 in the centre."""
+        self._turtles.clear()
         self._count = 0
         self.clear()
         self.spawn()
@@ -100,9 +111,9 @@ class World:
 
         Raises ServiceRefused when there is none: its services went with it.
         """
-        if name not in self.turtles:
-            raise ServiceRefused(f"no turtle [{name}] to call; turtles: {', '.join(self.turtles) or 'none'}")
-        return self.turtles[name]
+        if name not in self._turtles:
+            raise ServiceRefused(f"no turtle [{name}] to call; turtles: {listing(self._turtles) or 'none'}")
+        return self._turtles[name]
 
     def call(self, service: str, **arguments: float | str) -> str:
         """Call a service of the table SERVICES by name; what is left out takes the table's value.
@@ -113,35 +124,13 @@ class World:
         given = complete(service, arguments)
         if self.variant == "ros1" and service == "rotate_absolute":
             raise ServiceRefused("rotate_absolute is an action of the ROS 2 turtlesim; add turtlesim: ros2")
-        answer = getattr(self, f"_{service}")(**given)
-        return str(answer or "")
-
-    def _spawn(self, x: float, y: float, theta: float, name: str) -> str:
-        name = self.spawn(x, y, theta, name)
-        return f"Spawning turtle [{name}] at x=[{single(x):f}], y=[{single(y):f}], theta=[{single(theta):f}]"
-
-    def _kill(self, name: str) -> None:
-        self.kill(name)
-
-    def _reset(self) -> str:
-        self.reset()
-        return "Resetting turtlesim."
-
-    def _clear(self) -> str:
-        self.clear()
-        return "Clearing turtlesim."
-
-    def _teleport_absolute(self, turtle: str, x: float, y: float, theta: float) -> None:
-        self.turtle(turtle).teleport_absolute(x, y, theta)
-
-    def _teleport_relative(self, turtle: str, linear: float, angular: float) -> None:
-        self.turtle(turtle).teleport_relative(linear, angular)
-
-    def _rotate_absolute(self, turtle: str, theta: float) -> None:
-        self.turtle(turtle).rotate_absolute(theta)
-
-    def _set_pen(self, turtle: str, r: float, g: float, b: float, width: float, off: float) -> None:
-        self.turtle(turtle).pen = Pen(int(r), int(g), int(b), int(width), bool(off))
+        receiver = self.turtle(str(given.pop("turtle"))) if "turtle" in given else self
+        answer = getattr(receiver, service)(**given)
+        if service == "spawn":
+            return f"Spawning turtle [{answer}] at " + ", ".join(
+                f"{name}=[{single(float(given[name])):f}]" for name in ("x", "y", "theta")
+            )
+        return {"reset": "Resetting turtlesim.", "clear": "Clearing turtlesim."}.get(service, "")
 
     def tick(self, now_ns: int) -> list[WallHit]:
         """Move every turtle by one tick; returns those that hit a wall."""
@@ -152,7 +141,7 @@ class World:
 def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float | str]:
     """Return a service's arguments with the defaults of the table.
 
-    Raises ValueInvalid for a service or argument that does not exist, or one that is missing.
+    Raises ValueInvalid for a service or argument that does not exist, or one that is missing or no finite float32.
     """
     if service not in SERVICES:
         raise ValueInvalid(f"no service {service!r}; services: {', '.join(SERVICES)}")
@@ -162,4 +151,5 @@ def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float
     given = {name: arguments.get(name, default) for name, default in expected.items()}
     if missing := [name for name, value in given.items() if value is None]:
         raise ValueInvalid(f"{service} needs {', '.join(missing)}")
+    check_single(**{name: value for name, value in given.items() if isinstance(value, float)})
     return {name: value for name, value in given.items() if value is not None}

@@ -9,9 +9,9 @@ import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, rigid
+from frametool.geometry.batch_validation import read_rotations
 from frametool.stream.faults import NULL, STOP, Fault
-from frametool.stream.row_layout import IDENTITY, POSE, TURN, pose_of
-from frametool.stream.row_rotations import read_rotations
+from frametool.stream.row_layout import FLAT, IDENTITY, POSE, TURN, pose_of
 from frametool.stream.row_transforms import NOWHERE, by_frame, by_time
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
 from frametool.stream.text_parts import Const, In, Instead, Out
@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from frametool.text.spans import Spans
 
 
+LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
+
+
 class Plan(NamedTuple):
     """What is done to every row of one layout.
 
@@ -47,7 +50,7 @@ class Plan(NamedTuple):
     pieces: tuple[Piece, ...]
     names: tuple[str, ...]
     null: bytes = b""
-    edge_of: Callable[[str], Rigid] | None = None
+    edge_of: Callable[..., Rigid] | None = None
     normalize: bool = False
     precision: int | None = None
     on_error: str = STOP
@@ -82,7 +85,7 @@ class Run:
         """Do all of it."""
         self.plan = plan
         self.block = block
-        self.reasons: dict[int, tuple[str, str | FrametoolError]] = {}
+        self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
         self.mended: list[int] = []
         self.doubted: list[tuple[int, str]] = []
         self.count = len(block.places)
@@ -117,7 +120,7 @@ class Run:
         """Tell whether a number is in degrees; None if it is no angle."""
         for shape in self.plan.shapes:
             if column < shape.size:
-                return shape.degrees if column in shape.angles_at else None
+                return shape.in_degrees(column)
             column -= shape.size
         return None
 
@@ -159,17 +162,17 @@ class Run:
         return moved
 
     def _with_previous(self, pose: Rigid, state: State) -> list[Rigid]:
-        if self.plan.operation.of != "previous" or not self.count:
+        if self.plan.operation.of != "previous":
             return [pose]
         return _with_previous(pose, [row for row in range(self.count) if row not in self.reasons], state, self.count)
 
     def _rotation(self, shape: Shape, numbers: list[Floats], first: int) -> Components:
         if shape.notation is None:
             return IDENTITY
-        given = [numbers[index] for index in shape.rotation_at]
+        given = list(shape.rotation(numbers))
         names = self.plan.names[first : first + shape.size]
-        if shape.whole:
-            self._check_last_row(numbers[12:16], names[12])
+        if shape.joined:
+            self._check_tail(numbers, names, shape.joined.tail)
         found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
         for row, reason in found.reasons.items():
             self._blame(row, names[shape.rotation_at[0]], reason)
@@ -177,11 +180,14 @@ class Run:
         self.doubted += _doubtful_angles(shape, given)
         return found.quaternions
 
-    def _check_last_row(self, numbers: list[Floats], name: str) -> None:
-        wrong = (numbers[0] != 0.0) | (numbers[1] != 0.0) | (numbers[2] != 0.0) | (numbers[3] != 1.0)
-        for row in np.flatnonzero(wrong).tolist():
-            found = " ".join(f"{number[row]:g}" for number in numbers)
-            self._blame(row, name, f"the last row of a 4x4 pose is 0 0 0 1, found {found}")
+    def _check_tail(self, numbers: list[Floats], names: Sequence[str], tail: Sequence[float]) -> None:
+        """Refuse rows whose last numbers are not what they always are: 0 0 0 1 of a 4x4 matrix."""
+        first = len(numbers) - len(tail)
+        wrong = {row for at, each in enumerate(tail) for row in np.flatnonzero(numbers[first + at] != each).tolist()}
+        wanted = " ".join(f"{each:g}" for each in tail)
+        for row in wrong:
+            found = " ".join(f"{number[row]:g}" for number in numbers[first:])
+            self._blame(row, names[first], f"the last row of a 4x4 pose is {wanted}, found {found}")
 
     def _results(self, moved: list[Components]) -> tuple[Floats, Ints]:
         """Return the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
@@ -189,6 +195,9 @@ class Run:
         locked = np.zeros(self.count, np.int64)
         for target, parts in zip(self.plan.targets, moved, strict=True):
             numbers += target.written(parts, arrays)
+            for name, number in target.left_out(parts, arrays):
+                for row in np.flatnonzero(abs(number) > FLAT).tolist():
+                    self._blame(row, "", LEAVES_PLANE.format(name, number[row]))
             flags = target.locked(parts)
             if flags is not None:
                 locked |= flags
@@ -271,7 +280,7 @@ def _read_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001
 def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]:
     """Wonder about the first bare angle beyond a full turn."""
     form = shape.notation
-    if form is None or shape.degrees or form.degrees is not None or form.representation.name == "rotvec":
+    if form is None or shape.degrees or form.degrees is not None:
         return []
     for index in form.representation.angles:
         beyond = np.flatnonzero(abs(given[index]) > TURN)

@@ -1,174 +1,403 @@
-"""Find points and poses among the columns of a table, by name: `x y z`, `qx qy qz qw`, `roll_deg ..`, with affixes.
+"""Find points and poses among the columns of a table by name: `x y z`, `qx qy qz qw`, `roll_deg ..`, with affixes.
 
-A common prefix or suffix is one that is set off: `pose.qx`, `qx_left`, `field.pose.orientation.x`. Knows names only.
+A common prefix or suffix is one that is set off: `pose.qx`, `qx_left`, `field.pose.orientation.x`. A unit stands right
+behind a name (`x_mm`, `roll_deg`) or in brackets at its end (`x [mm]`, `yaw (rad)`). Knows names only.
 """
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, did_you_mean
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import NAMED, REPRESENTATIONS, notation
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.geometry.representations import Notation
+    from frametool.geometry.representations import Notation, Representation
+    from frametool.stream.row_layout import Unit
 
-POSITIONS = ("x y z", "tx ty tz", "px py pz")
+    Spot = tuple[int, str]  # a column's place, and the unit that its name says
+
+XYZ = ("x", "y", "z")
+POSITIONS = (XYZ, ("tx", "ty", "tz"), ("px", "py", "pz"))
 TELLING = ("position", "translation", "point", "vector")
-OTHER_UNITS = ("_cm", "_km", "_in", "_ft", "_deg", "_rad", "_s")
-MILLIMETRES = "_mm"
-WHOLE = tuple(f"m{row}{column}" for row in "1234" for column in "1234")
-# `quaternion` stands for the three that share its columns; six_d's are a matrix's, euler's say no axes: by --from only
-SEARCHED = ("quaternion", "rpy", "axis_angle", "rotvec", "matrix", "mrp")
-WITH_XYZ = ("axis_angle", "rotvec", "mrp")  # their columns look like a position with a prefix
-SAME_COLUMNS = {"xyzw": "quaternion", "wxyz": "quaternion"}
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0, "um": 1e6}  # how many make a metre
+ANGLES = {"deg": True, "degree": True, "degrees": True, "°": True, "rad": False, "radian": False, "radians": False}
+NO_UNIT = ("", "-", "1")
+MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
+# behind an underscore: these are units of no length, and those are lengths that nobody should have to guess
+UNITS = re.compile(r"_(deg|rad|mm|cm|um|m)(?![^\W_])|_(km|in|ft|s)$")
+BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
+TOKEN = re.compile(r"[^\W_]+")
 
 
 class Columns(NamedTuple):
-    """Columns that belong together: where they stand, in the order of their meaning, and what surrounds their names.
+    """Columns that belong together.
 
-    unit: numbers a metre of a position; form: notation of a rotation; whole: the 16 of a homogeneous matrix
+    places: where they stand, in the order of their meaning; names: as the header writes them
+    prefix, suffix: what surrounds the names
+    unit: numbers a metre of a position
+    notation: that of a rotation; degrees: what the name of each of its numbers says (True, False, None: nothing)
+    whole: the numbers of a whole pose
+    absent: which numbers of a position or a rotation have no column
+    wrong: what is wrong with the names, an error where the columns are used
     """
 
     places: tuple[int, ...]
     names: tuple[str, ...]
     prefix: str = ""
     suffix: str = ""
-    unit: float | None = None
-    form: Notation | None = None
+    unit: Unit | None = None
+    notation: Notation | None = None
+    degrees: tuple[bool | None, ...] = ()
     whole: bool = False
+    absent: tuple[int, ...] = ()
+    wrong: str = ""
 
     @property
     def shown(self) -> str:
         """Name the columns."""
         return " ".join(self.names)
 
+    @property
+    def is_mixed(self) -> bool:
+        """Tell whether the names of a rotation's angles do not all say the same unit."""
+        angles = self.notation.representation.angles if self.notation else ()
+        return len({self.degrees[at] for at in angles if at not in self.absent}) > 1
 
-class Pose(NamedTuple):
+
+class PoseColumns(NamedTuple):
     """The columns of one point or pose."""
 
     position: Columns | None
     rotation: Columns | None
 
 
-def find_positions(names: Sequence[str]) -> list[Columns]:
-    """Return every three columns that can be a position."""
-    found = []
-    quaternions = {(each.prefix, each.suffix) for each in find_quaternions(names)}
-    turns = {place for name in WITH_XYZ for each in _of_representation(name, names, None) for place in each.places}
-    for base in POSITIONS:
-        for places, prefix, suffix in _matches(base.split(), names):
-            if (prefix, suffix) in quaternions or suffix.startswith(OTHER_UNITS) or turns.issuperset(places):
+class Match(NamedTuple):
+    """The columns found for the words of a base: the place and the unit of each, None where one is missing."""
+
+    spots: tuple[Spot | None, ...]
+    prefix: str
+    suffix: str
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Return the places of the columns that are there."""
+        return tuple(spot[0] for spot in self.spots if spot is not None)
+
+    @property
+    def units(self) -> list[str]:
+        """Return the units of the columns that are there."""
+        return [spot[1] for spot in self.spots if spot is not None]
+
+    def place(self, at: int) -> int:
+        """Return the place of one word's column; -1 where it is missing."""
+        spot = self.spots[at]
+        return -1 if spot is None else spot[0]
+
+
+class Header:
+    """The names of a table's columns, taken apart once: which words of ours each holds, and in which unit."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """Look for the columns of all representations and positions in the names."""
+        self.names = names
+        self.repeated = {name for name, count in Counter(names).items() if count > 1}
+        self.found: dict[str, dict[tuple[str, str], list[Spot]]] = {word: {} for word in WORDS}
+        self.affixes: dict[tuple[str, str], tuple[str, str]] = {}
+        for place, name in enumerate(names):
+            self._take_apart(place, name.lstrip("# ") if place == 0 else name)
+
+    def _take_apart(self, place: int, name: str) -> None:
+        bracket = BRACKETS.search(name)
+        bare = name[: bracket.start()] if bracket else name
+        folded = bare.lower() if bare.isascii() else bare
+        for token in TOKEN.finditer(folded):
+            for word in BY_TOKEN.get(token[0], ()):
+                end = token.start() + len(word)
+                if not folded.startswith(word, token.start()) or folded[end : end + 1].isalnum():
+                    continue
+                said = UNITS.match(folded, end)
+                behind = said.end() if said else end
+                key = folded[: token.start()], folded[behind:]
+                self.affixes.setdefault(key, (bare[: token.start()], bare[behind:]))
+                unit = bracket[1] if bracket else (said[1] or said[2]) if said else ""
+                self.found[word].setdefault(key, []).append((place, unit))
+
+    def match(self, base: Sequence[str], alike: Sequence[int] = ()) -> Iterator[Match]:
+        """Yield the columns that have all words of a base under common affixes.
+
+        alike: which of the words have a unit; columns of one unit belong together, and those of several only where
+        each word has one column.
+        """
+        for key, spots in self._keyed(base):
+            if not all(spots):
                 continue
-            unit = 1000.0 if suffix.startswith(MILLIMETRES) else 1.0
-            found.append(_columns(places, names, prefix, suffix)._replace(unit=unit))
+            same = [
+                unit for _, unit in (spots[alike[0]] if alike else [])
+                if all(any(each[1] == unit for each in spots[at]) for at in alike)
+            ]  # fmt: skip
+            for unit in dict.fromkeys(same) or ("",):
+                chosen = [next((each for each in spot if each[1] == unit), spot[0]) for spot in spots]
+                yield Match(tuple(chosen), *self.affixes[key])
+
+    def match_partly(self, base: Sequence[str]) -> Iterator[Match]:
+        """Yield the columns that have some words of a base, and not all, under common affixes."""
+        for key, spots in self._keyed(base):
+            if not all(spots):
+                yield Match(tuple(spot[0] if spot else None for spot in spots), *self.affixes[key])
+
+    def _keyed(self, base: Sequence[str]) -> Iterator[tuple[tuple[str, str], list[list[Spot]]]]:
+        """Yield the affixes under which a word of a base was found, with the columns of each word."""
+        keys = {key: spots[0][0] for word in reversed(base) for key, spots in self.found[word].items()}
+        for key in sorted(keys, key=keys.__getitem__):
+            yield key, [self.found[word].get(key, []) for word in base]
+
+    def is_plain(self, match: Match) -> bool:
+        """Tell whether a column has the affixes of a position or none: `yaw`, `pose.yaw`, and not `yaw_rate`."""
+        key = match.prefix.lower(), match.suffix.lower()
+        return key == ("", "") or any(key in self.found[base[0]] for base in POSITIONS)
+
+    def columns(self, match: Match) -> Columns:
+        """Name the columns of a match."""
+        names = tuple(self.names[place] for place in match.places)
+        twice = [name for name in names if name in self.repeated]
+        wrong = f"column {twice[0]} stands twice; choose by number with --columns" if twice else ""
+        return Columns(match.places, names, match.prefix, match.suffix, wrong=wrong)
+
+
+WORDS = {word for row in REPRESENTATIONS.values() for word in (*row.columns, *row.names, *row.alone) if word}.union(
+    *POSITIONS, *(row.whole.columns for row in REPRESENTATIONS.values() if row.whole)
+)
+BY_TOKEN: dict[str, list[str]] = {}
+for _word in sorted(WORDS):
+    BY_TOKEN.setdefault(_word.split("_")[0], []).append(_word)
+
+
+def has_names_of_ours(names: Iterable[str]) -> bool:
+    """Tell whether one of some names is that of a column of ours."""
+    return any(Header(list(names)).found.values())
+
+
+def find_positions(header: Header) -> list[Columns]:
+    """Return every three columns that can be a position."""
+    named = {(match.prefix, match.suffix) for match in _named_maps(header) if match.prefix or match.suffix}
+    turns: dict[int, set[int]] = {}
+    for at, match in enumerate(match for row in REPRESENTATIONS.values() for match in header.match(row.columns)):
+        for place in match.places:
+            turns.setdefault(place, set()).add(at)
+    found = []
+    for base in POSITIONS:
+        for match in header.match(base, range(3)):
+            in_rotation = set.intersection(*(turns.get(place, set()) for place in match.places))
+            if in_rotation or (match.prefix, match.suffix) in named or not {*ANGLES, "s"}.isdisjoint(match.units):
+                continue
+            found.append(_position(header, match))
     telling = [each for each in found if any(word in each.prefix.lower() for word in TELLING)]
     return telling or found
 
 
-def find_quaternions(names: Sequence[str], *, bare: bool = False) -> list[Columns]:
-    """Return quaternions written x y z w under a common prefix or suffix; without either only if `bare`."""
-    form = notation("quaternion")
-    matches = _matches(["x", "y", "z", "w"], names)
-    return [
-        _columns(*match[:1], names, *match[1:])._replace(form=form) for match in matches if bare or match[1] or match[2]
-    ]
+def _position(header: Header, match: Match) -> Columns:
+    """Read the units of a position's columns, of which one may be absent."""
+    columns = header.columns(match)
+    units = [1.0 if spot is None else LENGTHS.get(spot[1], 0.0) for spot in match.spots]
+    if 0.0 in units:
+        place, unit = next(spot for spot in match.spots if spot and spot[1] not in LENGTHS)
+        known = ", ".join(filter(None, LENGTHS))
+        wrong = f"column {header.names[place]!r}: unknown unit {unit!r} of a length; known are {known}"
+        return columns._replace(unit=1.0, wrong=wrong)
+    x, y, z = units
+    return columns._replace(unit=x if x == y == z else (x, y, z))
 
 
-def find_rotations(names: Sequence[str], given: Notation | None) -> list[Columns]:
+def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> list[Columns]:
     """Return every set of columns that can be a rotation, of the given notation if there is one."""
-    searched = SEARCHED if given is None else (SAME_COLUMNS.get(given.representation.name, given.representation.name),)
-    found = [each for name in searched for each in _of_representation(name, names, given)]
-    if "quaternion" in searched:
-        found += find_quaternions(names, bare=given is not None)
-    if "matrix" in searched:
-        found += [
-            _columns(places, names, prefix, suffix)._replace(form=notation("matrix"), whole=True, unit=1.0)
-            for places, prefix, suffix in _matches(WHOLE, names)
-        ]
-    return found
+    header = names if isinstance(names, Header) else Header(names)
+    rows = _searched(given)
+    found = [each for row in rows for each in _of_representation(row, header, given)]
+    found += [
+        _rotation(header, match, row, given)
+        for row in rows if row.shape == NAMED
+        for match in _named_maps(header) if given is not None or match.prefix or match.suffix
+    ]  # fmt: skip
+    return _without_strays(found) or [each for row in rows for each in _standing_alone(row, header, given)]
 
 
-def _of_representation(name: str, names: Sequence[str], given: Notation | None) -> Iterator[Columns]:
-    """Find a representation's columns, with the unit in the angles' names and without."""
-    row = REPRESENTATIONS[name]
-    for unit in ("_deg", "_rad", "") if row.angles else ("",):
-        base = [column + unit * (index in row.angles) for index, column in enumerate(row.columns)]
-        for places, prefix, suffix in _matches(base, names):
-            if not unit and row.angles and suffix.startswith(("_deg", "_rad")):
-                continue
-            form = given if given is not None and row.angles and not unit else _with_unit(name, unit, given)
-            yield _columns(places, names, prefix, suffix)._replace(form=form)
+def _searched(given: Notation | None) -> list[Representation]:
+    """Return the representations whose columns are looked for; of those that share their columns the first."""
+    rows = [row for row in REPRESENTATIONS.values() if row.searched]
+    if given is not None:
+        same = [row for row in rows if set(row.columns) == set(given.representation.columns)]
+        return same[:1] or [given.representation]
+    return [row for at, row in enumerate(rows) if set(row.columns) not in [set(each.columns) for each in rows[:at]]]
 
 
-def _with_unit(name: str, unit: str, given: Notation | None) -> Notation:
+def _named_maps(header: Header) -> Iterator[Match]:
+    """Yield the columns called as the keys of a map: x y z w of a quaternion."""
+    for row in REPRESENTATIONS.values():
+        if row.shape == NAMED:
+            yield from header.match(row.names)
+
+
+def _without_strays(found: list[Columns]) -> list[Columns]:
+    """Where several share columns (an axis beside an angle and an angle_deg), keep those that stand side by side."""
+    rivals: dict[int, list[Columns]] = {}
+    for each in found:
+        for place in each.places:
+            rivals.setdefault(place, []).append(each)
+    best = {place: min(map(_spread, several)) for place, several in rivals.items()}
+    return [each for each in found if all(_spread(each) <= best[place] for place in each.places)]
+
+
+def _spread(columns: Columns) -> int:
+    return max(columns.places) - min(columns.places) - len(columns.places)
+
+
+def _of_representation(row: Representation, header: Header, given: Notation | None) -> Iterator[Columns]:
+    """Find a representation's columns: those of a rotation, or of a whole pose."""
+    for match in header.match(row.columns, row.angles):
+        yield _rotation(header, match, row, given)
+    for match in header.match(row.whole.columns) if row.whole else ():
+        yield _rotation(header, match, row, given)._replace(whole=True, unit=1.0)
+
+
+def _standing_alone(row: Representation, header: Header, given: Notation | None) -> Iterator[Columns]:
+    """Find the column that says a rotation by itself, where none of the others is there: `yaw`, `theta`."""
+    others = {(match.prefix, match.suffix) for match in header.match_partly(row.columns) if any(match.spots[:-1])}
+    for word in row.alone:
+        for match in header.match((word,), (0,)):
+            if (match.prefix, match.suffix) not in others and header.is_plain(match):
+                spots = (*[None] * (len(row.columns) - 1), *match.spots)
+                yield _rotation(header, match._replace(spots=spots), row, given)
+
+
+def _rotation(header: Header, match: Match, row: Representation, given: Notation | None) -> Columns:
+    """Read the units of a rotation's columns: those of angles, each as its name says."""
+    columns = header.columns(match)
+    said: list[bool | None] = []
+    for at, spot in enumerate(match.spots):
+        unit = spot[1].lower() if spot else ""
+        angle = at in row.angles
+        if unit not in NO_UNIT and not (angle and unit in ANGLES):
+            kind = "of an angle; known are deg, rad" if angle else "of a number that has none"
+            columns = columns._replace(wrong=f"column {header.names[match.place(at)]!r}: unknown unit {unit!r} {kind}")
+        said.append(ANGLES.get(unit) if angle else None)
+    units = {said[at] for at in row.angles if match.spots[at]}
+    suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
     axes = f":{given.axes}" if given is not None and given.axes else ""
-    return notation(f"{name}{unit}{axes}")
+    form = given if given is not None and row.angles and not suffix else notation(f"{row.name}{suffix}{axes}")
+    absent = tuple(at for at, spot in enumerate(match.spots) if spot is None)
+    return columns._replace(notation=form, degrees=tuple(said), absent=absent)
 
 
-def _matches(base: Sequence[str], names: Sequence[str]) -> Iterator[tuple[tuple[int, ...], str, str]]:
-    """Yield the places of columns called prefix + base + suffix for all of the base, with the affixes."""
-    folded = [name.casefold() for name in names]
-    where = {name: index for index, name in reversed(list(enumerate(folded)))}
-    for index, name in enumerate(folded):
-        start = name.find(base[0])
-        while start >= 0:
-            prefix, suffix = name[:start], name[start + len(base[0]) :]
-            if where[name] == index and _is_set_off(prefix[-1:], suffix[:1]):
-                places = [where.get(prefix + each + suffix, -1) for each in base]
-                if min(places) >= 0:
-                    yield tuple(places), names[index][:start], names[index][start + len(base[0]) :]
-            start = name.find(base[0], start + 1)
-
-
-def _is_set_off(before: str, after: str) -> bool:
-    return not before.isalnum() and not after.isalnum()
-
-
-def _columns(places: Sequence[int], names: Sequence[str], prefix: str = "", suffix: str = "") -> Columns:
-    return Columns(tuple(places), tuple(names[place] for place in places), prefix, suffix)
-
-
-def find_poses(names: Sequence[str], given: Notation | None, count: int, source: str) -> list[Pose]:
+def find_poses(names: Sequence[str], given: Notation | None, count: int, source: str) -> list[PoseColumns]:
     """Find so many points or poses; raises FormatError that lists the candidates, or the columns there are."""
-    positions, rotations = find_positions(names), find_rotations(names, given)
+    header = Header(names)
+    positions, rotations = find_positions(header), find_rotations(header, given)
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
-        whole = rotations and rotations[0].whole
-        pose = Pose(None if whole or not positions else positions[0], rotations[0] if rotations else None)
-        if pose == (None, None):
-            raise FormatError(
-                f"no columns of a point or pose among: {', '.join(names)}; name them with --columns",
-                source=source,
-                line=1,
-            )
-        return [pose]
-    poses = _paired(positions, rotations)
+        return [_only_pose(header, positions, rotations, given, source)]
+    poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []
     if len(poses) == count:
         return poses
     wanted = "one pose" if count == 1 else "two poses"
-    candidates = "; ".join(each.shown for each in (*positions, *rotations)) or f"none among {', '.join(names)}"
-    raise FormatError(
-        f"columns of {wanted} are wanted, found {candidates}; choose with --columns", source=source, line=1
-    )
+    candidates = "; ".join(each.shown for each in (*positions, *rotations)[:MOST_SHOWN])
+    found = candidates or f"none among {_listed(names)}"
+    raise _refusal(f"columns of {wanted} are wanted, found {found}; choose with --columns", source)
 
 
-def _paired(positions: Sequence[Columns], rotations: Sequence[Columns]) -> list[Pose]:
+def _refusal(reason: str, source: str) -> FormatError:
+    return FormatError(reason, source=source, line=1)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """List the columns there are, the first of very many."""
+    more = f", .. ({len(names)} columns)" if len(names) > MOST_LISTED else ""
+    return ", ".join(names[:MOST_LISTED]) + more
+
+
+def _only_pose(
+    header: Header, positions: Sequence[Columns], rotations: Sequence[Columns], given: Notation | None, source: str
+) -> PoseColumns:
+    """Put the one position and the one rotation together; raise FormatError where a rotation is there by half."""
+    rotation = rotations[0] if rotations else None
+    position = positions[0] if positions and not (rotation and rotation.whole) else None
+    if rotation is None and (half := _half_rotation(header, given)):
+        raise _refusal(half, source)
+    if position is None and rotation and not rotation.whole:
+        position = _half_position(header, rotation)
+    if position is rotation is None:
+        raise _refusal(
+            f"no columns of a point or pose among: {_listed(header.names)}; name them with --columns", source
+        )
+    return PoseColumns(position, rotation)
+
+
+def _half_rotation(header: Header, given: Notation | None) -> str:
+    """Say what is missing of a rotation that is there by half, or goes by other names; "" where there is none."""
+    for row in REPRESENTATIONS.values() if given is None else ():
+        if not row.searched and (match := next(header.match(row.columns), None)):
+            return f"columns {header.columns(match).shown} may be {row.name}; then add --from {row.spelling}"
+    for row in _searched(given):
+        for match in header.match_partly(row.columns):
+            if len(match.places) > 1 or (row.alone and header.is_plain(match)):
+                absent = [word for word, spot in zip(row.columns, match.spots, strict=True) if spot is None]
+                missing = ", ".join(f"{match.prefix}{word}{match.suffix}" for word in absent)
+                there = header.columns(match).shown
+                return f"half a rotation: {there} without {missing}; add what is missing, or choose with --columns"
+    return _other_names(header) if given is None else ""
+
+
+def _other_names(header: Header) -> str:
+    """Recognise four columns that are a quaternion under names nobody has agreed upon: `ox oy oz ow`, `q0 .. q3`."""
+    folded = {name.lower(): name for name in reversed(header.names)}
+    stems = [name[:-1] for name in folded if name[-1:] == "w" and len(name) > 1] + ["q", "q_"]
+    for stem in stems:
+        for letters in ("xyzw", "0123", "1234"):
+            if letters == "xyzw" and stem in ("", "q"):
+                continue
+            if all(stem + letter in folded for letter in letters):
+                shown = [folded[stem + letter] for letter in letters]
+                return (
+                    f"no qx, qy, qz, qw: {' '.join(shown)} look like a quaternion under other names; name them so, or "
+                    f"add --columns x,y,z,{','.join(shown)} --from xyzw (or wxyz)"
+                )
+    return ""
+
+
+def _half_position(header: Header, rotation: Columns) -> Columns | None:
+    """Return x, y beside a turn about z, a pose in the plane; other parts of a position are wrong if they are used."""
+    affixes = ((rotation.prefix, rotation.suffix), ("", ""))
+    for base in POSITIONS:
+        for match in header.match_partly(base):
+            if len(match.places) < len(base) - 1 or (match.prefix, match.suffix) not in affixes:
+                continue
+            at = match.spots.index(None)
+            columns = _position(header, match)._replace(absent=(at,))
+            if rotation.absent and base[at] == base[-1]:
+                return columns
+            missing = f"half a position: {columns.shown} without {match.prefix}{base[at]}{match.suffix}"
+            return columns._replace(wrong=f"{missing}; add what is missing, or choose with --columns")
+    return None
+
+
+def _paired(positions: Sequence[Columns], rotations: Sequence[Columns]) -> list[PoseColumns]:
     """Put each rotation with the position that shares most of its affixes."""
     if not rotations or not positions:
-        return [Pose(each, None) for each in positions] + [Pose(None, each) for each in rotations]
+        return [PoseColumns(each, None) for each in positions] + [PoseColumns(None, each) for each in rotations]
     poses = []
     left = list(positions)
     for rotation in rotations:
         near = max(left, key=lambda position: _kinship(position, rotation), default=None)
         if rotation.whole or near is None:
-            poses.append(Pose(None, rotation))
+            poses.append(PoseColumns(None, rotation))
             continue
         left.remove(near)
-        poses.append(Pose(near, rotation))
-    poses += [Pose(each, None) for each in left]
+        poses.append(PoseColumns(near, rotation))
+    poses += [PoseColumns(each, None) for each in left]
     return sorted(poses, key=lambda pose: min(each.places[0] for each in pose if each is not None))
 
 
@@ -181,63 +410,80 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
     return position.suffix == rotation.suffix, same
 
 
-def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notation | None) -> Pose:
+def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notation | None) -> PoseColumns:
     """Take columns by name or by position from 1 (`2-8`): x y z, a rotation's, or first the one and then the other.
 
     Raises Misused for names that are not there, or a count that says nothing.
     """
-    places = [place for word in spec.split(",") for place in _places(word.strip(), names, width)]
-    shown = names or [f"column {place + 1}" for place in range(width)]
-    if twice := sorted({shown[place] for place in places if places.count(place) > 1}):
+    numbers = {name: place for place, name in reversed(list(enumerate(names or ())))}
+    places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
+    header = Header(names or [f"column {place + 1}" for place in range(width)])
+    if twice := sorted({header.names[place] for place in places if places.count(place) > 1}):
         raise Misused(f"--columns: {', '.join(twice)} stands twice")
-    position = _columns(places[:3], shown)._replace(unit=1000.0 if shown[places[0]].endswith(MILLIMETRES) else 1.0)
-    if len(places) == 3 and given is None:
-        found = find_rotations([shown[place] for place in places], None) if names else []
-        return Pose(None, _columns(places, shown)._replace(form=found[0].form)) if found else Pose(position, None)
-    if len(places) == 16 and (given is None or given.representation.name == "matrix"):
-        return Pose(None, _columns(places, shown)._replace(form=notation("matrix"), whole=True, unit=1.0))
-    form, size = _form_of(places, shown, given)
-    rotation = _columns(places[-size:], shown)._replace(form=form)
-    return Pose(position if len(places) == size + 3 else None, rotation)
+    count, rotation = _chosen_rotation(header, places, given)
+    if count == len(places):
+        return PoseColumns(None, rotation)
+    match = _chosen(header, places[: len(places) - count])
+    if len(match.spots) == len(XYZ):
+        return PoseColumns(_position(header, match), rotation)
+    return PoseColumns(_position(header, match._replace(spots=(*match.spots, None)))._replace(absent=(2,)), rotation)
 
 
-def _form_of(places: Sequence[int], shown: Sequence[str], given: Notation | None) -> tuple[Notation, int]:
-    """Settle the notation of chosen columns: as their names say, as told, or by their count where only one has it."""
-    for count in (len(places), len(places) - 3):
-        form = _form_by_names([shown[place] for place in places[-count:]] if count > 0 else [], given)
-        if form is not None:
-            return form, count
-    if given is not None:
-        size = len(given.representation.columns)
-        if len(places) in (size, size + 3):
-            return given, size
+def _chosen(header: Header, places: Sequence[int]) -> Match:
+    """Take columns as they were chosen, with the units that their names say."""
+    bare = [header.names[place] for place in places]
+    units = [bracket[1] if (bracket := BRACKETS.search(name)) else _unit_at_end(name) for name in bare]
+    return Match(tuple(zip(places, units, strict=True)), "", "")
+
+
+def _unit_at_end(name: str) -> str:
+    said = UNITS.match(name.lower(), name.rfind("_")) if "_" in name else None
+    return (said[1] or said[2]) if said else ""
+
+
+def _chosen_rotation(header: Header, places: Sequence[int], given: Notation | None) -> tuple[int, Columns | None]:
+    """Return how many of the chosen columns, from the last, are a rotation, and which: by name, as told, by count."""
+    for count in (len(places), len(places) - 3, len(places) - 2):
+        found = _by_names(header, places[-count:], given) if count > 0 else None
+        if found is not None and (count != len(places) - 2 or found.absent):
+            return count, found
+    if given is None and len(places) == len(XYZ):
+        return 0, None
+    for row in REPRESENTATIONS.values() if given is None else (given.representation,):
+        if row.whole and len(places) == len(row.whole.columns):
+            return len(places), _rotation(header, _chosen(header, places), row, given)._replace(whole=True, unit=1.0)
+    if given is None:
+        raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
+    size = len(given.representation.columns)
+    if len(places) not in (size, size + 3):
         raise Misused(
             f"--columns: {given.spec} takes {size} columns, or {size + 3} with x y z before them; found {len(places)}"
         )
-    if len(places) == 7:
-        return notation("xyzw"), 4
-    raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
+    return size, _rotation(header, _chosen(header, places[-size:]), given.representation, given)
 
 
-def _form_by_names(chosen: Sequence[str], given: Notation | None) -> Notation | None:
-    """Return the notation whose columns these are, in their order."""
-    for name in (*SEARCHED, "wxyz", *([given.representation.name] if given else ())):
-        axes = given if given is not None and given.representation.name == name else None
-        for each in _of_representation(name, chosen, axes):
-            if each.places == tuple(range(len(chosen))) and each.form is not None:
-                return each.form
+def _by_names(header: Header, places: Sequence[int], given: Notation | None) -> Columns | None:
+    """Return the rotation whose columns these are, in their order."""
+    chosen = Header([header.names[place] for place in places])
+    for row in REPRESENTATIONS.values():
+        told = given if given is not None and given.representation is row else None
+        if not (row.searched or told):
+            continue
+        for each in (*_of_representation(row, chosen, told), *_standing_alone(row, chosen, told)):
+            if each.places == tuple(range(len(places))):
+                return each._replace(places=tuple(places), prefix="", suffix="")
     return None
 
 
-def _places(word: str, names: Sequence[str] | None, width: int) -> list[int]:
+def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
     """Return the places of a column's name, or of a number or range from 1."""
-    if names and word in names:
-        return [names.index(word)]
+    if word in numbers:
+        return [numbers[word]]
     first, dash, last = word.partition("-")
     if first.isdecimal() and (last.isdecimal() if dash else not last):
         low, high = int(first), int(last or first)
         if 1 <= low <= high <= width:
             return list(range(low - 1, high))
         raise Misused(f"--columns: {word} is not within 1-{width}")
-    near = did_you_mean(word, names or ())
-    raise Misused(f"--columns: no column {word!r}{near}; columns: {', '.join(names or [f'1-{width}'])}")
+    near = did_you_mean(word, numbers)
+    raise Misused(f"--columns: no column {word!r}{near}; columns: {_listed(list(numbers) or [f'1-{width}'])}")

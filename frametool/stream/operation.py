@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.geometry import quaternion, rigid, spatial
+from frametool.geometry.trig import RADIAN
 from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH
 
 if TYPE_CHECKING:
@@ -103,8 +104,8 @@ class Operation(NamedTuple):
     def _relative(self, poses: Sequence[Rigid], xp: Namespace) -> Components:
         first, second = self._pair(poses)
         result = rigid.relative(*first, *second)
-        angle = quaternion.angle(*result[3:], xp)
-        return *result, xp.length(*result[:3]), angle, xp.degrees(angle)
+        metres, angle = rigid.extent(*result, xp)
+        return *result, metres, angle, angle * RADIAN
 
     def _pair(self, poses: Sequence[Rigid]) -> tuple[Rigid, Rigid]:
         if self.of == "first" and self.fixed is not None:

@@ -28,20 +28,26 @@ class New(NamedTuple):
     name: str
 
 
-class Told(NamedTuple):
-    """The same text in every row, in place of a column."""
+class Named(NamedTuple):
+    """A frame's name in place of a column: the result's parent or what it is the pose of."""
 
     place: int
-    text: str
+    role: int
 
 
-Column: TypeAlias = Kept | New | Told
+PARENT, NAME = 0, 1  # roles of names
+NAMED = "named"  # a stretch that is no text of the input but the name of a role
+
+
+Column: TypeAlias = Kept | New | Named
 
 
 class Layout(NamedTuple):
     """The columns of the output, and from where in a row its pieces come.
 
-    places: the columns our numbers are read from; frames: those that name frames; time: that of the stamps
+    places: the columns our numbers are read from; time: that of the stamps
+    frames: those that name the frame a row is given in, for look-ups the two frames
+    name: the one that says what a row is the pose of
     stretches: (first, last column, where it begins, where it ends) of the text that passes
     """
 
@@ -53,14 +59,14 @@ class Layout(NamedTuple):
     delimiter: bytes
     null: bytes
     time: int | None = None
+    name: int | None = None
 
-    def header(self, raw: Sequence[bytes]) -> bytes:
-        """Return the output's header, the kept names as they were written."""
-        cells = [
+    def header(self, raw: Sequence[bytes]) -> list[bytes]:
+        """Return the cells of the output's header, the kept names as they were written."""
+        return [
             quoted(column.name, self.delimiter) if isinstance(column, New) else raw[column.place]
             for column in self.columns
         ]
-        return (self.delimiter or b" ").join(cells)
 
     def null_row(self, cells: Sequence[bytes]) -> bytes:
         """Return a row without a result, as far as its cells go."""
@@ -99,7 +105,7 @@ def lay_out(
             if follows and end == width - 1:
                 pieces.append(Const(between))
         else:
-            pieces += _written(group, between, delimiter, stretches)
+            pieces += _written(group, between, stretches)
             if not last and not isinstance(groups[at + 1][0], Kept):
                 pieces.append(Const(between))
     if not stretches or stretches[-1][3] != "line":
@@ -116,10 +122,11 @@ def lay_out(
     )
 
 
-def _written(group: Sequence[Column], between: bytes, delimiter: bytes, stretches: list[Stretch]) -> list[Piece]:
-    if isinstance(group[0], Told):
-        stretches.append((group[0].place, group[0].place, "cell", "cell"))
-        return [Instead(len(stretches) - 1, quoted(group[0].text, delimiter))]
+def _written(group: Sequence[Column], between: bytes, stretches: list[Stretch]) -> list[Piece]:
+    if isinstance(group[0], Named):
+        place, role = group[0]
+        stretches += [(place, place, "cell", "cell"), (role, role, NAMED, NAMED)]
+        return [Instead(len(stretches) - 2, len(stretches) - 1)]
     first, last = group[0].number, group[-1].number  # type: ignore[union-attr]
     return [Out(first, last + 1, between)]
 

@@ -291,7 +291,10 @@ def _flat_rotation(value: dict[str, Any], rotations: list[str]) -> Columns | Non
     from frametool.stream.header import find_rotations
 
     names = [key for key, each in value.items() if type(each) not in (dict, list)]
-    found = [each for each in find_rotations(names, None) if not each.prefix and not each.suffix and not each.whole]
+    every = find_rotations(names, None)
+    found = [each for each in every if not (each.prefix or each.suffix or each.whole or each.absent)]
+    if odd := [each for each in found if each.wrong or each.is_mixed]:
+        raise Misfit(odd[0].wrong or f"angles of several units: {odd[0].shown}; write all in one", (odd[0].names[0],))
     if found and len(found) + len(rotations) > 1:
         shown = " and ".join([*(each.shown for each in found), *rotations])
         raise Misfit(f"expected one rotation, found {shown}", (found[0].names[0],), key=True)
@@ -309,7 +312,7 @@ def _with_flat_rotation(
     value: dict[str, Any], columns: Columns, record: Record, reading: Reading, request: Request
 ) -> Record:
     """Add a rotation whose numbers are members of the record itself."""
-    form, names, texts = columns.form, columns.names, [value[name] for name in columns.names]
+    form, names, texts = columns.notation, columns.names, [value[name] for name in columns.names]
     if form is None or request.poses != 1:
         raise Misfit("a record holds one pose; two in a row are for tables")
     places = [(name,) for name in names]
@@ -348,7 +351,8 @@ def _with_position(record: Record, value: Any, below: Path, metre: float, *, par
 def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
     """Add the rotation's numbers."""
     form, texts, places = shape_of(key, value)
-    whole = len(texts) == 16
+    joined = form.representation.whole
+    whole = joined is not None and len(texts) == len(joined.columns)
     if whole and record.shape.unit is not None:
         raise Misfit("a 4x4 matrix is the whole pose; leave xyz out, or write the 3x3 rotation", below)
     if request.poses != 1:

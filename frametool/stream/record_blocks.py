@@ -188,7 +188,7 @@ class RecordBlocks:
             odd += [] if skips else [(place, _null_row(cut, row, text)) for place, row in bad]
             notes += [RowNote.of_degrees(run.block.line_of(row), angle) for row, angle in run.doubted[:1]]
             notes += [RowNote.of_rounding(run.block.line_of(row)) for row in sorted(run.mended)[:1]]
-            notes += [RowNote(run.block.line_of(0), *each) for each in cut.template.notes if len(cut.starts)]
+            notes += [each._replace(line=run.block.line_of(0)) for each in cut.template.notes if len(cut.starts)]
         end = min((place for place, _ in faults), default=None) if stops else None
         groups = [group for run in runs for group in run.groups(end)]
         kept = sum(len(run.rows) for run in runs) + (0 if skips else len(faults))

@@ -136,7 +136,7 @@ def _rendered(template: Template, request: Request, line: int) -> tuple[bytes, b
         return Fault.of(line, getattr(error, "column_name", ""), error)
     notes = [RowNote.of_degrees(line, doubt)] if doubt else []
     notes += [RowNote.of_rounding(line)] * mended
-    notes += [RowNote(line, *each) for each in template.notes]
+    notes += [each._replace(line=line) for each in template.notes]
     return text.encode(), mended, notes
 
 

@@ -5,16 +5,15 @@ Knows no text; works on floats and on arrays alike.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.geometry import euler, quaternion
-from frametool.grammar.result import KEPT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from frametool.geometry.representations import Notation
+    from frametool.geometry.representations import Notation, Whole
     from frametool.geometry.types import Components, Namespace, Rigid
 
 POINT, VECTOR, POSE, TWIST, WRENCH = "point", "vector", "pose", "twist", "wrench"
@@ -22,23 +21,38 @@ SIX = (TWIST, WRENCH)  # two vectors, linear part first
 COVARIANCE = 36
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 TURN = 6.283185307179586
+TO_DEGREES = 180.0 / 3.141592653589793
+FLAT = 1e-9  # radians, metres: what a number without a column may be
+Unit: TypeAlias = float | tuple[float, float, float]  # how many make a metre, where they differ of x, y, z each
 
 
 class Shape(NamedTuple):
-    """The numbers of a row in order: position (3, if any), then rotation (if any); or the 16 of a whole matrix.
+    """The numbers of a row in order: position (3, if any), then rotation (if any); or those of a whole matrix.
 
+    kind: point, vector, pose, twist or wrench
     unit: how many of the position's numbers make a metre; None where there is no position
+    notation: that of the rotation; degrees: whether its angles are degrees
+    whole: the numbers are those of a whole pose
     inverse: what is written is the inverse
     covariance: the 36 numbers of a covariance come last
+    radians_at: which of the rotation's numbers are radians where the others are degrees
+    absent: which numbers have no column and count as 0
     """
 
     kind: str
-    unit: float | None = 1.0
+    unit: Unit | None = 1.0
     notation: Notation | None = None
     degrees: bool = False
     whole: bool = False
     inverse: bool = False
     covariance: bool = False
+    radians_at: tuple[int, ...] = ()
+    absent: tuple[int, ...] = ()
+
+    @property
+    def joined(self) -> Whole | None:
+        """Return how position and rotation are written in one, if they are."""
+        return self.notation.representation.whole if self.whole and self.notation else None
 
     @property
     def size(self) -> int:
@@ -48,57 +62,80 @@ class Shape(NamedTuple):
     @property
     def own_size(self) -> int:
         """Count the numbers of the thing itself, without its covariance."""
-        if self.kind in SIX:
-            return 6
+        return self._full - len(self.absent)
+
+    @property
+    def _full(self) -> int:
+        if self.joined or self.kind in SIX:
+            return len(self.joined.columns) if self.joined else 6
         rotation = len(self.notation.representation.columns) if self.notation else 0
-        return 16 if self.whole else rotation + (self.unit is not None) * 3
+        return rotation + (self.unit is not None) * 3
 
     @property
     def rotation_at(self) -> tuple[int, ...]:
-        """Return the indices of the rotation's numbers."""
-        if self.whole:
-            return (0, 1, 2, 4, 5, 6, 8, 9, 10)
-        return tuple(range(0 if self.unit is None else 3, self.own_size))
+        """Return where in a row the rotation's numbers stand."""
+        if self.joined:
+            return tuple(self.joined.split(range(self.own_size))[1])
+        return tuple(range((self.unit is not None) * 3 - sum(place < 3 for place in self.absent), self.own_size))
 
-    @property
-    def angles_at(self) -> tuple[int, ...]:
-        """Return the indices of the angles among the numbers."""
-        angles = self.notation.representation.angles if self.notation else ()
-        return tuple(self.rotation_at[index] for index in angles)
+    def in_degrees(self, place: int) -> bool | None:
+        """Tell whether a row's number is an angle in degrees; None if it is no angle."""
+        there = [each for each in range(self._full) if each not in self.absent]
+        index = there[place] - (self.unit is not None) * 3
+        if self.whole or self.notation is None or index not in self.notation.representation.angles:
+            return None
+        return self.degrees and index not in self.radians_at
 
     def position(self, numbers: Sequence[Any]) -> Components:
         """Return x, y, z in metres; 0 where there is no position."""
-        if self.whole:
-            return numbers[3], numbers[7], numbers[11]
+        if self.joined:
+            position: Components = self.joined.split(numbers)[0]
+            return position
         if self.unit is None:
             return (0.0, 0.0, 0.0)
-        x, y, z = numbers[:3]
-        return (x, y, z) if self.unit == 1.0 else (x / self.unit, y / self.unit, z / self.unit)
+        x, y, z = self._with_absent(numbers)[:3]
+        if self.unit == 1.0:
+            return x, y, z
+        a, b, c = _each(self.unit)
+        return x / a, y / b, z / c
 
     def rotation(self, numbers: Sequence[Any]) -> Components:
-        """Return the rotation's numbers, in the order of its columns."""
-        return tuple(numbers[index] for index in self.rotation_at)
+        """Return the rotation's numbers in the order of its columns, angles in one unit."""
+        if self.joined:
+            rotation: Components = self.joined.split(numbers)[1]
+            return rotation
+        given = list(self._with_absent(numbers)[(self.unit is not None) * 3 : self._full])
+        for index in self.radians_at:
+            given[index] = given[index] * TO_DEGREES
+        return tuple(given)
 
-
-def axes_of(form: Notation) -> str | None:
-    """Return the Euler axes of a notation whose angles may not be unique; None for others."""
-    return "sxyz" if form.representation.name == "rpy" else form.axes
+    def _with_absent(self, numbers: Sequence[Any]) -> Sequence[Any]:
+        """Put zeros where a row has no number."""
+        if not self.absent:
+            return numbers
+        full = list(numbers)
+        for place in self.absent:
+            full.insert(place, numbers[0] - numbers[0])
+        return full
 
 
 class Target(NamedTuple):
     """How results are written.
 
-    unit: of positions; None where none are written
-    notations: of rotations, each with the unit of its angles
-    whole: the 16 numbers of a homogeneous matrix
+    unit: of positions (None: not at all); notations: with the unit of their angles (True: degrees)
+    keep_sign: quaternions keep their sign; whole: the first notation carries the position
     plain: the numbers of a twist or wrench as they are
+    radians_at: which of the first notation's numbers are radians where the others are degrees
+    absent: which numbers have no column; they have to be 0
     """
 
-    unit: float | None
+    unit: Unit | None
     notations: tuple[tuple[Notation, bool], ...]
     keep_sign: bool = False
     whole: bool = False
     plain: bool = False
+    radians_at: tuple[int, ...] = ()
+    absent: tuple[int, ...] = ()
 
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
@@ -106,28 +143,51 @@ class Target(NamedTuple):
         return [*self.numbers(parts[:own], xp), *parts[own:]]
 
     def numbers(self, parts: Components, xp: Namespace) -> list[Any]:
-        """Return the numbers of a result: the position, then each notation's; or the 16 of a whole matrix."""
+        """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""
+        full = self._full(parts, xp)
+        return [number for place, number in enumerate(full) if place not in self.absent] if self.absent else full
+
+    def left_out(self, parts: Components, xp: Namespace) -> list[tuple[str, Any]]:
+        """Return the numbers of a result without a column, by name; a row where one is above FLAT is bad."""
+        if not self.absent:
+            return []
+        full, names = self._full(parts, xp), [*"xyz"[: 3 * (self.unit is not None)], *self.names]
+        return [(names[place], full[place]) for place in self.absent]
+
+    def _full(self, parts: Components, xp: Namespace) -> list[Any]:
         if self.plain:
             return list(parts)
-        position = [] if self.unit is None else [part * self.unit if self.unit != 1.0 else part for part in parts[:3]]
+        position: list[Any] = []
+        if self.unit == 1.0:
+            position = list(parts[:3])
+        elif self.unit is not None:
+            position = [part * unit for part, unit in zip(parts[:3], _each(self.unit), strict=True)]
         if len(parts) == 3 or not self.notations:
             return position
-        turned = [number for form, degrees in self.notations for number in self._rotation(parts, form, degrees, xp)]
-        return _homogeneous(turned, parts[:3]) if self.whole else position + turned
-
-    def _rotation(self, parts: Components, form: Notation, degrees: bool, xp: Namespace) -> Components:  # noqa: FBT001
         x, y, z, w = parts[3:7]
-        x, y, z, w = quaternion.unit(x, y, z, w, xp)
-        if self.keep_sign and form.representation.name in KEPT:
-            return KEPT[form.representation.name](x, y, z, w)
-        return form.from_quaternion(x, y, z, w, xp, degrees=degrees)
+        unit = quaternion.unit(x, y, z, w, xp)
+        written = [
+            form.from_quaternion(*unit, xp, degrees=degrees, keep_sign=self.keep_sign)
+            for form, degrees in self.notations
+        ]
+        if self.whole and (whole := self.notations[0][0].representation.whole):
+            return list(whole.join(parts[:3], written[0]))
+        turned = [number for numbers in written for number in numbers]
+        for index in self.radians_at:
+            turned[index] = turned[index] / TO_DEGREES
+        return position + turned
+
+    @property
+    def names(self) -> list[str]:
+        """Name the numbers of all notations as columns; of a whole pose all of them."""
+        if self.whole and (whole := self.notations[0][0].representation.whole):
+            return list(whole.columns)
+        return [name for form, degrees in self.notations for name in form.columns_in(degrees=degrees)]
 
     @property
     def size(self) -> int:
         """Count the numbers of a result."""
-        if self.whole or self.plain:
-            return 16 if self.whole else 6
-        return (self.unit is not None) * 3 + sum(len(form.representation.columns) for form, _ in self.notations)
+        return 6 if self.plain else (self.unit is not None) * 3 + len(self.names) - len(self.absent)
 
     def angle_columns(self) -> list[tuple[int, float]]:
         """Return which of the numbers are angles, each with the size of a full turn."""
@@ -135,21 +195,25 @@ class Target(NamedTuple):
         for form, degrees in self.notations:
             found += [(first + index, 360.0 if degrees else TURN) for index in form.representation.angles]
             first += len(form.representation.columns)
-        return found
+        start = 0 if self.unit is None else 3
+        return [
+            (place - sum(each < place for each in self.absent), TURN if place - start in self.radians_at else period)
+            for place, period in found
+            if place not in self.absent
+        ]
 
     def locked(self, parts: Components) -> Any:
         """Tell whether Euler angles among the notations are not unique; None where there are none."""
-        axes = next((axes for form, _ in self.notations if (axes := axes_of(form))), None)
+        axes = next((axes for form, _ in self.notations if (axes := form.euler_axes)), None)
         if axes is None or len(parts) < 7:
             return None
         x, y, z, w = parts[3:7]
         return euler.locked(x, y, z, w, axes)
 
 
-def _homogeneous(rows: Sequence[Any], position: Components) -> list[Any]:
-    """Return the 16 numbers of the 4x4 matrix."""
-    upper = [number for row, moved in enumerate(position) for number in (*rows[3 * row : 3 * row + 3], moved)]
-    return [*upper, 0.0, 0.0, 0.0, 1.0]
+def _each(unit: Unit) -> tuple[float, float, float]:
+    """Return the unit of x, y and z each."""
+    return unit if isinstance(unit, tuple) else (unit, unit, unit)
 
 
 def pose_of(position: Components, rotation: Components) -> Rigid:

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 
 
-def by_frame(edge_of: Callable[[str], Rigid], frames: Sequence[str], blame: Blame, column: str = "") -> Rigid:
+def by_frame(edge_of: Callable[..., Rigid], frames: Sequence[str | None], blame: Blame, column: str = "") -> Rigid:
     """Return the pose of each row by its frame's name; a row whose frame has none is bad."""
     table: list[Rigid] = []
-    known: dict[str, tuple[int, FrametoolError | None]] = {}
+    known: dict[str | None, tuple[int, FrametoolError | None]] = {}
     for row, name in enumerate(frames):
         if name not in known:
             edge, error = _edge(edge_of, name)
@@ -38,7 +38,7 @@ def by_frame(edge_of: Callable[[str], Rigid], frames: Sequence[str], blame: Blam
     return tuple(np.array(column)[chosen_rows] for column in zip(*table, strict=True))  # type: ignore[return-value]
 
 
-def _edge(edge_of: Callable[[str], Rigid], name: str) -> tuple[Rigid, FrametoolError | None]:
+def _edge(edge_of: Callable[..., Rigid], name: str | None) -> tuple[Rigid, FrametoolError | None]:
     """Return the edge of a frame, or why there is none."""
     try:
         return edge_of(name), None

@@ -5,6 +5,7 @@ Knows no syntax: what a format found is spans of text, what it wants written is 
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,8 +16,9 @@ from frametool.text.shortest import shortest_spans
 from frametool.text.spans import MARGIN, Spans, framed, join
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    from frametool.errors import FrametoolError
     from frametool.stream.text_parts import Piece
     from frametool.text.array_types import Floats, Ints
 
@@ -42,6 +44,8 @@ class Block(NamedTuple):
     broken: rows that have no numbers
     frames: the name of the frame each row is given in, if rows say so
     stamps: for each shape the spans (n,) of its stamp: one, or seconds and nanoseconds; none where it has none
+    bad: rows whose names do not fit: column and reason
+    lost: the first row whose result cannot name a frame, and that frame
     """
 
     numbers: Spans
@@ -50,8 +54,10 @@ class Block(NamedTuple):
     line_of: Callable[[int], int]
     odd: Sequence[tuple[int, bytes]] = ()
     broken: Sequence[Broken] = ()
-    frames: Sequence[str] = ()
+    frames: Sequence[str | None] = ()
     stamps: Sequence[tuple[Spans, ...]] = ()
+    bad: Mapping[int, tuple[str, FrametoolError | str]] = MappingProxyType({})
+    lost: Sequence[tuple[int, str]] = ()
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:
@@ -94,13 +100,13 @@ def assemble(pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | No
 
 
 def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, locked: Ints) -> Spans:
-    if isinstance(piece, In):
-        return parts[piece.part]
+    if isinstance(piece, (In, Instead)):
+        return parts[piece.part if isinstance(piece, In) else piece.new]
     if isinstance(piece, Out) and values is not None:
         ends = values.ends[:, piece.first : piece.last].copy()
         ends[:, -1] -= 1
         return Spans(values.data, values.starts[:, piece.first : piece.last], ends)
-    text = piece.text if isinstance(piece, (Const, Instead, IfLocked)) else b""
+    text = piece.text if isinstance(piece, (Const, IfLocked)) else b""
     data = framed(text)
     starts = np.full(len(locked), MARGIN, np.int64)
     return Spans(data, starts, starts + (locked * len(text) if isinstance(piece, IfLocked) else len(text)))

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
     from frametool.stream.faults import BadRows, Fault
 
-MOST_WAITING = 2  # blocks a process may have ahead: memory stays flat
-
 
 class RowNote(NamedTuple):
     """Something worth telling about a row: its line from 0, what it is about, and the sentence."""
@@ -26,6 +24,11 @@ class RowNote(NamedTuple):
         """Wonder about an angle beyond a full turn."""
         remedy = "degrees? give --deg, or name the columns _deg"
         return cls(line, "degrees", f"{angle} is more than a full turn in radians; {remedy}")
+
+    @classmethod
+    def of_lost_name(cls, line: int, name: str) -> RowNote:
+        """Tell that a frame is not named any more."""
+        return cls(line, "unnamed", f"frame {name!r} is left out: the frames of the result are not known")
 
     @classmethod
     def of_rounding(cls, line: int) -> RowNote:
@@ -86,35 +89,8 @@ def run(
 
 def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:
     """Process blocks in order, over several processes if asked for."""
-    return map(process, blocks) if jobs < 2 else _spread(process, blocks, jobs)
+    if jobs < 2:
+        return map(process, blocks)
+    from frametool.stream.workers import spread
 
-
-def _spread(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:
-    """Hand blocks to forked processes, and give what becomes of them in order."""
-    from collections import deque
-    from multiprocessing import get_context
-
-    global _process  # noqa: PLW0603 - what the processes inherit: closures cannot be sent
-    _process = process
-    waiting: deque[object] = deque()
-    with get_context("fork").Pool(jobs, initializer=_ignore_interrupt) as pool:
-        for block in blocks:
-            waiting.append(pool.apply_async(_call, (block,)))
-            if len(waiting) >= MOST_WAITING * jobs:
-                yield waiting.popleft().get()  # type: ignore[attr-defined]
-        while waiting:
-            yield waiting.popleft().get()  # type: ignore[attr-defined]
-
-
-_process: Callable[[bytes], Outcome]
-
-
-def _call(block: bytes) -> Outcome:
-    return _process(block)
-
-
-def _ignore_interrupt() -> None:
-    """Leave Ctrl-C to the parent, which ends its processes."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return spread(process, blocks, jobs)

@@ -9,7 +9,7 @@ from frametool.errors import FrametoolError, ValueInvalid, overheard
 from frametool.geometry import floats, rigid
 from frametool.stream.row_layout import IDENTITY, POSE, TURN, pose_of
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
-from frametool.stream.text_parts import Const, In, Out
+from frametool.stream.text_parts import Const, IfLocked, In, Out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -88,9 +88,10 @@ def checked_rotation(shape: Shape, values: Sequence[float], request: Request) ->
     """Return the quaternion of a record's numbers, and whether it had to be normalised beyond silence."""
     if shape.notation is None:
         return IDENTITY, False
-    if shape.whole and tuple(values[12:]) != (0.0, 0.0, 0.0, 1.0):
-        found = " ".join(f"{value:g}" for value in values[12:])
-        raise ValueInvalid(f"the last row of a 4x4 pose is 0 0 0 1, found {found}")
+    tail = shape.joined.tail if shape.joined else ()
+    if tail and tuple(values[-len(tail) :]) != tail:
+        wanted, found = (" ".join(f"{value:g}" for value in row) for row in (tail, values[-len(tail) :]))
+        raise ValueInvalid(f"the last row of a 4x4 pose is {wanted}, found {found}")
     rotation, odd = overheard(
         shape.notation.checked_quaternion,
         shape.rotation(values),
@@ -134,6 +135,6 @@ def _text(template: Template, numbers: Sequence[str], *, locked: bool) -> str:
             text += segments[piece.part]
         elif isinstance(piece, Out):
             text += numbers[piece.first]
-        elif isinstance(piece, Const) or locked:
+        elif isinstance(piece, Const) or (locked and isinstance(piece, IfLocked)):
             text += piece.text.decode()
     return text

@@ -14,7 +14,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import PARENT_KEYS, POINT_KEYS, STALE, XYZ
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Target, axes_of
+from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Target
 from frametool.stream.text_parts import Const, IfLocked, Out
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def target_of(record: Record, request: Request) -> Target:
     whole = (
         placed
         and len(forms) == 1
-        and forms[0].representation.name == "matrix"
+        and forms[0].representation.whole is not None
         and (shape.whole or bool(request.notations))
     )
     unit = (shape.unit or 1.0) if placed and not whole else None
@@ -187,7 +187,7 @@ class Splicer:
             if key not in ("gimbal_lock", "xyz"):
                 members.append(self._member({key: value}, first))
                 first += sum(isinstance(piece, Out) for piece in members[-1])
-        if any(axes_of(form) for form, _ in notations):
+        if any(form.euler_axes for form, _ in notations):
             flag = self._member({"gimbal_lock": True}, 0)
             members.append(tuple(IfLocked(piece.text) for piece in flag if isinstance(piece, Const)))
         return members

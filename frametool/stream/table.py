@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError
+from frametool.errors import FormatError, warn
+from frametool.stream.header import has_names_of_ours
+from frametool.stream.output_columns import NAMED
 from frametool.stream.rows import Block, Broken
 from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
-from frametool.text.spans import Spans
+from frametool.text.spans import MARGIN, Spans
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.stream.output_columns import Layout
+    from frametool.stream.table_names import Naming
     from frametool.text.cells import Cells
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -25,9 +28,12 @@ UNCLOSED = "a quote is opened here and not closed"
 
 
 class Table(NamedTuple):
-    """How a table is written: what is between cells (b"" for blanks), its column names if it has any, and its width.
+    """How a table is written.
 
-    head: what comes before the first row; header: the raw text of the header's cells, head included
+    delimiter: what is between cells, b"" for blanks
+    names: of its columns, if it has any; width: how many cells a row has
+    head: what comes before the header, or before the first row
+    header: the raw text of the header's cells; title: its whole line; line_end: what ends it
     """
 
     delimiter: bytes
@@ -35,6 +41,7 @@ class Table(NamedTuple):
     width: int
     head: bytes = b""
     header: tuple[bytes, ...] = ()
+    title: bytes = b""
     line_end: bytes = b"\n"
 
     def split(self, block: bytes) -> Cells:
@@ -47,46 +54,86 @@ class Table(NamedTuple):
         """Name a column for messages."""
         return self.names[place] if self.names else f"column {place + 1}"
 
+    def opening(self, layout: Layout) -> bytes:
+        """Return what stands before the first row of the output: the header as it was where no column changes."""
+        if not self.header:
+            return self.head
+        cells = layout.header(self.header)
+        title = self.title if cells == list(self.header) else (self.delimiter or b" ").join(cells)
+        return self.head + title + self.line_end
+
 
 def open_table(block: bytes, delimiter: bytes, *, header: bool, source: str) -> tuple[Table, bytes]:
-    """Look at the first block; give the table and the block without what stands before the first row."""
+    """Look at the first block; return the table and the block without what stands before the first row."""
     mark = BYTE_ORDER_MARK if block.startswith(BYTE_ORDER_MARK) else b""
-    rest = block[len(mark) :]
-    skipped = _comments(rest) if not delimiter else 0
-    line = _first_record(rest[skipped:], delimiter)
+    comments, rest = _comments(block[len(mark) :])
+    line = _first_record(rest, delimiter)
     if delimiter and torn_record(line, delimiter) is not None:
         raise FormatError(UNCLOSED, source=source, line=1)
     cells = _cells(line, delimiter)
-    if not cells:
+    named = _named_comment(comments, delimiter, len(cells)) if header else None
+    if not cells and not (delimiter and comments):
         raise FormatError("no rows in it", source=source)
-    names = tuple(_unquoted(cell) for cell in cells)
-    head = mark + rest[:skipped]
-    numeric = [_is_number(name) for name in names]
-    if not header or (not delimiter and any(numeric)):
-        return Table(delimiter, None, len(cells), head), rest[skipped:]
-    if all(numeric):
-        raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
-    _refuse_repeated(names, source, 1 + head.count(b"\n"))
-    end = line[len(line.rstrip(b"\r\n")) :] or b"\n"
-    return Table(delimiter, names, len(cells), head, tuple(cells), end), rest[skipped + len(line) :]
+    numeric = [_is_number(_unquoted(cell)) for cell in cells]
+    own = header and not (all(numeric) if delimiter else any(numeric))
+    if named is not None and not (own and has_names_of_ours(map(_unquoted, cells))):
+        head, titles, title, end = named
+        return Table(delimiter, _names(titles, source), len(titles), mark + head, titles, title, end), rest
+    if not own:
+        if header and delimiter:
+            raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
+        return Table(delimiter, None, len(cells), mark + comments), rest
+    title = line.rstrip(b"\r\n")
+    end = line[len(title) :] or b"\n"
+    table = Table(delimiter, _names(cells, source), len(cells), mark + comments, tuple(cells), title, end)
+    return table, rest[len(line) :]
 
 
-def _comments(text: bytes) -> int:
-    """Return the length of the comments and empty lines at the start."""
+def _comments(text: bytes) -> tuple[bytes, bytes]:
+    """Split a text behind the comments and empty lines at its start."""
     end = 0
     for line in text.splitlines(keepends=True):
         if line.strip() and not line.startswith(COMMENT):
             break
         end += len(line)
-    return end
+    return text[:end], text[end:]
+
+
+def _named_comment(
+    comments: bytes, delimiter: bytes, width: int
+) -> tuple[bytes, tuple[bytes, ...], bytes, bytes] | None:
+    """Take the last comment for the header if it has a word for each column and one of them is a name of ours.
+
+    Returns what stands before its words, the words, their line, and what follows up to the first row.
+    """
+    lines = [line for line in comments.splitlines(keepends=True) if line.strip()]
+    if not lines:
+        return None
+    start = comments.rindex(lines[-1])
+    text = lines[-1].rstrip(b"\r\n")
+    words = text.lstrip(b"# \t")
+    cells = _cells(words, delimiter)
+    if not cells or (width and len(cells) != width) or not has_names_of_ours(map(_unquoted, cells)):
+        return None
+    before = comments[: start + len(text) - len(words)]
+    return before, tuple(cells), words, comments[start + len(text) :]
+
+
+def _names(cells: Sequence[bytes], source: str) -> tuple[str, ...]:
+    """Return the names of columns; a quote within one opens nothing, which is said."""
+    for cell in cells:
+        if b'"' in cell and not cell.strip().startswith(b'"'):
+            warn(f"{source}:1: the quote in the name {_unquoted(cell)!r} opens nothing and is taken as it stands")
+    return tuple(map(_unquoted, cells))
 
 
 def _first_record(text: bytes, delimiter: bytes) -> bytes:
     """Return the first line, its end included; a quoted cell may hold line ends."""
-    end = text.find(b"\n") + 1
-    while delimiter and end and text.count(b'"', 0, end) % 2:
-        end = text.find(b"\n", end) + 1
-    return text[:end] if end else text
+    end = text.find(b"\n") + 1 or len(text)
+    if not delimiter or b'"' not in text[:end]:
+        return text[:end]
+    ends = split_delimited(text, delimiter, 0).line_ends
+    return text[: int(ends[0]) - MARGIN] if len(ends) else text
 
 
 def _cells(line: bytes, delimiter: bytes) -> list[bytes]:
@@ -113,24 +160,18 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _refuse_repeated(names: Sequence[str], source: str, line: int) -> None:
-    repeated = sorted({name for name in names if name and names.count(name) > 1})
-    if repeated:
-        raise FormatError(f"columns stand twice in the header: {', '.join(repeated)}", source=source, line=line)
-
-
-def table_block(table: Table, layout: Layout, text: bytes) -> Block:
-    """Find the rows of a block, their numbers, and the stretches of text that pass."""
+def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Block:
+    """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
     cells = table.split(text)
     columns = _as_slice(layout.places)
     numbers = Spans(cells.data, cells.starts[:, columns], cells.ends[:, columns])
     if b'"' in text and layout.places:
         numbers = without_quotes(numbers)
-    parts = [_stretch(cells, *stretch) for stretch in layout.stretches]
-    frames: Sequence[str] = ()
-    if layout.frames:
-        named = [_texts(cells, place) for place in layout.frames]
-        frames = ["\0".join(names) for names in zip(*named, strict=True)]
+    names = naming.of_block(cells)
+    parts = [
+        names.spans[begin] if kind == NAMED else _stretch(cells, begin, end, kind, until)
+        for begin, end, kind, until in layout.stretches
+    ]
     stamps = [] if layout.time is None else [(without_quotes(cells.column(layout.time)),)]
     odd, broken = [], []
     if len(cells.rows) < len(cells.counts):
@@ -141,8 +182,9 @@ def table_block(table: Table, layout: Layout, text: bytes) -> Block:
             else:
                 broken.append(_broken(table, layout, cells, line, raw))
     return Block(
-        numbers, parts, cells.rows, lambda row: cells.lines_before(int(cells.rows[row])), odd, broken, frames, stamps
-    )
+        numbers, parts, cells.rows, lambda row: cells.lines_before(int(cells.rows[row])), odd, broken, names.frames,
+        stamps, names.bad, names.lost,
+    )  # fmt: skip
 
 
 def _as_slice(places: Sequence[int]) -> slice | list[int]:
@@ -166,11 +208,6 @@ def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans
         "gap": lambda: cells.starts[:, last + 1],
     }[end]()
     return Spans(cells.data, starts, ends)
-
-
-def _texts(cells: Cells, place: int) -> list[str]:
-    column = without_quotes(cells.column(place))
-    return [column.text(row).decode("utf-8", "replace") for row in range(len(cells.rows))]
 
 
 def _broken(table: Table, layout: Layout, cells: Cells, line: int, raw: bytes) -> Broken:

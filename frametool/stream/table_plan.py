@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, alternatives
-from frametool.geometry.representations import notation
+from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.stream.blocks import Plan
 from frametool.stream.faults import Misused
-from frametool.stream.header import Pose, find_poses, named_pose
-from frametool.stream.output_columns import Kept, New, Told, lay_out, refuse_repeated
+from frametool.stream.header import XYZ, PoseColumns, find_poses, named_pose
+from frametool.stream.output_columns import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
+from frametool.stream.table_names import rename_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from frametool.geometry.representations import Notation
     from frametool.stream.header import Columns
@@ -22,27 +23,32 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
 
 TUM = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
-FRAME_NAMES = ("frame", "frame_id", "header.frame_id", "field.header.frame_id")
-COUNTING = "frame"  # such a column often counts pictures: beside a SOURCE it is not asked
+PARENTS = ("header.frame_id", "parent", "frame_id", "frame")  # what is in the message's header is said best
+NAMES = ("child_frame_id", "name")
 
 
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
-    """Settle which columns are read and written; raises FormatError that names the columns there are."""
+    """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find(table, request, source)
     if request.poses == 1 and not request.operation.moves and request.operation.keeps_position:
         poses = [_without_position(poses[0], request, table, source)]
+    for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
+        raise FormatError(wrong, source=source, line=1)
     shapes = tuple(_shape(pose, request) for pose in poses)
     target = _target(shapes, request)
     places = tuple(place for pose in poses for columns in pose if columns for place in columns.places)
     frames = _frame_columns(table, request, source)
+    stays = not request.poses or (request.operation.moves and request.rename is None)
+    name = None if stays else _first_called(NAMES, table)
     edge_of = request.edge_of
-    if frames and edge_of is None:
+    if frames and edge_of is None and request.operation.moves:
         edge_of = request.way
-    columns = _columns(table, poses, shapes, target, request, frames)
+    named = {frames[0]: PARENT} if frames and request.poses else {}
+    columns = _columns(table, poses, shapes, target, request, named if name is None else {**named, name: NAME})
     if table.header:
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
-    layout = layout._replace(time=_time_column(table, request, source))
+    layout = layout._replace(time=_time_column(table, request, source), name=name)
     return Plan(
         shapes, (target,), request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
@@ -50,7 +56,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     ), layout  # fmt: skip
 
 
-def _find(table: Table, request: Request, source: str) -> list[Pose]:
+def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     """Find the columns of the poses, by --columns, by name, or by their number where there are no names."""
     if not request.poses:
         return []
@@ -63,21 +69,25 @@ def _find(table: Table, request: Request, source: str) -> list[Pose]:
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
         return [named_pose(spec, None, table.width, request.given)]
     raise FormatError(
-        f"{table.width} columns without names do not say what they are; give --columns", source=source, line=1
+        f"{table.width} columns without names do not say what they are; give --from REP, or --columns",
+        source=source,
+        line=1,
     )
 
 
 def _by_width(width: int, given: Notation | None) -> str:
-    """Take all columns of a table without names for a point or pose: TUM's eight, or as many as it has numbers."""
-    size = len(given.representation.columns) if given else 0
-    if given and given.representation.name == "matrix" and width in (16, 17):
-        return f"{width - 15}-{width}"
-    if given and width in (size, size + 3, size + 4):
-        return f"{1 + (width == size + 4)}-{width}"
-    return {3: "1-3", 7: "1-7", 8: "2-8", 16: "1-16"}.get(width, "") if not given else ""
+    """Take all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not."""
+    rows = REPRESENTATIONS.values() if given is None else [given.representation]
+    wholes = [len(row.whole.columns) for row in rows if row.whole]
+    if given is None:
+        return f"1-{width}" if width in (len(XYZ), *wholes) else ""
+    size = len(given.representation.columns)
+    if width in (size, size + 3, *wholes):
+        return f"1-{width}"
+    return f"2-{width}" if width - 1 in (size + 3, *wholes) else ""
 
 
-def _without_position(pose: Pose, request: Request, table: Table, source: str) -> Pose:
+def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
     """Leave the position to pass as it is where only the rotation is rewritten."""
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.given is None else ""
@@ -86,40 +96,59 @@ def _without_position(pose: Pose, request: Request, table: Table, source: str) -
             source=source,
             line=1,
         )
-    return pose if _is_matrix(request.notations) or pose.rotation.whole else Pose(None, pose.rotation)
+    leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.notations
+    stays = not (_is_whole(request.notations) or pose.rotation.whole or leaves_plane)
+    return PoseColumns(None, pose.rotation) if stays else pose
 
 
-def _is_matrix(notations: Sequence[Notation]) -> bool:
-    return len(notations) == 1 and notations[0].representation.name == "matrix"
+def _is_whole(notations: Sequence[Notation]) -> bool:
+    """Tell whether a result is written as the numbers of a whole pose."""
+    return len(notations) == 1 and notations[0].representation.whole is not None
 
 
-def _shape(pose: Pose, request: Request) -> Shape:
-    unit = pose.position.unit if pose.position else None
-    if pose.rotation is None or pose.rotation.form is None:
+def _shape(pose: PoseColumns, request: Request) -> Shape:
+    """Say what the numbers of a pose's columns mean."""
+    position, rotation = pose
+    unit = position.unit if position else None
+    if rotation is None or rotation.notation is None:
         moved = request.operation.moves and request.kind != POSE
         return Shape((request.kind or POINT) if moved else POSE, unit)
     if request.kind not in ("", POSE) and request.operation.moves:
         raise Misused(
-            f"rows have a rotation, {pose.rotation.shown}, and cannot be taken for a {request.kind}; "
+            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.kind}; "
             "name the three with --columns"
         )
-    form = pose.rotation.form
-    return Shape(POSE, None if pose.rotation.whole else unit, form, request.in_degrees(form), pose.rotation.whole)
+    form = rotation.notation
+    angles = form.representation.angles
+    said = [request.in_degrees(form) if each is None else each for each in rotation.degrees]
+    degrees = any(said[at] for at in angles if at not in rotation.absent)
+    radians_at = tuple(at for at in angles if degrees and not said[at])
+    first = 0 if unit is None else len(XYZ)
+    absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
+    if rotation.whole:
+        return Shape(POSE, None, form, degrees, whole=True)
+    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent)
 
 
 def _target(shapes: Sequence[Shape], request: Request) -> Target:
-    """Settle how results are written: as they were read unless told."""
+    """Choose how results are written: as they were read unless told."""
     shape = shapes[0] if shapes else Shape(POSE)
     if shape.kind != POSE:
         return Target(shape.unit, ())
-    notations = request.notations or ((shape.notation,) if shape.notation else ())
-    if not notations and not _only_turns_around(request):
-        notations = (notation("quaternion"),)
-    forms = tuple((form, request.in_degrees(form)) for form in notations)
     placed = shape.whole or shape.unit is not None
-    whole = placed and (_is_matrix(request.notations) or (shape.whole and not request.notations))
-    unit = None if whole or not (placed or _shifts(request)) else shape.unit or 1.0
-    return Target(unit, forms, request.keep_sign, whole)
+    if request.notations or shape.notation is None:
+        notations = request.notations
+        if not notations and not _only_turns_around(request):
+            notations = (notation("quaternion"),)
+        forms = tuple((form, request.in_degrees(form)) for form in notations)
+        whole = placed and _is_whole(notations)
+        unit = None if whole or not (placed or _shifts(request)) else shape.unit or 1.0
+        return Target(unit, forms, request.keep_sign, whole)
+    unit = None if shape.whole or not (placed or _shifts(request)) else shape.unit or 1.0
+    first = len(XYZ) * (unit is not None and shape.unit is None)  # a position comes in front
+    absent = tuple(first + at for at in shape.absent)
+    form = (shape.notation, shape.degrees)
+    return Target(unit, (form,), request.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
 
 
 def _only_turns_around(request: Request) -> bool:
@@ -141,111 +170,114 @@ def _shifts(request: Request) -> bool:
 
 
 def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ...]:
-    """Find the columns that name frames."""
+    """Find the columns that name frames: for look-ups those named, else the one a row is given in."""
     names = table.names or ()
-    found = [name for name in names if name in FRAME_NAMES or name.endswith(("header.frame_id",))]
-    agrees = not request.frames and request.told is not None and request.operation.moves
-    if agrees and len(found) == 1 and found[0] != COUNTING:
-        return (names.index(found[0]),)  # what rows say must agree with SOURCE
-    if request.frames == ("",):
-        if len(found) != 1:
-            raise FormatError(
-                f"rows do not say their frame; name SOURCE, or give --frame-column; columns: {', '.join(names)}",
-                source=source,
-                line=1,
-            )
-        return (names.index(found[0]),)
-    for name in request.frames:
-        if name not in names:
-            raise Misused(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
-    return tuple(names.index(name) for name in request.frames)
+    if request.frames and request.frames != ("",):
+        return tuple(_place(name, names, source) for name in request.frames)
+    found = _first_called(PARENTS, table)
+    if found is None and request.frames:
+        raise FormatError(
+            f"rows do not say their frame; name SOURCE, or give --frame-column; columns: {', '.join(names)}",
+            source=source,
+            line=1,
+        )
+    return () if found is None else (found,)
+
+
+def _first_called(names: Sequence[str], table: Table) -> int | None:
+    """Find the column of one of some names, the first of them that is there; a message's path may stand before it."""
+    for name in names:
+        for place, column in enumerate(table.names or ()):
+            if column == name or ("_id" in name and column.endswith(f".{name}")):
+                return place
+    return None
+
+
+def _place(name: str, names: Sequence[str], source: str) -> int:
+    """Return the place of a column; raises Misused for one that is not there, or twice."""
+    if name not in names:
+        raise Misused(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
+    if names.count(name) > 1:
+        raise Misused(f"column {name!r} stands twice", source=source, line=1)
+    return names.index(name)
 
 
 def _time_column(table: Table, request: Request, source: str) -> int | None:
     """Find the column of the stamps, by its name or, where there are none, by its number from 1."""
     if request.timed is None:
         return None
-    name, names = request.timed.name, table.names or tuple(map(str, range(1, table.width + 1)))
-    if name not in names:
-        raise Misused(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
-    return names.index(name)
+    return _place(request.timed.name, table.names or tuple(map(str, range(1, table.width + 1))), source)
 
 
 def _columns(
     table: Table,
-    poses: Sequence[Pose],
+    poses: Sequence[PoseColumns],
     shapes: Sequence[Shape],
     target: Target,
     request: Request,
-    frames: Sequence[int],
+    named: Mapping[int, int],
 ) -> list[Column]:
-    """Put the results where they belong."""
-    new = _new_columns(poses, target, request)
+    """Put the results where they belong; `named` are the columns of names and their roles."""
+    position, rotation, extras = _new_columns(poses, target, request)
     ours = [columns for pose in poses for columns in pose if columns is not None]
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     if request.keep or not ours:
-        return [*columns, *(column for group in new for column in group)]
-    if request.told is not None and len(frames) == 1:
-        columns[frames[0]] = Told(frames[0], request.told)
+        return [*columns, *position, *rotation, *extras]
+    if rename_of(request) is not None:
+        for place, role in named.items():
+            columns[place] = Named(place, role)
+    only_turned = request.operation.changes_nothing and not request.operation.moves
     at: dict[int, list[Column]] = {place: [] for each in ours for place in each.places}
-    position, rotation, extras = new
     pose = poses[0]
     if _in_place(pose, shapes[0], target, request):
-        for column, place in zip(
-            (*position, *rotation), (place for each in ours for place in each.places), strict=False
-        ):
+        new = (*position, *rotation)
+        for column, place in zip(new, (place for each in ours for place in each.places), strict=False):
             at[place].append(column)
-        at[max(at)] += [*(position + rotation)[len(at) :], *extras]
+        at[max(at)] += [*new[len(at) :], *extras]
     elif pose.position and pose.rotation and target.unit is not None and len(poses) == 1:
-        for column, place in zip(position, pose.position.places, strict=True):
-            at[place].append(column)
+        for column, place in zip(position, pose.position.places, strict=False):
+            at[place].append(Kept(place) if only_turned else column)
+        at[max(pose.position.places)] += position[len(pose.position.places) :]
         at[min(pose.rotation.places)] += [*rotation, *extras]
     else:
         at[min(at)] += [*position, *rotation, *extras]
     return [column for place, given in enumerate(columns) for column in at.get(place, [given])]
 
 
-def _in_place(pose: Pose, shape: Shape, target: Target, request: Request) -> bool:
+def _in_place(pose: PoseColumns, shape: Shape, target: Target, request: Request) -> bool:
     """Tell whether each number of the result stands where one of the input did."""
     if request.poses != 1:
         return False
-    same = not target.notations or shape.notation is None or [form for form, _ in target.notations] == [shape.notation]
-    placed = (shape.unit is None) == (target.unit is None)
+    same = not target.notations or shape.notation is None or _same(pose, target)
+    placed = (shape.unit is None) == (target.unit is None) and len(shape.absent) == len(target.absent)
     return same and placed and shape.whole == target.whole and (pose.position is not None or pose.rotation is not None)
 
 
-def _new_columns(poses: Sequence[Pose], target: Target, request: Request) -> list[list[Column]]:
+def _same(pose: PoseColumns, target: Target) -> bool:
+    """Tell whether a rotation is written in the notation it was read in."""
+    return pose.rotation is not None and [form for form, _ in target.notations] == [pose.rotation.notation]
+
+
+def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request) -> list[list[New]]:
     """Name the numbers of the result: position, rotation, what else there is."""
-    pose = poses[0] if poses else Pose(None, None)
-    rotation_names = [name for form, degrees in target.notations for name in _names(form, degrees=degrees)]
-    if target.whole:
-        rotation_names = [f"m{row}{column}" for row in "1234" for column in "1234"]
-    rotation = pose.rotation
-    same = rotation is not None and [form for form, _ in target.notations] == [rotation.form]
-    if rotation and same and rotation.whole == target.whole and not request.prefix and len(poses) == 1:
-        rotation_names = list(rotation.names)
+    pose = poses[0] if poses else PoseColumns(None, None)
+    rotation, alone = pose.rotation, not request.prefix and len(poses) == 1
+    if rotation and alone and _same(pose, target) and rotation.whole == target.whole:
+        turned = list(rotation.names)
     else:
-        rotation_names = _affixed(rotation_names, pose.rotation, request, len(poses))
-    names = ["x", "y", "z"] if target.unit is not None else []
-    if names and pose.position and not request.prefix and len(poses) == 1:
-        names = list(pose.position.names)
-    else:
-        names = [request.prefix + name for name in names]
+        turned = _affixed(target.names, rotation, request, len(poses))
+    moved = [] if target.unit is None else [request.prefix + name for name in XYZ]
+    if moved and pose.position and alone:
+        moved = list(pose.position.names)
+        moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)
     extras = [request.prefix + name for name in request.operation.extras]
-    indices = iter(range(len(names) + len(rotation_names) + len(extras)))
-    return [[New(next(indices), name) for name in group] for group in (names, rotation_names, extras)]
+    new = [New(at, name) for at, name in enumerate((*moved, *turned, *extras))]
+    first, last = len(moved), len(moved) + len(turned)
+    return [new[:first], new[first:last], [each for each in new[last:] if each.name not in turned]]
 
 
 def _affixed(names: Sequence[str], columns: Columns | None, request: Request, poses: int) -> list[str]:
     """Add to new names the affixes of those they come from, or the prefix asked for."""
     if request.prefix or columns is None or poses > 1:
         return [request.prefix + name for name in names]
-    suffix = "" if "deg" in columns.suffix or "rad" in columns.suffix else columns.suffix
-    return [columns.prefix + name + suffix for name in names]
-
-
-def _names(form: Notation, *, degrees: bool) -> Sequence[str]:
-    """Name a notation's columns; angles in degrees say so."""
-    if form.degrees is not None or not degrees:
-        return form.columns
-    return [f"{name}_deg" if index in form.representation.angles else name for index, name in enumerate(form.columns)]
+    return [columns.prefix + name + columns.suffix for name in names]

@@ -11,8 +11,9 @@ from frametool.stream.faults import Fault
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.table import UNCLOSED, open_table, table_block
+from frametool.stream.table_names import Naming
 from frametool.stream.table_plan import TUM, plan_table
-from frametool.text.cells import is_torn, torn_record, whole_records
+from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import BLOCK_BYTES, read_blocks
 
 if TYPE_CHECKING:
@@ -44,15 +45,14 @@ def run_table(
     if first is None:
         raise FormatError("nothing in it", source=source)
     table, rest = open_table(first, delimiter, header=header, source=source)
-    table = _as_tum(table, form)
+    table = _as_tum(table, form, request)
     if request.timed is not None and not request.timed.name:
         request = request._replace(timed=None)  # rows have no header
     plan, layout = plan_table(table, request, source)
-    head = table.head + (layout.header(table.header) + table.line_end if table.header else b"")
     taken = len(first) - len(rest)
-    yield Outcome(head, lines=first.count(b"\n", 0, taken), size=taken)
-    work = Work(table, plan, layout)
-    yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if work.remembers else jobs)
+    yield Outcome(table.opening(layout), lines=first.count(b"\n", 0, taken), size=taken)
+    work = TableWork(table, plan, layout, Naming(table, layout, request))
+    yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
 
 
 def _blocks(stream: Source, delimiter: bytes, size: int) -> Iterator[bytes]:
@@ -60,12 +60,7 @@ def _blocks(stream: Source, delimiter: bytes, size: int) -> Iterator[bytes]:
     size = size or BLOCK_BYTES
     if not delimiter:
         return read_blocks(stream, size=size)
-
-    def whole(text: bytes) -> int:
-        end = whole_records(text, delimiter)
-        return -1 if is_torn(text[end:], delimiter) else end
-
-    return read_blocks(stream, size=size, whole=whole)
+    return read_blocks(stream, size=size, whole=RecordEnds(delimiter))
 
 
 def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
@@ -78,23 +73,23 @@ def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
     return text or None
 
 
-def _as_tum(table: Table, form: str) -> Table:
-    """Name the columns of a trajectory without a header."""
-    if table.names or table.delimiter or not (form == "tum" or table.width == len(TUM)):
+def _as_tum(table: Table, form: str, request: Request) -> Table:
+    """Name the columns of a trajectory without a header, unless --from says what they are."""
+    if table.names or request.given or not (form == "tum" or table.width == len(TUM)):
         return table
     return table._replace(names=TUM, width=len(TUM))
 
 
-class Work:
-    """What is done to each block of a table; holds what one block leaves for the next."""
+class TableWork:
+    """Turn one block of a table after the other into its outcome; keeps what one block leaves for the next."""
 
-    def __init__(self, table: Table, plan: Plan, layout: Layout) -> None:
+    def __init__(self, table: Table, plan: Plan, layout: Layout, naming: Naming) -> None:
         """Begin before the first row."""
         self.table = table
         self.plan = plan
         self.layout = layout
+        self.naming = naming
         self.state = State()
-        self.remembers = plan.unwrap or plan.operation.of == "previous"
 
     def __call__(self, text: bytes) -> Outcome:
         """Process one block; a quote that is not closed takes all behind it along."""
@@ -106,10 +101,11 @@ class Work:
         return done._replace(faults=[*done.faults, fault])
 
     def _done(self, text: bytes) -> Outcome:
-        block = table_block(self.table, self.layout, text)
+        block = table_block(self.table, self.layout, text, self.naming)
         run = Run(self.plan, block, self.state)
         faults = run.faults()
         notes = [RowNote.of_degrees(block.line_of(row), angle) for row, angle in run.doubted[:1]]
+        notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.lost]
         notes += [RowNote.of_rounding(block.line_of(row)) for row in sorted(run.mended)[:1]]
         rows = len(block.places) + len(block.broken)
         return Outcome(

@@ -19,6 +19,7 @@ from frametool.grammar.pose import POSE_KEYS
 from frametool.grammar.readers import Misfit, Reading, within
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_records
+from frametool.stream.run import RowNote
 from frametool.stream.splice import OURS, Splicer, target_of
 from frametool.stream.stamp_source import stamp_path
 from frametool.stream.text_parts import In, Out
@@ -69,7 +70,7 @@ class Template:
     numbers: the stretches that hold our numbers, in order
     stamps: the stretches of each entry's stamp
     pieces: what the result is made of
-    notes: what is worth telling, as (what it is about, the sentence)
+    notes: what is worth telling about it
     """
 
     def __init__(
@@ -161,13 +162,13 @@ class Template:
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
 
 
-def _notes(entries: Sequence[Entry], request: Request) -> Iterator[tuple[str, str]]:
+def _notes(entries: Sequence[Entry], request: Request) -> Iterator[RowNote]:
     """Yield what is worth telling about the records of a text."""
     for entry in entries:
         if lost := lost_name(entry.record, request):
-            yield "unnamed", f"frame {lost!r} is left out: the frames of the result are not known"
+            yield RowNote.of_lost_name(0, lost)
         if not entry.record.values:
-            yield "identity", "neither position nor rotation: taken as the identity"
+            yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
 
 
 def lost_name(record: Record, request: Request) -> str:

@@ -20,10 +20,10 @@ class Out(NamedTuple):
 
 
 class Instead(NamedTuple):
-    """Constant text in place of a stretch of the input, which stays where there is no result."""
+    """A name of the result in place of a stretch of the input, which stays where there is no result."""
 
     part: int
-    text: bytes
+    new: int
 
 
 class Const(NamedTuple):

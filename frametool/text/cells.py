@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from frametool.text.array_types import Bytes, Flags, Ints
 
 _NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
-MOST_QUOTED = 1 << 20  # bytes of a record whose quote is still open
-MOST_QUOTED_LINES = 10_000
+_CLOSING_QUOTE = re.compile(rb'(?:[^"]++|"")*+"')
 _NEWLINE, _RETURN, _QUOTE, _BLANK, _TAB = b'\n\r" \t'
 
 
@@ -106,6 +105,30 @@ def whole_records(text: bytes, delimiter: bytes = b",") -> int:
     return max(record_ends, default=0)
 
 
+class RecordEnds:
+    """Find where records end in text that arrives in pieces; bytes inside an open quote are looked at once."""
+
+    def __init__(self, delimiter: bytes) -> None:
+        """Begin before the first record."""
+        self.delimiter = delimiter
+        self.quoted = False
+
+    def __call__(self, text: bytes) -> int:
+        """Return how many bytes are whole records; the negative number that begin a record if its quote is open.
+
+        text: a line end stands in it; it follows what was returned last.
+        """
+        last, start = text.rfind(b"\n") + 1, 0
+        if self.quoted:
+            closing = _CLOSING_QUOTE.match(text, 0, last)
+            if closing is None:
+                return -last
+            start = closing.end()
+        end = whole_records(text[start:], self.delimiter)
+        self.quoted = not end
+        return start + end if end else -last
+
+
 def torn_record(text: bytes, delimiter: bytes) -> int | None:
     """Return where the record begins that has a quote opened and not closed; None where all are closed."""
     if _ends_outside_quotes(text, delimiter):
@@ -116,12 +139,6 @@ def torn_record(text: bytes, delimiter: bytes) -> int | None:
             return start
         start = cell.end() if cell[1] == b"\n" else start
     return None
-
-
-def is_torn(rest: bytes, delimiter: bytes) -> bool:
-    """Tell whether what is left of a block is more than any cell in quotes should hold, and its quote still open."""
-    is_much = b"\n" in rest and (len(rest) > MOST_QUOTED or rest.count(b"\n") > MOST_QUOTED_LINES)
-    return is_much and torn_record(rest, delimiter) == 0
 
 
 def _ends_outside_quotes(lines: bytes, delimiter: bytes) -> bool:

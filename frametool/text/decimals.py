@@ -81,7 +81,7 @@ def _scaled_decimals(size: Floats) -> Decimals:
 
 
 def _scale(size: Floats, power: Floats, rest: Floats) -> tuple[Ints, Floats]:
-    """Multiply by the sum of two floats; give the product as an integer and a fraction from 0 to 1."""
+    """Multiply by the sum of two floats; return the product as an integer and a fraction from 0 to 1."""
     product = size * power
     error = product_error(halves(size), halves(power), product)
     error += size * rest

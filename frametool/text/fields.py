@@ -17,9 +17,9 @@ from frametool.text.digits import ZEROS, count_digits, eight_digits
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from frametool.text.array_types import Bytes, Flags, Ints, Words
+    from frametool.text.array_types import Bytes, Flags, Floats, Ints, Words
 
 WIDTH = 40
 POINT = 15
@@ -51,7 +51,7 @@ class Fields:
             self.words[:, 0] = eight_digits(upper)
 
     def write_fraction(self, fraction: Ints, digits: int) -> list[Words]:
-        """Write integers as exactly so many digits (up to 17) after the point; give their words, filled up with 0."""
+        """Write integers as exactly so many digits (up to 17) after the point; return their words, filled up with 0."""
         words = []
         rest = fraction
         for left in range(digits, 0, -8):
@@ -63,7 +63,7 @@ class Fields:
         return words
 
     def write_sign(self, starts: Ints, negative: Flags) -> Ints:
-        """Put a minus before each start; give the starts, moved to the minus where it counts."""
+        """Put a minus before each start; return the starts, moved to the minus where it counts."""
         self.data[starts - 1] = _MINUS
         return starts - negative
 
@@ -79,12 +79,15 @@ def _left_digits(numbers: Ints, digits: int) -> Words:
     return eight_digits(numbers * 10 ** (8 - digits) if digits < 8 else numbers)
 
 
-def with_separators(spans: Spans, separators: bytes, rows: int) -> Spans:
-    """Put the separator of its column behind every span, and give the spans as (rows, columns)."""
-    columns = len(separators)
-    spans.data[spans.ends] = np.tile(np.frombuffer(separators, np.uint8), rows)
-    shape = (rows, columns)
-    return Spans(spans.data, spans.starts.reshape(shape), (spans.ends + 1).reshape(shape))
+def written(values: Floats, separators: bytes, write: Callable[[Floats], Spans]) -> Spans:
+    """Write rows of floats (n, c) by a function for a flat array of them; put its column's separator behind each."""
+    rows, columns = values.shape
+    if len(separators) != columns:
+        raise ValueError(f"{columns} columns, but {len(separators)} separators")
+    with np.errstate(over="ignore", invalid="ignore"):
+        data, starts, ends = write(np.ascontiguousarray(values, np.float64).ravel())
+    data[ends] = np.tile(np.frombuffer(separators, np.uint8), rows)
+    return Spans(data, starts.reshape(rows, columns), (ends + 1).reshape(rows, columns))
 
 
 def replaced(spans: Spans, places: Ints, texts: Sequence[str]) -> Spans:

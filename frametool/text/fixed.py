@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frametool.text.fields import GREATEST_WHOLE, POINT, Fields, replaced, with_separators
+from frametool.text.fields import GREATEST_WHOLE, POINT, Fields, replaced, written
 from frametool.text.powers import halves, product_error
-from frametool.text.spans import Spans, join
+from frametool.text.spans import Spans
 
 if TYPE_CHECKING:
     from frametool.text.array_types import Flags, Floats, Ints
@@ -20,24 +20,13 @@ _DOUBT = 2.0**-52
 _MOST_DECIMALS = 15
 
 
-def format_fixed(values: Floats, precision: int, separators: bytes) -> bytes:
-    """Write rows of floats as text.
+def fixed_spans(values: Floats, precision: int, separators: bytes) -> Spans:
+    """Write rows of floats with so many decimals, as spans (n, c), each with its separator.
 
     values: (n, c); separators: c bytes, the one that follows each column.
     Nan and infinity become `nan` and `inf`, as in `%`.
     """
-    return join([fixed_spans(values, precision, separators)])
-
-
-def fixed_spans(values: Floats, precision: int, separators: bytes) -> Spans:
-    """Write floats as `format_fixed` does, but give them as spans (n, c), each with its separator."""
-    rows, columns = values.shape
-    if len(separators) != columns:
-        raise ValueError(f"{columns} columns, but {len(separators)} separators")
-    flat = np.ascontiguousarray(values, np.float64).ravel()
-    with np.errstate(over="ignore", invalid="ignore"):
-        spans = _all_spans(flat, precision)
-    return with_separators(spans, separators, rows)
+    return written(values, separators, lambda flat: _all_spans(flat, precision))
 
 
 def _all_spans(flat: Floats, precision: int) -> Spans:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 BLOCK_BYTES = 1 << 19
-LONGEST_LINE = 1 << 26
+LONGEST_RECORD = 1 << 26
 # A piece this large was not typed: more is on its way, and waiting a moment for it saves much work per block. But
 # nothing that has arrived is kept back for longer than the second number.
 _BULK_BYTES = 1 << 14
@@ -39,32 +39,37 @@ def read_blocks(
     stream: Source,
     *,
     size: int = BLOCK_BYTES,
-    longest: int = LONGEST_LINE,
+    longest: int = LONGEST_RECORD,
     whole: Callable[[bytes], int] = whole_lines,
 ) -> Iterator[bytes]:
     """Yield blocks of whole lines, in order; only the very last may lack its line end.
 
     size: bytes a block has when the stream delivers as fast as they are taken.
-    whole: how many bytes of a text are finished records; for records of several lines. Where it is
-    negative they will never be, and the text is the last block.
-    Raises FormatError if one record is longer than `longest`.
+    whole: how many bytes of a text are finished records; for records of several lines. A negative number: so many
+    bytes are the beginning of a record that goes on behind them, and need not be looked at again.
+    Raises FormatError if one record is longer than `longest`, however the stream was cut.
     """
     ready = _readiness(stream)
-    pieces: list[bytes] = []
-    while piece := _read_piece(stream, size, ready):
+    begun: list[bytes] = []  # the beginning of a record
+    pieces: list[bytes] = []  # what follows it
+    held = 0
+    while piece := _read_piece(stream, min(size, longest - held), ready):
         pieces.append(piece)
+        held += len(piece)
         if b"\n" in piece:
             text = b"".join(pieces)
             end = whole(text)
-            if end < 0:
-                pieces = [text]
-                break
-            pieces = [text[end:]]
-            if end:
-                yield text[:end]
-        if sum(map(len, pieces)) > longest:
-            raise FormatError(f"a line is longer than {longest} bytes: this is no text in lines")
-    if rest := b"".join(pieces):
+            if end > 0:
+                yield b"".join((*begun, text[:end]))
+                begun, held = [], len(text) - end
+            elif end < 0:
+                begun.append(text[:-end])
+            pieces = [text[abs(end) :]]
+        if held >= longest:
+            raise FormatError(
+                f"a record is longer than {longest} bytes: this is no text in lines, or a quote is not closed"
+            )
+    if rest := b"".join((*begun, *pieces)):
         yield rest
 
 

@@ -20,14 +20,15 @@ if TYPE_CHECKING:
 _DECIMAL_CHARACTERS = "0123456789.-+eE"
 _strip = str.strip
 _INFINITE = float("inf")
-_DECIMAL = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+# possessive: digits are never shared out in another way, which would take time that grows with their square
+_DECIMAL = r"(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?+[0-9]++)?+"
 # patterns are compiled when first needed, not at start-up: most texts are plain numbers
 _WITH_UNIT = rf"([-+]?{_DECIMAL}) ?(deg|rad|°)"
 _MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
 _BARE_STAR = r"[-+]? ?\*"
 _UNITS = {"deg": "deg", "°": "deg", "rad": "rad"}
 _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
-_LONGEST_SHOWN = 60
+LONGEST_SHOWN = 60
 
 
 class NotFinite(ValueInvalid):
@@ -85,10 +86,11 @@ def _degrees_of_pi(text: str, sign: str, factor: str | None, divisor: str | None
 
 
 def shown(text: str) -> str:
-    """Quote a text for a message: escaped, and cut when it is long."""
-    if len(text) > _LONGEST_SHOWN:
-        return f"{text[:_LONGEST_SHOWN]!r}... ({len(text)} characters)"
-    return repr(text)
+    """Quote a text for a message: escaped, and cut to 60 characters, escapes included."""
+    kept = text[:LONGEST_SHOWN]
+    while len(repr(kept)) > LONGEST_SHOWN + 2:
+        kept = kept[:-1]
+    return repr(text) if kept == text else f"{kept!r}... ({len(text)} characters)"
 
 
 def explain_number(text: str) -> str:
@@ -128,9 +130,9 @@ _MISTAKES = (
     (r"[-+]?[0-9]+,[0-9]+(e[-+]?[0-9]+)?", "has a decimal comma; write a point"),
     (r"[-+]?0x[0-9a-f_]+|[-+]?0[ob][0-9_]+", f"{_NOT_DECIMAL}; write it in base ten"),
     (r"[-+]?[0-9]+(:[0-9]+)+(\.[0-9]*)?", f"{_NOT_DECIMAL}; base 60 is not read"),
-    (r"[-+]?[0-9._]*_[0-9._]*(e[-+]?[0-9_]+)?", f"{_NOT_DECIMAL}; leave out the underscores"),
-    (rf"\s+[-+]?{_DECIMAL}\s*|[-+]?{_DECIMAL}\s+", "has blanks around the number"),
-    (rf"[-+]?{_DECIMAL}(\s+[-+]?{_DECIMAL})+", "is several numbers where one is expected"),
+    (r"[-+]?[0-9.]*+_[0-9._]*+(e[-+]?[0-9_]+)?", f"{_NOT_DECIMAL}; leave out the underscores"),
+    (rf"\s++[-+]?{_DECIMAL}\s*|[-+]?{_DECIMAL}\s+", "has blanks around the number"),
+    (rf"[-+]?{_DECIMAL}(\s++[-+]?{_DECIMAL})++", "is several numbers where one is expected"),
     (r"true|false|yes|no|on|off", "is a truth value where a number is expected"),
     (r"null|~", "is empty where a number is expected"),
     (rf"[-+]?{_DECIMAL}e[-+]?", _UNKNOWN),

@@ -72,7 +72,7 @@ def _parse_single(text: bytes) -> float:
 
 
 def _parse_plain(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
-    """Read cells without blanks and exponents; give the values and which of them are decided."""
+    """Read cells without blanks and exponents; return the values and which of them are decided."""
     begins, negative = _after_sign(data, starts)
     mantissa, sure = _read_mantissa(data, begins, ends)
     if mantissa.words == 1:

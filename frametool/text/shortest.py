@@ -9,9 +9,9 @@ import numpy as np
 
 from frametool.text.decimals import Decimals, shortest_decimals
 from frametool.text.digits import count_digits, significant_digits
-from frametool.text.fields import GREATEST_WHOLE, POINT, Fields, replaced, with_separators
+from frametool.text.fields import GREATEST_WHOLE, POINT, Fields, replaced, written
 from frametool.text.powers import TENS
-from frametool.text.spans import Spans, join
+from frametool.text.spans import Spans
 
 if TYPE_CHECKING:
     from frametool.text.array_types import Bytes, Floats, Ints, Words
@@ -31,24 +31,13 @@ class _Parts(NamedTuple):
     zeros: Ints
 
 
-def format_shortest(values: Floats, separators: bytes) -> bytes:
-    """Write rows of floats as text.
+def shortest_spans(values: Floats, separators: bytes) -> Spans:
+    """Write rows of floats as spans (n, c), each with its separator.
 
     values: (n, c); separators: c bytes, the one that follows each column.
     Nan and infinity become `nan` and `inf`, as in `repr`.
     """
-    return join([shortest_spans(values, separators)])
-
-
-def shortest_spans(values: Floats, separators: bytes) -> Spans:
-    """Write floats as `format_shortest` does, but give them as spans (n, c), each with its separator."""
-    rows, columns = values.shape
-    if len(separators) != columns:
-        raise ValueError(f"{columns} columns, but {len(separators)} separators")
-    flat = np.ascontiguousarray(values, np.float64).ravel()
-    with np.errstate(over="ignore", invalid="ignore"):
-        spans = _all_spans(flat)
-    return with_separators(spans, separators, rows)
+    return written(values, separators, _all_spans)
 
 
 def _all_spans(flat: Floats) -> Spans:
@@ -90,7 +79,7 @@ def _plain_parts(size: Floats, decimals: Decimals) -> _Parts:
 
 
 def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
-    """Rewrite those with an exponent to one digit before the point; give their exponents."""
+    """Rewrite those with an exponent to one digit before the point; return their exponents."""
     digits, places = decimals.digits[powered], decimals.places[powered]
     behind = count_digits(digits) - 1
     scale = TENS.take(behind)
@@ -102,7 +91,7 @@ def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
 
 
 def _write(fields: Fields, parts: _Parts) -> tuple[Ints, Ints]:
-    """Write all parts; give where each number starts, without its sign, and ends."""
+    """Write all parts; return where each number starts, without its sign, and ends."""
     fields.write_whole(parts.whole)
     shown = significant_digits(fields.write_fraction(parts.fraction, _MOST_DIGITS))
     starts = fields.whole_starts(parts.whole)

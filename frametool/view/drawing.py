@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.frames.stamps import BILLION
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from frametool.sim.scene import Scene
-    from frametool.sim.simulate import Step
-    from frametool.sim.turtle import Pen, State
+    from frametool.sim.simulate import SimulationStep
+    from frametool.sim.turtle import Pen, TurtleState
 
     Point = tuple[float, float]
 
@@ -38,19 +41,24 @@ class Curves(NamedTuple):
     angular: list[float]
 
 
+def colours_of(turtles: Iterable[str]) -> dict[str, str]:
+    """Return a colour for each turtle, in the order of their names."""
+    return dict(zip(sorted(turtles), cycle(COLOURS), strict=False))
+
+
 class Drawing:
     """Remember of the steps what a plot shows; turtles that do not move add nothing."""
 
     def __init__(self, scene: Scene) -> None:
-        """Begin with an empty sheet."""
+        """Create the drawing of a run that has not begun."""
         self.strokes: list[Stroke] = []
-        self.turtles: dict[str, State] = {}
+        self.turtles: dict[str, TurtleState] = {}
         self.curves: dict[str, Curves] = {name: Curves([], [], [], []) for name in scene.followers}
         self._current: dict[str, Stroke] = {}
         self._clears = 0
 
-    def watch(self, step: Step) -> None:
-        """Take a step into the drawing."""
+    def watch(self, step: SimulationStep) -> None:
+        """Add a step to the drawing."""
         if step.is_tick:
             self._wipe_if_cleared(step)
             self.turtles = step.states
@@ -63,18 +71,17 @@ class Drawing:
             curves.linear.append(command.twist.linear_x)
             curves.angular.append(command.twist.angular_z)
 
-    def colour(self, turtle: str) -> str:
-        """Return a turtle's colour: `#rrggbb`."""
-        names = sorted({*self.turtles, *self.curves})
-        return COLOURS[names.index(turtle) % len(COLOURS)] if turtle in names else COLOURS[-1]
+    def colours(self) -> dict[str, str]:
+        """Return the colour of every turtle: `#rrggbb`."""
+        return colours_of({*self.turtles, *self.curves})
 
-    def _wipe_if_cleared(self, step: Step) -> None:
+    def _wipe_if_cleared(self, step: SimulationStep) -> None:
         if step.clears != self._clears:
             self._clears = step.clears
             self.strokes.clear()
             self._current.clear()
 
-    def _draw(self, name: str, step: Step) -> None:
+    def _draw(self, name: str, step: SimulationStep) -> None:
         """Go on with a turtle's stroke, or begin one with its new pen."""
         x, y, _ = step.states[name]
         pen = step.pens[name]

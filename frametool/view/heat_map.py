@@ -9,7 +9,7 @@ from frametool.view.plot_svg import document
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.sim.sweep import Many
+    from frametool.sim.sweep import SweepResult
 
 SIDE = 400  # pixels of a map
 MARGIN = 70
@@ -31,7 +31,7 @@ class Map(NamedTuple):
         return (min(known), max(known)) if known else (0.0, 0.0)
 
 
-def plot(gain_linear: Sequence[float], gain_angular: Sequence[float], many: Many, suffix: str) -> str | bytes:
+def plot(gain_linear: Sequence[float], gain_angular: Sequence[float], many: SweepResult, suffix: str) -> str | bytes:
     """Return the maps as a picture of the kind that a suffix names: .svg, .html, .png."""
     maps = [Map("time to reach (s)", many.time_to_reach.tolist()), Map("overshoot (m)", many.overshoot.tolist())]
     if suffix == ".png":

@@ -68,7 +68,8 @@ def _window(axes: Any, drawing: Drawing) -> None:
         red, green, blue, width, _ = stroke.pen
         xs, ys = zip(*stroke.points, strict=True)
         axes.plot(xs, ys, color=(red / 255, green / 255, blue / 255), linewidth=width * POINTS)
+    colours = drawing.colours()
     for name, (x, y, theta) in drawing.turtles.items():
         triangle = 3, 0, math.degrees(theta) - 90.0
-        axes.plot([x], [y], marker=triangle, markersize=14, color=drawing.colour(name))
+        axes.plot([x], [y], marker=triangle, markersize=14, color=colours[name])
         axes.annotate(name, (x, y), xytext=(0, 12), textcoords="offset points", ha="center", color="white")

@@ -12,7 +12,7 @@ from frametool.view.drawing import COLOURS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.sim.turtle import State
+    from frametool.sim.turtle import TurtleState
     from frametool.view.drawing import Drawing, Stroke
 
 WINDOW = 500  # pixels, as turtlesim's
@@ -23,6 +23,7 @@ WIDTH = LEFT + 420 + MARGIN
 HEIGHT = WINDOW + 2 * MARGIN
 BACKGROUND = "#4556ff"  # turtlesim's 69, 86, 255
 INK = "#333"
+LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is drawn at its end
 # the turtles' colours as they show on white
 DARKENED = dict(
     zip(COLOURS, ("#c79a00", "#d4691b", "#1593ad", "#2a9d8f", "#d6458b", "#5a9a16", "#7d5fc7", "#666666"), strict=True)
@@ -58,10 +59,11 @@ def panels(drawing: Drawing) -> list[Panel]:
     if not curves:
         return []
     height = (WINDOW - 2 * 50) / 3
+    colours = drawing.colours()
     rows = (("distance (m)", "distance"), ("linear.x (m/s)", "linear"), ("angular.z (rad/s)", "angular"))
     return [
         Panel(title, MARGIN + index * (height + 50), height, [
-            (name, DARKENED[drawing.colour(name)], curve.times, getattr(curve, key)) for name, curve in curves.items()
+            (name, DARKENED[colours[name]], curve.times, getattr(curve, key)) for name, curve in curves.items()
         ])
         for index, (title, key) in enumerate(rows)
     ]  # fmt: skip
@@ -72,7 +74,8 @@ def _window(drawing: Drawing) -> Iterator[str]:
     yield f'<svg x="{MARGIN}" y="{MARGIN}" width="{WINDOW}" height="{WINDOW}" viewBox="0 0 {WINDOW} {WINDOW}">\n'
     yield f'<rect width="{WINDOW}" height="{WINDOW}" fill="{BACKGROUND}"/>\n'
     yield from map(_stroke, drawing.strokes)
-    yield from (_turtle(name, state, drawing.colour(name)) for name, state in drawing.turtles.items())
+    colours = drawing.colours()
+    yield from (_turtle(name, state, colours[name]) for name, state in drawing.turtles.items())
     yield "</svg>\n"
 
 
@@ -85,7 +88,7 @@ def _stroke(stroke: Stroke) -> str:
     )
 
 
-def _turtle(name: str, state: State, colour: str) -> str:
+def _turtle(name: str, state: TurtleState, colour: str) -> str:
     """Draw a turtle from above: shell, head and feet; nose along its heading."""
     place = f"translate({_number(state.x * METRE)} {_number((SIZE - state.y) * METRE)})"
     feet = "".join(f'<circle cx="{x}" cy="{y}" r="4"/>' for x in (-9, 9) for y in (-11, 11))
@@ -107,7 +110,7 @@ def _panel(panel: Panel) -> Iterator[str]:
         return _number(LEFT + width * t / right)
 
     def down(value: float) -> str:
-        return _number(panel.top + panel.height * (high - value) / (high - low))
+        return _number(panel.top + panel.height * (high - min(max(value, low), high)) / (high - low))
 
     bottom = _number(panel.top + panel.height)
     yield f'<text x="{LEFT}" y="{_number(panel.top - 8)}">{panel.title}</text>\n'
@@ -126,7 +129,7 @@ def _panel(panel: Panel) -> Iterator[str]:
 
 def ticks(low: float, high: float) -> list[float]:
     """Return round numbers that enclose two values: 1, 2 or 5 times a power of ten apart, four to ten of them."""
-    span = (high - low) or 1.0
+    span = high - low if high - low > LEAST_SPAN else 1.0
     step = 10.0 ** math.floor(math.log10(span / 4.0))
     step *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if span / (step * factor) <= 6.0)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
@@ -134,9 +137,9 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _bounds(values: Iterable[float]) -> tuple[float, float]:
-    """Return the least and the greatest value, zero included."""
+    """Return the least and the greatest value, zero included, as far as an axis reaches."""
     known = [0.0, *values]
-    return min(known), max(known)
+    return max(min(known), -FURTHEST), min(max(known), FURTHEST)
 
 
 def _number(value: float) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
-from frametool.geometry.representations import notation
+from frametool.geometry.representations import REPRESENTATIONS, ROWS, notation
 from frametool.grammar.result import is_locked, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
@@ -16,14 +17,7 @@ if TYPE_CHECKING:
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, Style
 
-EVERYTHING = ("quaternion", "rpy_rad", "rpy_deg", "axis_angle_rad", "matrix")
-LABELS = {
-    "axis_angle": "axis-angle",
-    "rotvec": "rotation vector",
-    "six_d": "6d",
-    "xyzw": "quaternion",
-    "wxyz": "quaternion",
-}
+OVERVIEW = [name + unit for name, row in REPRESENTATIONS.items() for unit in row.overview]
 
 
 class Line(NamedTuple):
@@ -59,8 +53,8 @@ def _describe(result: Result, style: Style) -> str:
     if pose.position is not None:
         lines.append(Line("translation", list(zip("xyz", pose.position, strict=True)), "m"))
     if pose.rotation is not None:
-        for form in style.notations or tuple(map(notation, EVERYTHING)):
-            lines += _rotation_lines(pose, form, style)
+        for each in style.notations or map(notation, OVERVIEW):
+            lines += _rotation_lines(pose, each, style)
     lines += [Line(*extra) for extra in _extra_lines(result)]
     return _heading(result) + _layout(lines, style)
 
@@ -78,35 +72,17 @@ def _heading(result: Result) -> str:
     return f"{source} seen from {target}{across}  (maps points in {name} to points in {parent})\n"
 
 
-def _rotation_lines(pose: Pose, form: Notation, style: Style) -> Iterator[Line]:
-    """Yield the lines of one representation."""
-    name = form.representation.name
-    label = LABELS.get(name, name) + (f" {form.axes}" if form.axes else "")
-    unit = ("deg" if style.in_degrees(form) else "rad") if form.representation.angles else ""
-    if name == "matrix":
-        rows = rotation_entry(pose, form, style)[1]
-        yield from (Line(label if row is rows[0] else "", [("", value) for value in row], "") for row in rows[:3])
+def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Line]:
+    """Yield the lines of one notation."""
+    row, numbers = notation.representation, rotation_numbers(pose, notation, style)
+    if row.shape == ROWS:
+        for at, each in enumerate(rotation_entry(pose, notation, style)[1][: math.isqrt(len(numbers))]):
+            yield Line("" if at else notation.label, [("", value) for value in each], "")
         return
-    numbers = rotation_numbers(pose, form, style)
-    if is_locked(pose, form):
+    unit = ("deg" if style.in_degrees(notation) else "rad") if row.angles else ""
+    if is_locked(pose, notation):
         unit += "  (gimbal lock: not unique, third angle set to 0)"
-    yield Line(label, list(zip(_names(form), numbers, strict=True)), unit)
-
-
-def _names(form: Notation) -> Sequence[str]:
-    """Name the numbers of a line."""
-    match form.representation.name:
-        case "quaternion" | "xyzw":
-            return "xyzw"
-        case "wxyz":
-            return "wxyz"
-        case "rpy":
-            return ("roll", "pitch", "yaw")
-        case "euler":
-            return tuple((form.axes or "")[1:])
-        case "axis_angle":
-            return ("x", "y", "z", "angle")
-    return ("x", "y", "z") if len(form.representation.columns) == 3 else [""] * len(form.representation.columns)
+    yield Line(notation.label, list(zip(notation.names, numbers, strict=True)), unit)
 
 
 def _extra_lines(result: Result) -> Iterator[tuple[str, Sequence[tuple[str, float]], str]]:

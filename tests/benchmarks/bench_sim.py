@@ -22,7 +22,7 @@ TICKS = 1250
 
 
 def follow() -> float:
-    """Give the seconds that one minute of following takes, start-up included."""
+    """Return the seconds that one minute of following takes, start-up included."""
     begin = perf_counter()
     arguments = ["sim", "follow", "--leader", "circle", "--duration", "60", "--format", "csv"]
     subprocess.run([*TOOL, *arguments], cwd=ROOT, check=True, capture_output=True)
@@ -30,7 +30,7 @@ def follow() -> float:
 
 
 def many() -> float:
-    """Give the turtle-ticks a second of ten thousand followers."""
+    """Return the turtle-ticks a second of ten thousand followers."""
     generator = np.random.default_rng(1)
     spawn = generator.uniform((0.0, 0.0, -3.0), (11.0, 11.0, 3.0), size=(FOLLOWERS, 3))
     begin = perf_counter()

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.text.cells import Cells, split_blank, split_delimited
-from frametool.text.fixed import fixed_spans, format_fixed
+from frametool.text.fixed import fixed_spans
 from frametool.text.parse import parse_floats
-from frametool.text.shortest import format_shortest, shortest_spans
+from frametool.text.shortest import shortest_spans
 from frametool.text.spans import Spans, join
 
 if TYPE_CHECKING:
@@ -85,12 +85,16 @@ def six_decimals(values: Floats, separators: bytes) -> Spans:
     return fixed_spans(values, 6, separators)
 
 
+def shortest(values: Floats) -> bytes:
+    return join([shortest_spans(values, b",,\n")])
+
+
 def print_floats() -> None:
     print("floats to text, ns a float")
     for name, values in PRINTED.items():
-        ours = best(partial(format_shortest, values, b",,\n"), values.size)
+        ours = best(partial(shortest, values), values.size)
         report(f"shortest, {name}", ours, "repr", best(partial(by_repr, values), values.size))
-    ours = best(lambda: format_fixed(FULL, 6, b",,\n"), FULL.size)
+    ours = best(lambda: join([fixed_spans(FULL, 6, b",,\n")]), FULL.size)
     report("fixed, 6 decimals", ours, "one bulk %", best(lambda: by_percent(FULL), FULL.size))
 
 

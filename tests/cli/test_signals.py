@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import pty
 import signal
 import subprocess
+import termios
+from threading import Thread
 from typing import TYPE_CHECKING
 
 import pytest
@@ -85,3 +88,30 @@ def test_a_result_and_its_plot_are_two_files(tmp_path: Path) -> None:
         )  # fmt: skip
         assert (done.returncode, b"the same file" in done.stderr) == (2, True)
     assert os.listdir(tmp_path) == ["link.svg"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("arguments", [["follow", "--live", "--duration", "inf"], ["teleop"]], ids=["live", "teleop"])
+def test_a_terminal_is_as_before(number: int, arguments: list[str]) -> None:
+    ours, theirs = pty.openpty()
+    before = termios.tcgetattr(theirs)
+    environment = ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "80", "LINES": "24"}
+    with subprocess.Popen(
+        [*TOOL, "sim", *arguments], stdin=theirs, stdout=theirs, stderr=theirs, env=environment,
+        preexec_fn=_by_default,  # noqa: PLW1509 - no thread is running yet
+    ) as tool:
+        drawn = b""
+        while b"\x1b[?25l" not in drawn or drawn.count(b"turtle2") < 2:  # it is drawing, without a cursor
+            drawn += os.read(ours, 1 << 16)
+        tool.send_signal(number)
+        while b"\x1b[?25h" not in drawn[drawn.rindex(b"\x1b[?25l") :]:
+            drawn += os.read(ours, 1 << 16)
+        Thread(target=drain, args=(ours,), daemon=True).start()
+        assert tool.wait() == (130 if number == signal.SIGINT else -number)
+    assert termios.tcgetattr(theirs) == before
+
+
+def drain(terminal: int) -> None:
+    """Read what a program still draws, so that it can end."""
+    while os.read(terminal, 1 << 16):
+        pass

@@ -10,24 +10,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from shell import ENVIRONMENT, in_shell, run, start
 
-ROOT = Path(__file__).parents[2]
-TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
 MOVE = ["apply", "--transform", "{xyz: [1, 2, 3]}"]
 ROWS = b"id,x,y,z\n007,1,2,3\n"
 MOVED = b"id,x,y,z\n007,2.0,4.0,6.0\n"
-
-
-def start(*arguments: str, **options: object) -> subprocess.Popen[bytes]:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
-    return subprocess.Popen([*TOOL, *arguments], env=environment, **pipes)  # type: ignore[call-overload, no-any-return]
-
-
-def run(*arguments: str, text: bytes = b"") -> tuple[int, bytes, bytes]:
-    process = start(*arguments)
-    out, err = process.communicate(text)
-    return process.returncode, out, err
 
 
 @pytest.mark.parametrize("line", [b"1,2,3\n", b'{"x": 1, "y": 2, "z": 3}\n'])
@@ -96,8 +83,7 @@ def test_a_form_is_told_only_when_it_was_found_out() -> None:
 def test_a_few_records_need_no_numpy() -> None:
     code = "import sys; from frametool.cli import run; run(['invert', '-']); print('numpy' in sys.modules, file=sys.stderr)"
     record = b"name: a\nparent: b\nxyz: [1, 2, 3]\n"
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, "-c", code], input=record, capture_output=True, check=True, env=environment)
+    done = subprocess.run([sys.executable, "-c", code], input=record, capture_output=True, check=True, env=ENVIRONMENT)
     assert done.stdout == b"name: b\nparent: a\nxyz: [-1.0, -2.0, -3.0]\n"
     assert done.stderr == b"False\n"
 
@@ -137,20 +123,13 @@ def test_a_pipe_given_by_its_name_loses_nothing(tmp_path: Path) -> None:
         assert process.communicate()[0] == MOVED
 
 
-def in_shell(redirection: str, *arguments: str, text: bytes = ROWS) -> tuple[int, bytes, bytes]:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = ["sh", "-c", f'exec "$@" {redirection}', "sh", *TOOL, *arguments]
-    done = subprocess.run(command, input=text, capture_output=True, check=False, env=environment)
-    return done.returncode, done.stdout, done.stderr
-
-
 def test_a_closed_input_is_told() -> None:
     for arguments in (MOVE, ["invert"]):
-        assert in_shell("<&-", *arguments) == (5, b"", b"frametool: standard input is closed\n")
+        assert in_shell("<&-", *arguments, text=ROWS) == (5, b"", b"frametool: standard input is closed\n")
 
 
 def test_what_nobody_is_told_does_not_change_the_data() -> None:
-    assert in_shell("2>&-", *MOVE) == (0, MOVED, b"")
+    assert in_shell("2>&-", *MOVE, text=ROWS) == (0, MOVED, b"")
     assert in_shell("2>/dev/full", *MOVE, "--on-error", "skip", text=ROWS + b"8,1,2,?\n") == (3, MOVED, b"")
 
 
@@ -158,21 +137,6 @@ def test_what_nobody_is_told_does_not_change_the_data() -> None:
 def test_a_full_device_is_told_by_its_name() -> None:
     message = b"frametool: /dev/full: no space left on device\n"
     assert run(*MOVE, "-o", "/dev/full", text=ROWS) == (5, b"", message)
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_who_is_ended_leaves_no_half_file(number: int, tmp_path: Path) -> None:
-    with start(*MOVE, "-v", "-o", str(tmp_path / "out.csv")) as process:
-        assert process.stdin is not None
-        process.stdin.write(ROWS)
-        process.stdin.flush()
-        while not list(tmp_path.iterdir()):
-            assert process.poll() is None
-        while b"\n" not in next(tmp_path.iterdir()).read_bytes():
-            assert process.poll() is None
-        process.send_signal(number)
-        assert process.wait() == -number
-    assert list(tmp_path.iterdir()) == []
 
 
 TREE = "frames: [{name: cam, parent: map, xyz: [1, 0, 0]}, {name: lid, parent: map, xyz: [2, 0, 0]}]\n"

@@ -16,7 +16,7 @@ import pytest
 from frametool.sim.controllers import FollowController
 from frametool.sim.leaders import scripted
 from frametool.sim.scene import tutorial
-from frametool.sim.simulate import Step, simulate
+from frametool.sim.simulate import SimulationStep, simulate
 from frametool.sim.turtle import SIZE, Twist
 
 GOLDEN = Path(__file__).parents[1] / "golden"
@@ -28,13 +28,13 @@ SCENARIOS = {scenario["name"]: scenario for scenario in DYNAMICS["scenarios"]}
 
 
 @pytest.fixture(scope="module")
-def played() -> dict[str, list[Step]]:
-    """Play every trace once."""
+def runs() -> dict[str, list[SimulationStep]]:
+    """Run every trace once."""
     return {name: list(simulate(scene_of(trace))) for name, trace in TRACES.items()}
 
 
 def scene_of(trace: dict[str, Any]) -> Any:
-    """Set the scene of a trace."""
+    """Return the scene of a trace."""
     law = FollowController(
         rate=1000.0 / trace["period_ms"], gain_linear=trace["gain_linear"], gain_angular=trace["gain_angular"]
     )
@@ -42,8 +42,8 @@ def scene_of(trace: dict[str, Any]) -> Any:
     return tutorial(leader=leader, law=law, spawn=tuple(trace["spawn"]))
 
 
-def walls(steps: list[Step]) -> list[tuple[float, float, float]]:
-    """Give time and place of every wall hit."""
+def walls(steps: list[SimulationStep]) -> list[tuple[float, float, float]]:
+    """Return time and place of every wall hit."""
     return [(hit.t_ns / 1e9, hit.place.x, hit.place.y) for step in steps for hit in step.walls]
 
 
@@ -54,8 +54,8 @@ def recorded_walls(warnings: list[list[Any]]) -> list[Any]:
 
 
 @pytest.mark.parametrize("name", TRACES)
-def test_commands_and_states_are_those_of_the_recorded_trace(name: str, played: dict[str, list[Step]]) -> None:
-    commands = [command for step in played[name] for command in step.commands]
+def test_commands_and_states_are_those_of_the_recorded_trace(name: str, runs: dict[str, list[SimulationStep]]) -> None:
+    commands = [command for step in runs[name] for command in step.commands]
     rows = [
         [each.t_ns / MILLISECOND, each.twist.linear_x, each.twist.angular_z, *(each.leader or ()), *each.state]
         for each in commands
@@ -64,12 +64,12 @@ def test_commands_and_states_are_those_of_the_recorded_trace(name: str, played: 
 
 
 @pytest.mark.parametrize("name", TRACES)
-def test_walls_are_hit_at_the_recorded_ticks(name: str, played: dict[str, list[Step]]) -> None:
-    assert walls(played[name]) == recorded_walls(TRACES[name]["walls"])
+def test_walls_are_hit_at_the_recorded_ticks(name: str, runs: dict[str, list[SimulationStep]]) -> None:
+    assert walls(runs[name]) == recorded_walls(TRACES[name]["walls"])
 
 
-def test_poses_are_the_recorded_float32_ones_at_every_tick(played: dict[str, list[Step]]) -> None:
-    steps = [step for step in played["ros1_spawn_4_2"] if step.is_tick and step.t_ns]
+def test_poses_are_the_recorded_float32_ones_at_every_tick(runs: dict[str, list[SimulationStep]]) -> None:
+    steps = [step for step in runs["ros1_spawn_4_2"] if step.is_tick and step.t_ns]
     rows = [[step.t_ns / MILLISECOND, *step.poses["turtle1"], *step.poses["turtle2"]] for step in steps]
     assert rows == [pytest.approx(row, abs=1e-6) for row in TRACES["ros1_spawn_4_2"]["ticks"]]
 

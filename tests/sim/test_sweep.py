@@ -1,4 +1,4 @@
-"""Many followers at once against the same ones one by one."""
+"""SweepResult followers at once against the same ones one by one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from frametool.errors import ValueInvalid
 from frametool.sim import sweep
 from frametool.sim.controllers import FollowController
-from frametool.sim.progress import Progress
+from frametool.sim.run_summary import RunSummary
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
 from frametool.sim.sweep import grid, rows, simulate_many
@@ -27,7 +27,7 @@ def test_many_followers_are_each_what_one_alone_is(law: str, leader: str) -> Non
     for index in range(6):
         controller = FollowController(law, gain_linear=gains[index], max_angular=2.0)
         scene = tutorial(leader=leader, law=controller, spawn=tuple(spawn[index].tolist()), duration=8.0)
-        progress, last = Progress(scene), None
+        progress, last = RunSummary(scene), None
         for step in simulate(scene):
             progress.watch(step)
             last = step if step.is_tick else last

@@ -9,17 +9,17 @@ import pytest
 from frametool.errors import ValueInvalid
 from frametool.sim.controllers import LAWS, FollowController
 from frametool.sim.leaders import LEADERS, Heading, Mailbox, Script, built_in, scripted
-from frametool.sim.progress import Progress
-from frametool.sim.scene import Actor, Call, Follow, Scene, tutorial
-from frametool.sim.simulate import Stage, Step, Ticker, simulate
-from frametool.sim.turtle import CENTRE, SIZE, TICK_NS, TIMEOUT_NS, State, Turtle, Twist, single
+from frametool.sim.run_summary import RunSummary
+from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall, tutorial
+from frametool.sim.simulate import Simulation, SimulationStep, simulate
+from frametool.sim.turtle import CENTRE, SIZE, TICK_NS, TIMEOUT_NS, Turtle, TurtleState, Twist, single
 from frametool.sim.world import ServiceRefused, World
 
 SECOND = 1_000_000_000
 
 
 def walked(turtle: Turtle, ticks: int, begin: int = 1) -> Turtle:
-    """Let a turtle live through some ticks."""
+    """Advance a turtle by some ticks."""
     for tick in range(begin, begin + ticks):
         turtle.update(tick * TICK_NS)
     return turtle
@@ -150,7 +150,7 @@ def test_reset_leaves_turtle1_in_the_centre() -> None:
     for _ in range(3):
         world.spawn(1.0, 1.0)
     world.call("reset")
-    assert [(name, turtle.state) for name, turtle in world.turtles.items()] == [("turtle1", State(CENTRE, CENTRE, 0.0))]
+    assert [(name, turtle.state) for name, turtle in world.turtles.items()] == [("turtle1", TurtleState(CENTRE, CENTRE, 0.0))]
     assert world.spawn() == "turtle2"
 
 
@@ -176,9 +176,9 @@ def test_a_wrong_call_says_what_is_wrong(service: str, arguments: dict[str, floa
 # --- the follower --------------------------------------------------------------------------------------------------
 
 
-def last_of(scene: Scene) -> tuple[Progress, Step]:
-    """Play a scene; give what it came to and its last tick."""
-    progress = Progress(scene)
+def last_of(scene: Scene) -> tuple[RunSummary, SimulationStep]:
+    """Run a scene; return its summary and its last tick."""
+    progress = RunSummary(scene)
     last = None
     for step in simulate(scene):
         progress.watch(step)
@@ -188,7 +188,7 @@ def last_of(scene: Scene) -> tuple[Progress, Step]:
 
 
 def commands(scene: Scene) -> list[Twist]:
-    """Give all commands of a scene's followers."""
+    """Return all commands of a scene's followers."""
     return [command.twist for step in simulate(scene) for command in step.commands]
 
 
@@ -231,7 +231,7 @@ def test_control_steps_do_not_drift(rate: float) -> None:
 
 
 def test_a_run_that_never_began_has_no_distances() -> None:
-    assert list(Progress(tutorial()).lines()) == ["ended before the first step"]
+    assert list(RunSummary(tutorial()).lines()) == ["ended before the first step"]
 
 
 def test_a_chain_of_followers_converges() -> None:
@@ -265,7 +265,7 @@ def test_a_delay_beyond_ten_seconds_is_kept_in_the_buffer() -> None:
 
 
 def test_a_killed_leader_is_followed_until_its_last_transform_is_forgotten() -> None:
-    scene = tutorial(leader="circle", duration=15.0)._replace(calls=[Call(SECOND, "kill", {"name": "turtle1"})])
+    scene = tutorial(leader="circle", duration=15.0)._replace(calls=[ServiceCall(SECOND, "kill", {"name": "turtle1"})])
     steps = list(simulate(scene))
     last = max(step.t_ns for step in steps if step.commands)
     assert 10.5 * SECOND < last < 11.5 * SECOND
@@ -273,18 +273,18 @@ def test_a_killed_leader_is_followed_until_its_last_transform_is_forgotten() -> 
 
 
 def test_a_killed_follower_commands_no_more() -> None:
-    scene = tutorial(duration=3.0)._replace(calls=[Call(SECOND, "kill", {"name": "turtle2"})])
+    scene = tutorial(duration=3.0)._replace(calls=[ServiceCall(SECOND, "kill", {"name": "turtle2"})])
     assert max(step.t_ns for step in simulate(scene) if step.commands) <= SECOND + TICK_NS
 
 
-def test_a_refused_call_is_logged_and_the_play_goes_on() -> None:
-    scene = tutorial(duration=2.0)._replace(calls=[Call(SECOND, "spawn", {"x": 1.0, "y": 1.0, "name": "turtle2"}, "here")])
+def test_a_refused_call_is_logged_and_the_run_goes_on() -> None:
+    scene = tutorial(duration=2.0)._replace(calls=[ServiceCall(SECOND, "spawn", {"x": 1.0, "y": 1.0, "name": "turtle2"}, "here")])
     log = [line for step in simulate(scene) for line in step.log]
     assert log == ["here: A turtled named [turtle2] already exists"]
 
 
 def test_a_turtle_cannot_follow_itself() -> None:
-    scene = Scene([Actor("a", (1.0, 1.0, 0.0), Follow("a", FollowController()))])
+    scene = Scene([SceneTurtle("a", (1.0, 1.0, 0.0), Follow("a", FollowController()))])
     with pytest.raises(ValueInvalid, match="cannot follow itself"):
         list(simulate(scene))
 
@@ -330,7 +330,7 @@ def test_a_mailbox_gives_the_newest_command_that_is_due_and_turns_to_headings() 
     assert last_of(scene)[1].poses["turtle1"].angular_velocity == 1.0
 
 
-def test_closing_a_mailbox_ends_the_play() -> None:
+def test_closing_a_mailbox_ends_the_run() -> None:
     mailbox = Mailbox()
     steps = simulate(tutorial(leader=lambda: mailbox, duration=None))
     next(steps)
@@ -350,12 +350,13 @@ def test_a_mailbox_tells_what_went_wrong_while_it_was_filled() -> None:
             pass
 
 
-def test_an_endless_play_keeps_ten_seconds_of_transforms() -> None:
+def test_an_endless_run_keeps_ten_seconds_of_transforms() -> None:
     scene = tutorial(leader="circle", duration=None)
-    stage, ticker = Stage(scene), Ticker()
+    simulation = Simulation(scene)
     for tick in range(2500):
-        ticker.act(tick * TICK_NS, stage, Step(tick * TICK_NS))
-    track = stage.buffer.track("turtle1")
+        simulation.step = SimulationStep(tick * TICK_NS)
+        simulation.tick()
+    track = simulation.buffer.track("turtle1")
     assert track is not None
     assert track.count <= 10 * SECOND // TICK_NS + 2
 

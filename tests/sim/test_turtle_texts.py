@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from typing import TYPE_CHECKING
 
 import pytest
@@ -9,12 +10,15 @@ import yaml
 
 from frametool.documents.source import Source
 from frametool.errors import FormatError
-from frametool.sim.command_file import read_script, read_twists
-from frametool.sim.leaders import KEYS
-from frametool.sim.scene import tutorial
+from frametool.grammar.result import Style
+from frametool.sim.command_file import read_commands, read_script
+from frametool.sim.controllers import FollowController
+from frametool.sim.leaders import KEYS, scripted
+from frametool.sim.run_summary import RunSummary
+from frametool.sim.scene import Follow, tutorial
 from frametool.sim.scene_file import read_scene
 from frametool.sim.simulate import simulate
-from frametool.sim.step_writer import EMITS, FORMS, Writer, table
+from frametool.sim.step_writer import EMITS, FORMS, StepWriter, table
 from frametool.sim.turtle import CENTRE, Twist
 
 if TYPE_CHECKING:
@@ -47,7 +51,7 @@ def test_a_leader_file_is_read_in_any_form(text: str) -> None:
 
 
 def test_twist_messages_and_keys_follow_one_another_a_period_apart() -> None:
-    commands = list(read_twists((ECHO + "up\nLEFT\n" + ECHO).splitlines(keepends=True), "stdin"))
+    commands = list(read_commands((ECHO + "up\nLEFT\n" + ECHO).splitlines(keepends=True), "stdin"))
     assert commands == [
         (0, Twist(2.0, 1.8)), (SECOND, KEYS["up"]), (2 * SECOND, KEYS["left"]), (3 * SECOND, Twist(2.0, 1.8)),
     ]  # fmt: skip
@@ -58,7 +62,7 @@ def test_a_stream_is_read_one_command_at_a_time() -> None:
         yield "up\n"
         raise AssertionError("read ahead")
 
-    assert next(read_twists(lines(), "stdin")) == (0, KEYS["up"])
+    assert next(read_commands(lines(), "stdin")) == (0, KEYS["up"])
 
 
 @pytest.mark.parametrize(
@@ -115,7 +119,7 @@ def test_a_scene_is_read() -> None:
     scene = read_scene(Source("scene.yaml", SCENE))
     follow = scene.followers["b"]
     assert (scene.duration_ns, scene.variant, scene.holonomic) == (2_500_000_000, "ros2", True)
-    assert [actor.spawn for actor in scene.actors] == [
+    assert [actor.spawn for actor in scene.turtles] == [
         (CENTRE, CENTRE, 0.0), pytest.approx((1.0, 2.0, 1.5707963267948966)), (3.0, 4.0, 0.0),
     ]  # fmt: skip
     assert (follow.leader, follow.target, follow.delay_ns) == ("turtle1", "carrot", SECOND // 2)
@@ -124,7 +128,7 @@ def test_a_scene_is_read() -> None:
     assert scene.calls[2].arguments == {"turtle": "b", "r": 255.0, "off": 1.0}
 
 
-def test_a_scene_is_played() -> None:
+def test_a_scene_is_run() -> None:
     steps = [step for step in simulate(read_scene(Source("scene.yaml", SCENE))) if step.is_tick]
     assert [[*step.poses] for step in (steps[0], steps[-1])] == [["b", "c", "turtle1"], ["b", "d", "turtle1"]]
     assert steps[-1].pens["b"].off
@@ -182,8 +186,8 @@ def test_a_mistake_in_a_scene_is_placed(text: str, message: str) -> None:
 
 
 def written(emit: str, form: str) -> str:
-    """Give a short play as text."""
-    writer = Writer(emit, form)
+    """Return a short run as text."""
+    writer = StepWriter(emit, Style(form))
     return "".join(text for step in simulate(tutorial(leader="circle", duration=0.2)) for text in writer.write(step))
 
 
@@ -195,7 +199,7 @@ def test_yaml_and_json_say_the_same(emit: str) -> None:
 
 
 def test_a_message_of_several_turtles_says_whose_it_is() -> None:
-    writer = Writer("commands", "yaml", labelled=True)
+    writer = StepWriter("commands", Style("yaml"), labelled=True)
     texts = [text for step in simulate(tutorial(followers=2, duration=0.0)) for text in writer.write(step)]
     assert [text.splitlines()[0] for text in filter(None, texts)] == ["# turtle2 at 0.0 s", "# turtle3 at 0.0 s"]
     assert len(read_script(Source("commands", "".join(texts)))) == 2
@@ -214,19 +218,49 @@ def test_a_leader_reads_what_a_follower_commanded() -> None:
     given = [each for step in simulate(tutorial(duration=0.2)) for each in step.commands]
     expected = [(each.t_ns, each.twist) for each in given]
     for form in ("json", "csv"):
-        writer = Writer("commands", form)
+        writer = StepWriter("commands", Style(form))
         text = "".join(part for step in simulate(tutorial(duration=0.2)) for part in writer.write(step))
         assert read_script(Source("commands", text)) == expected
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_table_shows_what_is_missing(form: str) -> None:
-    text = table([{"gain": 0.5, "time": None, "hits": 3}], form)
+    text = table([{"gain": 0.5, "time": None, "hits": 3}], Style(form))
     assert {"text": "-", "yaml": "null", "json": "null", "csv": ",,"}[form] in text
 
 
 def test_every_row_of_a_yaml_table_has_one_line_whatever_is_missing() -> None:
     table_rows: list[dict[str, float | None]] = [{"gain": 0.5, "time": None}, {"gain": 1e-5, "time": 2.0}]
-    text = table(table_rows, "yaml")
+    text = table(table_rows, Style("yaml"))
     assert text.splitlines() == ["- {gain: 0.5, time: null}", "- {gain: 1.0e-05, time: 2.0}"]
     assert yaml.safe_load(text) == table_rows
+
+
+@pytest.mark.parametrize("name", ["a,b", 'a"b', "a\nb", " a", "world,"])
+def test_a_turtles_name_is_quoted_in_csv_where_a_reader_would_split_it(name: str) -> None:
+    scene = tutorial(duration=0.2)
+    turtles = [scene.turtles[0], scene.turtles[1]._replace(name=name)]
+    steps = list(simulate(scene._replace(turtles=turtles)))
+    writer = StepWriter("commands", Style("csv"))
+    text = "".join(part for step in steps for part in writer.write(step))
+    rows = list(csv.reader(text.splitlines(keepends=True)))
+    assert {len(row) for row in rows} == {10 + 1}
+    assert {row[1] for row in rows[1:]} == {name}
+    assert read_script(Source("commands", text)) == [(each.t_ns, each.twist) for step in steps for each in step.commands]
+
+
+def test_a_name_with_control_characters_reaches_no_terminal_raw() -> None:
+    scene = tutorial(followers=1, duration=2.0, leader=scripted([(0, Twist(30.0, 0.0))]))
+    leader, follower = scene.turtles
+    names = [leader._replace(name="a\x1b[31m"), follower._replace(name="b\n\x07", driver=Follow("a\x1b[31m", FollowController()))]
+    scene = scene._replace(turtles=names)
+    summary, texts = RunSummary(scene), []
+    writers = [StepWriter("commands", Style(form), labelled=True) for form in ("text", "yaml")]
+    for step in simulate(scene):
+        summary.watch(step)
+        texts += [text for writer in writers for text in writer.write(step)]
+        texts += map(str, step.walls)
+    shown = "".join([*texts, *summary.lines()])
+    assert "a\\x1b[31m" in shown
+    assert not {"\x1b", "\x07"} & set(shown)
+    assert all(text.startswith("# b\\n\\x07 at ") for text in texts if text.startswith("#"))

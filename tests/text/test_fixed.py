@@ -6,11 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numbers_at_hand import HOSTILE, random_bits
 
-from frametool.text.fixed import format_fixed
+from frametool.text.fixed import fixed_spans
+from frametool.text.spans import join
 
 
 def lines(values: list[float], precision: int) -> list[str]:
-    return format_fixed(np.array(values, np.float64).reshape(-1, 1), precision, b"\n").decode().splitlines()
+    return join([fixed_spans(np.array(values, np.float64).reshape(-1, 1), precision, b"\n")]).decode().splitlines()
 
 
 def by_percent(values: list[float], precision: int) -> list[str]:
@@ -40,16 +41,16 @@ def test_decimal_halves_go_where_their_float_lies(digits: int, precision: int) -
 
 
 def test_rows_are_written_with_the_separator_of_each_column() -> None:
-    assert format_fixed(np.array([[1.0, -0.0], [1e20, -2.5]]), 1, b",\n") == b"1.0,-0.0\n100000000000000000000.0,-2.5\n"
+    assert join([fixed_spans(np.array([[1.0, -0.0], [1e20, -2.5]]), 1, b",\n")]) == b"1.0,-0.0\n100000000000000000000.0,-2.5\n"
 
 
 def test_no_rows_are_no_text() -> None:
-    assert format_fixed(np.empty((0, 2)), 6, b",\n") == b""
+    assert join([fixed_spans(np.empty((0, 2)), 6, b",\n")]) == b""
 
 
 def test_a_separator_for_each_column_is_demanded() -> None:
     with pytest.raises(ValueError, match="1 columns, but 2 separators"):
-        format_fixed(np.empty((4, 1)), 6, b",\n")
+        join([fixed_spans(np.empty((4, 1)), 6, b",\n")])
 
 
 @pytest.mark.large
@@ -58,3 +59,10 @@ def test_many_floats_are_written_as_percent_writes_them(precision: int) -> None:
     rng = np.random.default_rng(precision)
     values = [*random_bits(50_000), *(rng.uniform(-1, 1, 50_000) * 10.0 ** rng.integers(-8, 16, 50_000)).tolist()]
     assert lines(values, precision) == by_percent(values, precision)
+
+
+@pytest.mark.parametrize("precision", range(19))
+def test_zero_keeps_its_sign_as_it_does_in_python(precision: int) -> None:
+    values = [-0.0, 0.0, -5e-324, -0.4, -0.5, -0.05, -1e-7, 1e300, -1e22]
+    for some in (values, values[:1], values[:2] * 20):
+        assert lines(some, precision) == by_percent(some, precision)

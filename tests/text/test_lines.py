@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from frametool.errors import FormatError
-from frametool.text.cells import whole_records
+from frametool.text.cells import RecordEnds, whole_records
 from frametool.text.lines import read_blocks
 
 
@@ -34,6 +34,57 @@ def test_records_of_several_lines_stay_whole() -> None:
     assert all(block.count(b'"') % 2 == 0 for block in blocks)
 
 
+class Trickle(io.BytesIO):
+    """A stream that gives at most so many bytes at a time."""
+
+    def __init__(self, text: bytes, most: int) -> None:
+        super().__init__(text)
+        self.most = most
+
+    def read1(self, size: int | None = -1, /) -> bytes:
+        return super().read1(min(size or 0, self.most))
+
+
+RECORDS = [
+    b'a,"b\n\nc",d\n', b"1,2\n", b'"x ""y""\n",",\n"\n', b'5" pipe,b\n', b'"\n\n\n\n\n\n\n\n\n"\n', b'"a"b"c,"\n"\n', b"\n",
+]  # fmt: skip
+
+
+@given(st.lists(st.sampled_from(RECORDS), max_size=8), st.integers(1, 40), st.integers(1, 40))
+def test_blocks_end_where_records_do_however_the_stream_is_cut(rows: list[bytes], most: int, size: int) -> None:
+    blocks = list(read_blocks(Trickle(b"".join(rows), most), size=size, whole=RecordEnds(b",")))
+    ends = {sum(map(len, rows[:count])) for count in range(len(rows) + 1)}
+    assert b"".join(blocks) == b"".join(rows)
+    assert {sum(map(len, blocks[:count])) for count in range(len(blocks) + 1)} <= ends
+
+
+@pytest.mark.parametrize("record", [b"x" * 99 + b"\n", b'"' + b"\n" * 97 + b'"\n', b'"' + b'""\n' * 32 + b'"\n'])
+@pytest.mark.parametrize("longest", [120, 105, 101, 99, 98, 60, 30])
+def test_the_longest_record_is_the_same_however_the_stream_is_cut(record: bytes, longest: int) -> None:
+    for most in (1, 2, 7, 64, 1000):
+        for size in (1, 3, 50, 1000):
+            blocks = read_blocks(Trickle(b"a,b\n" + record + b"c\n", most), size=size, longest=longest, whole=RecordEnds(b","))
+            if len(record) <= longest:
+                assert b"".join(blocks) == b"a,b\n" + record + b"c\n"
+            else:
+                with pytest.raises(FormatError, match=f"longer than {longest} bytes"):
+                    list(blocks)
+
+
+@pytest.mark.parametrize("record", [b"x" * 20_000 + b"\n", b'"' + b"\n" * 20_000 + b'"\n', b'"",' * 5000 + b'"\n\n"\n'])
+@pytest.mark.parametrize("most", [1, 10])
+def test_bytes_that_arrive_one_by_one_are_looked_at_twice_at_most(record: bytes, most: int) -> None:
+    seen = []
+    ends = RecordEnds(b",")
+
+    def whole(text: bytes) -> int:
+        seen.append(len(text))
+        return ends(text)
+
+    assert b"".join(read_blocks(Trickle(record, most), whole=whole)) == record
+    assert sum(seen) <= 2 * len(record) + most
+
+
 def test_a_typed_line_comes_out_while_the_stream_stays_open() -> None:
     reading, writing = os.pipe()
     with os.fdopen(reading, "rb") as stream, os.fdopen(writing, "wb", buffering=0) as typist:
@@ -47,13 +98,9 @@ def test_a_typed_line_comes_out_while_the_stream_stays_open() -> None:
 
 
 def test_pieces_that_have_arrived_are_read_into_one_block(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Pipe(io.BytesIO):
-        def read1(self, size: int | None = -1, /) -> bytes:
-            return super().read1(min(size or 0, 1 << 16))
-
     monkeypatch.setattr("frametool.text.lines._readiness", lambda _stream: lambda _patience: True)
     text = b"0123456\n" * 100_000
-    blocks = list(read_blocks(Pipe(text)))
+    blocks = list(read_blocks(Trickle(text, 1 << 16)))
     assert b"".join(blocks) == text
     assert len(blocks[0]) > 1 << 16
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import math
+import re
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from frametool.errors import ValueInvalid
-from frametool.text.numbers import parse_angle, parse_number
+from frametool.text.numbers import parse_angle, parse_number, shown
 
 NUMBERS = {
     "1e-3": 0.001,
@@ -117,3 +119,32 @@ def test_any_text_is_a_finite_number_or_refused_in_one_line(text: str) -> None:
             assert math.isfinite(parse(text))
         except ValueInvalid as error:
             assert "\n" not in str(error)  # noqa: PT017 - either outcome is right
+
+
+LONG = 100_000  # with work that grew with the square of the length, each of these would take minutes
+LONG_TEXTS = [
+    "1" * LONG + "pi/" + "2" * LONG + "x", "1_" * LONG + "x", "_" * LONG + "x", "1" * LONG + "x", "1 " * LONG + "x",
+    " " * LONG + "1" + " " * LONG + "x", "5" + " " * LONG + "\n", "1:" * LONG + "x", "1," * LONG, "." * LONG, "-" * LONG,
+    "$" * LONG, "1" * LONG + "e", "1pi" + " " * LONG, "0x" + "_" * LONG + "g", "1." * LONG, "1e" * LONG, "\0" * LONG,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", LONG_TEXTS, ids=[f"{text[:4]!r} {number}" for number, text in enumerate(LONG_TEXTS)])
+def test_long_texts_are_refused_in_time_that_grows_with_their_length(text: str) -> None:
+    for parse in (parse_number, parse_angle):
+        with pytest.raises(ValueInvalid):
+            parse(text)
+
+
+@given(some.text(max_size=200))
+@settings(deadline=None)
+def test_what_is_quoted_is_at_most_60_characters_escapes_included(text: str) -> None:
+    quoted = re.sub(r"\.\.\. \([0-9]+ characters\)$", "", shown(text))
+    assert len(quoted) <= 62
+    assert quoted == repr(text) or text.startswith(ast.literal_eval(quoted))
+
+
+@pytest.mark.parametrize("text", ["\x1b[31m" * 20, "\0" * 61, "\u202e" * 30, "x" * 61, "\U0001f600" * 59 + "\n\n"])
+def test_a_quote_is_cut_between_characters_and_says_how_many_there_are(text: str) -> None:
+    assert len(shown(text)) <= 62 + len(f"... ({len(text)} characters)")
+    assert shown(text).endswith(f"... ({len(text)} characters)")

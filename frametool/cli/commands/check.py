@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Command
+from frametool.cli.command import FILE, Command, verbose_option
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import opened, topic_option, verbose_option
+from frametool.cli.trees import opened, topic_option
 from frametool.lint.findings import RULES, WRITERS
 from frametool.lint.rules import check
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Command, result_options, rotation_options
+from frametool.cli.command import FILE, Command, result_options, rotation_options, verbose_option
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.cli.times import Time, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option, verbose_option
+from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
 from frametool.errors import NoDataAt
 from frametool.grammar.looked_up import result_at
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, Command, result_options
+from frametool.cli.command import FILE, TEXT, Command, result_options, verbose_option
 from frametool.cli.output import Output
-from frametool.cli.trees import opened, topic_option, verbose_option
+from frametool.cli.trees import opened, topic_option
 from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:

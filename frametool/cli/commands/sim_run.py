@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from frametool.cli.command import TEXT, Command
-from frametool.cli.commands.sim_follow import Duration, duration_ns
 from frametool.cli.poses import source_of, usage_if_inline
-from frametool.cli.sim_output import Show, play_options
+from frametool.cli.sim_options import Duration
+from frametool.cli.sim_output import SimOutput, output_options
 from frametool.cli.stderr import say
 from frametool.errors import FormatError
 from frametool.frames.stamps import BILLION
+from frametool.sim.scene import duration_ns
 from frametool.sim.scene_file import read_scene
-from frametool.sim.turtle import TICK_NS
-
-if TYPE_CHECKING:
-    from frametool.sim.scene import Scene
 
 
 @click.command(cls=Command, name="run")
 @click.argument("scene", type=TEXT)
 @click.option("--duration", type=Duration(), metavar="S", help="simulated seconds, or inf  [default: the scene's]")
 @click.option("--seed", type=click.IntRange(0), help="of random leaders  [default: the scene's]")
-@play_options
+@output_options
 def command(scene: str, duration: float | None, seed: int | None, **options: Any) -> None:
-    """Play SCENE, a YAML or JSON file, and print the followers' velocity commands.
+    """Run SCENE, a YAML or JSON file, and print the followers' velocity commands.
 
     \b
       frametool sim run turtles.yaml
@@ -44,22 +41,14 @@ def command(scene: str, duration: float | None, seed: int | None, **options: Any
     law, rate, gain_linear, gain_angular, max_linear, max_angular, target, delay. Events are turtlesim's services:
     spawn, kill, reset, clear, teleport_absolute, teleport_relative, rotate_absolute (ROS 2), set_pen.
     """
-    show = Show(**options)
+    output = SimOutput(**options)
     try:
         read = read_scene(source_of(scene), seed=seed)
     except FormatError as error:
         raise usage_if_inline(error) from None
-    scene_now = read if duration is None else read._replace(duration_ns=duration_ns(duration))
-    _warn_of_late(scene_now)
-    show.play(scene_now)
-
-
-def _warn_of_late(scene: Scene) -> None:
-    """Tell of events that the end comes before; an event acts at the first tick after its time."""
-    if scene.duration_ns is None:
-        return
-    last_ns = scene.duration_ns // TICK_NS * TICK_NS
-    if late := [call for call in scene.calls if call.t_ns >= last_ns]:
-        end = f"{scene.duration_ns / BILLION:g} s"
+    chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
+    if late := chosen.late_calls():
+        end = f"{(chosen.duration_ns or 0) / BILLION:g} s"
         more = f", nor do {len(late) - 1} more" if late[1:] else ""
         say(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")
+    output.run(chosen)

@@ -6,15 +6,14 @@ from typing import Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, Text
-from frametool.cli.commands.sim_follow import NUMBER, Duration, Spawn
+from frametool.cli.command import Command, Text
 from frametool.cli.leader import leader_of
-from frametool.cli.sim_output import check_files, form_of, number_writer, suffix_of
+from frametool.cli.sim_options import LAW, LEADER, MAX_ANGULAR, MAX_LINEAR, RATE, REACH, SEED, SPAWN, Duration
+from frametool.cli.sim_output import check_files, format_options, style_of, suffix_of
 from frametool.cli.sink import writing
 from frametool.errors import ValueInvalid
-from frametool.sim.controllers import LAWS
-from frametool.sim.step_writer import FORMS, table
-from frametool.text.numbers import parse_number
+from frametool.sim.step_writer import table
+from frametool.text.numbers import parse_number, shown
 
 MOST = 10_000  # values of one gain
 
@@ -35,7 +34,7 @@ class Range(Text):
         except ValueInvalid as error:
             self.fail(str(error), param, ctx)
         except ValueError:
-            self.fail(f"expected START:STOP:COUNT, e.g. 0.1:2:20, or numbers like 0.5,1; found {value!r}", param, ctx)
+            self.fail(f"expected START:STOP:COUNT (0.1:2:20), or numbers (0.5,1); found {shown(text)}", param, ctx)
 
 
 def _spaced(start: float, stop: float, count: int) -> list[float]:
@@ -51,23 +50,16 @@ def _spaced(start: float, stop: float, count: int) -> list[float]:
               help="speeds for each metre of distance")
 @click.option("--gain-angular", type=Range(), default="1:8:20", show_default=True, metavar="START:STOP:COUNT",
               help="turn rates for each radian of bearing")
-@click.option("--leader", type=TEXT, default="still", show_default=True, metavar="NAME|FILE|-",
-              help="still, circle, square, figure8, random, a file of commands, or - for standard input")
-@click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True, help="gives the rate")
-@click.option("--rate", type=NUMBER, metavar="HZ", help="control steps a second")
-@click.option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]")
-@click.option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]")
-@click.option("--spawn", type=Spawn(), default="4,2,0", show_default=True, metavar="X,Y,THETA",
-              help="where the followers begin")
+@LEADER
+@LAW
+@RATE
+@MAX_LINEAR
+@MAX_ANGULAR
+@SPAWN
 @click.option("--duration", type=Duration(), default="20", show_default=True, metavar="S", help="simulated seconds")
-@click.option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D", help="metres that count as arrival")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader")
-@click.option("-f", "--format", "format_name", type=click.Choice(FORMS),
-              help="form of the table  [default: text on a terminal, yaml otherwise]")
-@click.option("--precision", type=click.IntRange(0, 30), metavar="N", help="digits after the point")
-@click.option("-o", "--output", type=TEXT, metavar="FILE", help="write there instead of stdout, whole or not at all")
-@click.option("--plot", type=TEXT, metavar="FILE", help="draw heat maps into a .svg, .html or .png")
-@click.option("--force", is_flag=True, help="let --output and --plot replace existing files")
+@REACH
+@SEED
+@format_options
 def command(
     gain_linear: list[float], gain_angular: list[float], leader: str, seed: int, format_name: str | None,
     precision: int | None, output: str | None, plot: str | None, force: bool, **options: Any,
@@ -84,17 +76,17 @@ def command(
     check_files(plot, output, force=force)
     from frametool.sim.sweep import grid, rows
 
+    style = style_of(format_name, output, precision)
     try:
         drive = leader_of(leader, seed, paced=False)
-        many = grid(gain_linear, gain_angular, drive, **options)
+        result = grid(gain_linear, gain_angular, drive, **options)
     except ValueInvalid as error:
         raise click.UsageError(str(error)) from None
-    records = list(rows(gain_linear, gain_angular, many))
-    text = table(records, form_of(format_name, output), number_writer(precision))
+    text = table(list(rows(gain_linear, gain_angular, result)), style)
     with writing(output, force=force) as write:
         write(text)
     if plot:
         from frametool.view import heat_map
 
         with writing(plot, force=force) as write:
-            write(heat_map.plot(gain_linear, gain_angular, many, suffix_of(plot)))
+            write(heat_map.plot(gain_linear, gain_angular, result, suffix_of(plot)))

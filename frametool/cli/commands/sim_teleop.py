@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import Command
-from frametool.cli.commands.sim_follow import follow_options, settled
-from frametool.cli.sim_output import play_options
+from frametool.cli.commands.sim_follow import output_and_scene
+from frametool.cli.sim_options import follow_options
+from frametool.cli.sim_output import output_options
 from frametool.sim.leaders import HEADINGS, KEYS, Heading, Mailbox
 
 if TYPE_CHECKING:
@@ -24,11 +25,9 @@ QUIT = b"qQ\x04"
 
 
 @click.command(cls=Command, name="teleop")
-@click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
-              help="each follows the one before, the first follows turtle1")
 @follow_options("inf")
-@play_options
-def command(followers: int, **options: Any) -> None:
+@output_options
+def command(**options: Any) -> None:
     """Drive turtle1 with the arrow keys, as turtle_teleop_key does; turtle2 follows. Drawn in the terminal; q ends it.
 
     \b
@@ -42,9 +41,9 @@ def command(followers: int, **options: Any) -> None:
     if not sys.stdin.isatty():
         raise click.UsageError("standard input is no terminal; pipe key names into frametool sim follow --leader -")
     mailbox = Mailbox()
-    show, scene = settled({**options, "live": True}, lambda: mailbox, followers, leaders=True)
+    output, scene = output_and_scene({**options, "live": True}, lambda: mailbox, leaders=True)
     with keyboard(mailbox, headings=scene.variant == "ros2"):
-        show.play(scene)
+        output.run(scene)
 
 
 @contextmanager

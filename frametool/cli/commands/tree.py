@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Command, result_options, rotation_options
+from frametool.cli.command import FILE, Command, result_options, rotation_options, verbose_option
 from frametool.cli.output import Output
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import load_tree, topic_option, verbose_option
+from frametool.cli.trees import load_tree, topic_option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -5,25 +5,26 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from frametool.errors import printable
 from frametool.frames.stamps import BILLION
 from frametool.sim.targets import offset
-from frametool.sim.turtle import State
+from frametool.sim.turtle import TurtleState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.sim.scene import Follow, Scene
-    from frametool.sim.simulate import Step
+    from frametool.sim.simulate import SimulationStep
 
 
-class Progress:
+class RunSummary:
     """Watch the steps of a scene and sum them up; memory does not grow.
 
     reach: metres within which a follower counts as having come to its target.
     """
 
     def __init__(self, scene: Scene, reach: float = 0.5) -> None:
-        """Begin before the first step."""
+        """Create the summary of a run that has not begun."""
         self.reach = reach
         self.t_ns: int | None = None  # of the last step
         self.walls: dict[str, int] = {}
@@ -32,8 +33,8 @@ class Progress:
         self.gone: dict[str, tuple[str, int]] = {}  # follower -> who of the two left the world, and when
         self._follows = scene.followers
 
-    def watch(self, step: Step) -> None:
-        """Take a step into account."""
+    def watch(self, step: SimulationStep) -> None:
+        """Count a step in."""
         self.t_ns = step.t_ns
         for hit in step.walls:
             self.walls[hit.turtle] = self.walls.get(hit.turtle, 0) + 1
@@ -48,12 +49,12 @@ class Progress:
                 self.gone[name] = (follow.leader if name in step.states else name, step.t_ns)
 
     def lines(self) -> Iterator[str]:
-        """Yield the summary: one line a follower, then the walls."""
+        """Yield the summary: one line a follower, then the walls; names as a terminal may show them."""
         if self.t_ns is None:
             yield "ended before the first step"
             return
-        yield from (self._line(name, follow) for name, follow in self._follows.items())
-        hits = ", ".join(f"{name} {count}" for name, count in sorted(self.walls.items()))
+        yield from (printable(self._line(name, follow)) for name, follow in self._follows.items())
+        hits = ", ".join(f"{printable(name)} {count}" for name, count in sorted(self.walls.items()))
         yield f"{_seconds(self.t_ns)} simulated; wall hits: {sum(self.walls.values())}" + (f" ({hits})" if hits else "")
 
     def _line(self, name: str, follow: Follow) -> str:
@@ -69,11 +70,11 @@ class Progress:
         return f"{name}: no final distance, {who} left the world at {_seconds(when_ns)}; {soon}"
 
 
-def goal(leader: State, follow: Follow, now_ns: int) -> State:
+def goal(leader: TurtleState, follow: Follow, now_ns: int) -> TurtleState:
     """Return where a follower's target is, in the world."""
     x, y = offset(follow.target, now_ns)
     cosine, sine = math.cos(leader.theta), math.sin(leader.theta)
-    return State(leader.x + cosine * x - sine * y, leader.y + sine * x + cosine * y, leader.theta)
+    return TurtleState(leader.x + cosine * x - sine * y, leader.y + sine * x + cosine * y, leader.theta)
 
 
 def _seconds(t_ns: int) -> str:

@@ -1,0 +1,79 @@
+"""Names with control characters, and bytes that are no text: no terminal is steered, nothing ends in a traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from shell import ENVIRONMENT, TOOL, run
+
+ESC = "a\x1b[31mX\n\x9b\x7f\0"
+TREE = json.dumps({"frames": [{"name": ESC, "parent": "p\x1b]0;q", "xyz": [1, 2, 3]}]})
+MOVING = json.dumps(
+    {"frames": [{"name": ESC, "parent": "p\x07", "samples": [{"stamp": at, "xyz": [at, 0, 0]} for at in (0, 1, 9)]}]}
+)
+NAMES = [b"\xff\xfe.yaml", b"a\x1b[31m\nb\x7f.yaml"]
+COMMANDS = [
+    "lookup FILE nope p", "lookup FILE nope p -f json", "tree FILE -f text", "tree FILE -f mermaid", "tree FILE -f json",
+    "tree FILE -f yaml", "tree FILE -v", "tree FILE -f ros2", "check FILE", "check FILE -f json", "check FILE -f github",
+    "monitor FILE -f text", "monitor FILE -f json", "monitor FILE p\x1b q", "apply FILE x\x1b y 1 2 3", "check no\x1bFILE",
+    "convert no\x1b.yaml", "x\x1b", "invert --x\x1b", "lookup FILE a b --at \x1b", "convert --to \x1b 1", "sim run FILE",
+    "sim follow --leader \x1bx", "sim follow --leader FILE", "convert --from rpy 0 0 \x1b", "convert {\x1b:1}", "monitor no\x1b",
+    "static FILE -f json", "invert --columns \x1b", "apply FILE p -i FILE", "invert -i no\x1b", "compose FILE FILE",
+]  # fmt: skip
+
+
+def test_no_control_character_reaches_a_terminal(tmp_path: Path) -> None:
+    for name in NAMES:
+        for content in (TREE, MOVING):
+            Path(os.fsdecode(bytes(tmp_path) + b"/" + name)).write_text(content)
+            for command in COMMANDS:
+                arguments = [word.replace("FILE", os.fsdecode(name)) for word in command.split(" ")]
+                done = subprocess.run([*TOOL, *arguments], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, check=False)
+                shown = (done.stdout + done.stderr).decode().replace("\n", "").replace("\ufffd", "")
+                assert shown.isprintable(), command
+                assert b"Traceback" not in done.stderr, command
+                assert done.returncode in (0, 1, 2, 4, 5), command
+
+
+def test_files_may_be_called_as_the_system_allows(tmp_path: Path) -> None:
+    for name in NAMES:
+        path = bytes(tmp_path) + b"/" + name
+        assert run("convert", "--from", "rpy", "0", "0", "1", "-o", path) == (0, b"", b"")
+        assert run("invert", path)[::2] == (0, b"")
+        assert run("sim", "follow", "--duration", "0.1", "-o", path, "--force")[0] == 0
+        status, _, err = run("convert", "--from", "rpy", "0", "0", "1", "-o", path)
+        assert (status, err.count(b"\n"), b"exists" in err) == (5, 1, True)
+
+
+def test_what_becomes_part_of_a_result_is_text() -> None:
+    status, out, err = run("invert", "--prefix", b"\xff", text=b"x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n")
+    assert (status, out) == (2, b"")
+    assert b"is not UTF-8 text" in err
+
+
+def test_a_nul_ends_no_name(tmp_path: Path) -> None:
+    tree = tmp_path / "tree.yaml"
+    tree.write_text("frames: [{name: map, parent: world, xyz: [1, 0, 0]}]")
+    for options, cell in ((["world", "--source-column", "f"], b"1,map\0junk"), (["map", "--target-column", "f"], b"1,world\0")):
+        status, out, err = run("lookup", str(tree), *options, "--on-error", "skip", text=b"i,f\n" + cell + b"\n")
+        assert (status, out.count(b"\n")) == (3, 1), err
+        assert b"unknown frame" in err
+    both = ["--target-column", "f", "--source-column", "g", "--on-error", "skip"]
+    assert run("lookup", str(tree), *both, text=b"f,g\nworld\0map,map\nworld,map\n")[0] == 3
+
+
+@pytest.mark.parametrize("arguments", [["lookup", "TREE", "map", "lidar"], ["invert"], ["invert", "--jobs", "2"]])
+@pytest.mark.parametrize("limit", ["-n 4", "-n 6", "-v 40000", "-v 60000", "-v 120000"])
+def test_what_the_system_runs_out_of_is_one_line(arguments: list[str], limit: str) -> None:
+    tree = str(Path(__file__).parents[2] / "examples" / "robot.yaml")
+    command = [tree if word == "TREE" else word for word in arguments]
+    done = subprocess.run(
+        ["bash", "-c", f'ulimit {limit}; exec "$@"', "bash", *TOOL, *command],
+        input=b"x,y,z,qx,qy,qz,qw\n" + b"1,2,3,0,0,0,1\n" * 20_000, capture_output=True, check=False, env=ENVIRONMENT,
+    )  # fmt: skip
+    assert done.returncode in (0, 5)
+    assert (done.returncode, done.stderr.count(b"\n")) in ((0, 0), (5, 1)), done.stderr
