@@ -269,7 +269,7 @@ WRONG = {
     ("lookup folder a b", 5): "folder: is a directory",
     ("lookup empty.yaml a b", 1): "empty.yaml: no frames in it",
     ("lookup binary.yaml a b", 1):
-        "binary.yaml:1:1: not UTF-8: byte 0x89 does not belong there; convert the file (from Latin-1?)",
+        "binary.yaml:1:1: not text but a PNG picture",
     ("lookup parents.yaml a b", 1):
         "parents.yaml:3:5: frame 'tool' has two parents: 'wrist' (line 2) and 'flange' (line 3)",
     ("lookup values.yaml a b", 1): "values.yaml:2:1: frame 'b' has two different poses in 'a': line 1 and line 2",

@@ -50,6 +50,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
     from frametool.cli.signals import die_of
     from frametool.cli.stderr import discard, say, say_warning
+    from frametool.documents.limits import DEEPEST
     from frametool.errors import heard_by
 
     if sys.stdout is None:
@@ -57,6 +58,7 @@ def run(arguments: list[str]) -> int:
         return IN_OUT
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.encoding.lower() != "utf-8":
         sys.stdout.reconfigure(encoding="utf-8")  # the same bytes in every locale
+    sys.setrecursionlimit(max(sys.getrecursionlimit(), 20 * DEEPEST))  # a document may be so deep, a walk some calls
     status = 0
     try:
         with heard_by(say_warning):
