@@ -214,10 +214,11 @@ def listing(names: Iterable[str], most: int = 20) -> str:
     """Return the names sorted and joined by commas, cut after `most` of them."""
     ordered = sorted(names)
     more = f" and {len(ordered) - most} more" if len(ordered) > most else ""
-    return ", ".join(map(_name, ordered[:most])) + more
+    return ", ".join(map(bare, ordered[:most])) + more
 
 
-def _name(name: str) -> str:
+def bare(name: str) -> str:
+    """Return a name for a list in a message: as `shown`, without quotes."""
     kept = _cut(name, printable)
     return printable(name) if kept == name else f"{printable(kept)}..."
 

@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
+from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, shown
 from frametool.geometry.representations import NAMED, REPRESENTATIONS
 from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.faults import Misused
@@ -310,7 +310,7 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
         return poses
     wanted = "one pose" if count == 1 else "two poses"
     candidates = "; ".join(each.shown for each in (*positions, *rotations)[:MOST_SHOWN])
-    found = candidates or f"none among {_listed(names)}"
+    found = candidates or f"none among {listed(names)}"
     raise _refusal(f"columns of {wanted} are wanted, found {found}; choose with --columns", source)
 
 
@@ -340,10 +340,10 @@ def _refusal(reason: str, source: str) -> FormatError:
     return FormatError(reason, source=source, line=1)
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """List the columns there are, the first of very many."""
     more = f", .. ({len(names)} columns)" if len(names) > MOST_LISTED else ""
-    return ", ".join(names[:MOST_LISTED]) + more
+    return ", ".join(map(bare, names[:MOST_LISTED])) + more
 
 
 def _only_pose(
@@ -360,7 +360,7 @@ def _only_pose(
         position = _half_position(header, rotation)
     if position is rotation is None:
         raise _refusal(
-            f"no columns of a point or pose among: {_listed(header.names)}; name them with --columns", source
+            f"no columns of a point or pose among: {listed(header.names)}; name them with --columns", source
         )
     return PoseColumns(position, rotation)
 
@@ -544,4 +544,4 @@ def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
             return list(range(low - 1, high))
         raise Misused(f"--columns: {word} is not within 1-{width}")
     near = did_you_mean(word, numbers)
-    raise Misused(f"--columns: no column {shown(word)}{near}; columns: {_listed(list(numbers) or [f'1-{width}'])}")
+    raise Misused(f"--columns: no column {shown(word)}{near}; columns: {listed(list(numbers) or [f'1-{width}'])}")

@@ -9,7 +9,7 @@ from frametool.geometry.representations import REPRESENTATIONS
 from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.blocks import Plan
 from frametool.stream.faults import Misused
-from frametool.stream.header import XYZ, PoseColumns, find_poses, named_pose, row_shape
+from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape
 from frametool.stream.output_columns import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
 from frametool.stream.row_layout import POSE, Shape, Target
 from frametool.stream.table_names import rename_of
@@ -93,7 +93,7 @@ def _without_position(pose: PoseColumns, request: Request, table: Table, source:
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.given is None else ""
         raise FormatError(
-            f"no columns of a rotation among: {', '.join(table.names or ('columns without names',))}{wanted}",
+            f"no columns of a rotation among: {listed(table.names or ('columns without names',))}{wanted}",
             source=source,
             line=1,
         )

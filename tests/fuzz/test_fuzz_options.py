@@ -16,7 +16,7 @@ from frametool.cli.commands.sim import SUBCOMMANDS
 if TYPE_CHECKING:
     from oracles_of_use import Tool
 
-pytestmark = pytest.mark.fuzz
+pytestmark = [pytest.mark.fuzz, pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")]
 TREE = str(Path(__file__).parents[2] / "examples" / "drive.yaml")
 POSE = "{xyz: [1, 2, 3], rpy: [0, 0, 1]}"
 PLAIN = {
