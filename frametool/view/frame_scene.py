@@ -29,7 +29,7 @@ MOST_STAMPS = 4000  # of a trail; of more, every second, third, .. is taken
 
 
 class Trail(NamedTuple):
-    """Where a frame went: stretches of points, in metres; a new one begins where its parent changes or data are missing."""
+    """Where a frame went: stretches of points, in metres, cut where its parent changes or data are missing."""
 
     frame: str
     stretches: list[list[Point]]
@@ -91,7 +91,9 @@ class FrameScene:
         chosen = set(self.names)
         if below is not None:
             found = {below}
-            found.update(name for name in self.names if name == below or self.parent(name) in found and not found.add(name))
+            for name in self._ordered_now():
+                if self.parent(name) in found:
+                    found.add(name)
             chosen &= found
         if self.path_only and self.target and self.source:
             chosen &= set(self.tree.path(self.target, self.source, self.at_ns))
@@ -159,7 +161,7 @@ class FrameScene:
         times = [a + (b - a) * part // parts for a, b in pairwise(stamps) for part in range(parts)] + stamps[-1:]
         points = self.tree.lookup_many(self.fixed, name, times, missing="nan").xyz
         known = ~np.isnan(points[:, 0])
-        changes = self.tree.changes()
+        changes = sorted(stamp for mover in movers for stamp in self.tracks[mover].changes())
         epoch = np.searchsorted(changes, times, side="right")
         cuts = np.flatnonzero((known[1:] != known[:-1]) | (epoch[1:] != epoch[:-1])) + 1
         pieces = [piece.tolist() for piece in np.split(points, cuts) if not np.isnan(piece[0, 0])]

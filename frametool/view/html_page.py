@@ -61,9 +61,12 @@ def _file(name: str) -> str:
 
 def _policy(script: str, style: str) -> str:
     """Allow the page its own script and style, and nothing else."""
-    own = {kind: b64encode(sha256(text.encode()).digest()).decode() for kind, text in (("script", script), ("style", style))}
-    sources = "; ".join(f"{kind}-src 'sha256-{digest}'" for kind, digest in own.items())
-    return f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"
+    own = (f"{kind}-src 'sha256-{_digest(text)}'" for kind, text in (("script", script), ("style", style)))
+    return f"default-src 'none'; {'; '.join(own)}; base-uri 'none'; form-action 'none'"
+
+
+def _digest(text: str) -> str:
+    return b64encode(sha256(text.encode()).digest()).decode()
 
 
 def _json(value: dict[str, Any]) -> str:
