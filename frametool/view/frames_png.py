@@ -34,7 +34,7 @@ def write_png(shapes: Sequence[Shape]) -> bytes:
 
     Raises ValueInvalid where matplotlib is missing.
     """
-    drawn = figure(WIDTH / 100.0, HEIGHT / 100.0)
+    drawn = figure(WIDTH / 100.0, HEIGHT / 100.0, layout="none")
     axes = drawn.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(0.0, WIDTH), ylim=(HEIGHT, 0.0))
     axes.axis("off")

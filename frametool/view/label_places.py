@@ -78,14 +78,25 @@ def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box]
     placed, hidden = [], 0
     for point, names in flat.groups(SAME):
         words = words_of(names)
-        spots = [spot for spot in _spots(flat, words, point, font) if not taken.meets(spot.box)]
-        found = next((spot for spot in spots if not axes.meets(spot.box)), spots[0] if spots else None)
+        found = _free_spot(_spots(flat, words, point, font), taken, axes)
         if found is None:
             hidden += len(names)
         else:
             taken.add(found.box)
             placed.append(found)
     return placed, hidden
+
+
+def _free_spot(spots: Iterable[Label], taken: TakenBoxes, axes: TakenBoxes) -> Label | None:
+    """Return the first spot over nothing at all, or else the first that is only over axes."""
+    second = None
+    for spot in spots:
+        if taken.meets(spot.box):
+            continue
+        if not axes.meets(spot.box):
+            return spot
+        second = second or spot
+    return second
 
 
 def _spots(flat: Projection, words: str, point: Flat, font: float) -> Iterator[Label]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
@@ -27,13 +28,13 @@ def require_matplotlib() -> None:
         raise ValueInvalid("a PNG needs matplotlib: pip install 'frametool[plot]', or write .svg, which needs nothing")
 
 
-def figure(width: float, height: float) -> Any:
-    """Return an empty figure of so many inches, bound to no window."""
+def figure(width: float, height: float, layout: str = "constrained") -> Any:
+    """Return an empty figure of so many inches, bound to no window; layout "none" leaves axes where they are put."""
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    empty = Figure(figsize=(width, height), dpi=100, layout="constrained")
+    empty = Figure(figsize=(width, height), dpi=100, layout=layout)
     FigureCanvasAgg(empty)
     return empty
 
@@ -41,7 +42,9 @@ def figure(width: float, height: float) -> Any:
 def as_png(drawn: Any) -> bytes:
     """Return a figure as the bytes of a PNG, without a date in them."""
     stream = io.BytesIO()
-    drawn.savefig(stream, format="png", metadata={"Software": None})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of letters that matplotlib's font lacks: it draws boxes
+        drawn.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()
 
 

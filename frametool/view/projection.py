@@ -79,6 +79,7 @@ class Projection:
             room[1] / max(up - down, LEAST),
             0.4 * min(size[:2]) / (AXIS_PART * usual),  # one frame alone is not blown up
         )
+        self._origins = {name: self.at(pose[:3]) for name, pose in self.poses.items()}
         least, most = (pixels / self.scale for pixels in size.axes)
         self.axis = min(max(AXIS_PART * usual, least), most)
 
@@ -96,8 +97,9 @@ class Projection:
 
     def turned(self, point: Sequence[float]) -> Point:
         """Return metres to the right, up, and toward the eye."""
-        right, up, toward = (sum(part * value for part, value in zip(row, point, strict=True)) for row in self.view)
-        return right, up, toward
+        (a, b, c), (d, e, f), (g, h, i) = self.view
+        x, y, z = point
+        return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
     def at(self, point: Sequence[float]) -> Flat:
         """Return where a point in metres is on the picture."""
@@ -107,7 +109,7 @@ class Projection:
 
     def origin(self, name: str) -> Flat:
         """Return where a frame is on the picture."""
-        return self.at(self.poses[name][:3])
+        return self._origins[name]
 
     def tips(self, name: str, part: float = 1.0) -> list[Flat]:
         """Return where the axes x, y, z of a frame end, or a part of the way there."""

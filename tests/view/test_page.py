@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import itertools
 import json
 import math
 import re
@@ -55,7 +56,7 @@ def chain(names: list[str]) -> FrameTree:
     """Return a tree in which each frame hangs from the one before."""
     tree = FrameTree()
     tree.add_root(names[0])
-    for parent, child in zip(names, names[1:], strict=False):
+    for parent, child in itertools.pairwise(names):
         tree.add(parent, child, Transform.of(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     return tree
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import browsers
 import pytest
+from samples import LATTICE, LOCK_GAPS, random_quaternions
 
 import frametool
 from frametool.geometry import euler, floats, quaternion
-from samples import LATTICE, LOCK_GAPS, random_quaternions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -75,7 +75,7 @@ def visit(browser: Any) -> Iterator[Callable[..., Any]]:
 
 def hostile_rotations() -> Iterator[tuple[float, float, float, float]]:
     """Yield rotations at, near and far from gimbal lock."""
-    generator = random.Random(5)
+    generator = random.Random(5)  # noqa: S311 - no secret
     yield from LATTICE
     yield from random_quaternions(200)
     for gap in LOCK_GAPS:
@@ -87,7 +87,7 @@ def hostile_rotations() -> Iterator[tuple[float, float, float, float]]:
 
 def close(page_pose: list[float], transform: frametool.Transform) -> bool:
     """Compare a pose of the page with one of ours, q and -q being one."""
-    return frametool.Transform.of(*page_pose).is_close(transform, angle=1e-13, distance=1e-13)
+    return bool(frametool.Transform.of(*page_pose).is_close(transform, angle=1e-13, distance=1e-13))
 
 
 @browsers.NEEDS_CHROMIUM

@@ -64,7 +64,7 @@ canvas.addEventListener("pointermove", (event) => {
   }
   const [dx, dy] = [now[0] - before[0], now[1] - before[1]];
   dragged += Math.abs(dx) + Math.abs(dy);
-  const apart = () => Math.hypot(...[0, 1].map((k) => [...fingers.values()].reduce((sum, each, at) => (at ? sum - each[k] : each[k]), 0)));
+  const apart = () => distance(...[...fingers.values()].map((place) => [...place, 0]));
   const wide = fingers.size === 2 ? apart() : 0;
   fingers.set(event.pointerId, now);
   if (fingers.size === 2) {

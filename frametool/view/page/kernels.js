@@ -104,11 +104,9 @@ function inverse(pose) {
 }
 
 function along(a, b, fraction) {  // from sample a to sample b: `prepare`, then `along`
-  let apart = 0, near = 0, dot = 0;
-  apart = Math.sqrt(squared_norm(b[3] - a[3], b[4] - a[4], b[5] - a[5], b[6] - a[6]));
-  near = Math.sqrt(squared_norm(b[3] + a[3], b[4] + a[4], b[5] + a[5], b[6] + a[6]));
-  [apart, near] = [0.5 * Math.min(apart, near), 0.5 * Math.max(apart, near)];
-  dot = a[3] * b[3] + a[4] * b[4] + a[5] * b[5] + a[6] * b[6];
+  const lengths = [-1, 1].map((k) => Math.sqrt(squared_norm(...[3, 4, 5, 6].map((part) => b[part] + k * a[part]))));
+  const apart = 0.5 * Math.min(...lengths), near = 0.5 * Math.max(...lengths);
+  const dot = a[3] * b[3] + a[4] * b[4] + a[5] * b[5] + a[6] * b[6];
   const theta = 2 * incline(apart, near), arc = 2 * theta;
   const scale = apart === 0 ? 0 : 1 / (2 * apart * near);
   const to = (dot < 0 ? -1 : 1) * scale, back = (near - apart) * (near + apart) * scale;

@@ -1,6 +1,6 @@
 // Names beside frames, none over another: the chosen first, then those that move, then the nearest.
 
-const MOST_NAMES = 160, MANY = 3000, CELL = 64, LINE = 16;
+const MOST_NAMES = 160, MOST_FAILED = 60, MANY = 3000, CELL = 64, LINE = 16;
 const DISTANCES = [9, 20, 34, 52, 74];                              // pixels from a frame to its name
 const SIDES = [[1, -0.6], [1, 0.6], [-1, -0.6], [-1, 0.6], [0, -1.3], [0, 1.3], [1, 0], [-1, 0]];
 const labels = {placed: [], outside: [], hidden: 0};
@@ -11,10 +11,13 @@ class Rectangles {
     this.cells = new Map();
   }
 
-  * near([left, top, right, bottom]) {
+  // Return the numbers of the cells that a rectangle touches.
+  near([left, top, right, bottom]) {
+    const found = [];
     for (let x = Math.floor(left / CELL); x <= Math.floor(right / CELL); x++) {
-      for (let y = Math.floor(top / CELL); y <= Math.floor(bottom / CELL); y++) yield `${x},${y}`;
+      for (let y = Math.floor(top / CELL); y <= Math.floor(bottom / CELL); y++) found.push(4096 * x + y);
     }
+    return found;
   }
 
   add(box) {
@@ -24,9 +27,12 @@ class Rectangles {
     }
   }
 
-  meets(box) {
-    const over = (o) => box[0] < o[2] && box[2] > o[0] && box[1] < o[3] && box[3] > o[1];
-    for (const cell of this.near(box)) if ((this.cells.get(cell) || []).some(over)) return true;
+  meets([left, top, right, bottom]) {
+    for (const cell of this.near([left, top, right, bottom])) {
+      for (const o of this.cells.get(cell) || []) {
+        if (left < o[2] && right > o[0] && top < o[3] && bottom > o[1]) return true;
+      }
+    }
     return false;
   }
 }
@@ -66,13 +72,16 @@ function draw_names(inside) {
   taken.add([0, height - 92, 96, height]);
   labels.outside.forEach((box) => taken.add(box));
   labels.placed = [];
-  let left_out = many ? inside.length : 0;
+  let left_out = many ? inside.length : 0, failed = 0;
   pen.font = NORMAL;
   for (const group of groups) {
-    const full = labels.placed.length >= MOST_NAMES && weight(group[0]) <= 2;
+    const full = (labels.placed.length >= MOST_NAMES || failed > MOST_FAILED) && weight(group[0]) <= 2;
     const spot = full ? null : free_spot(group, taken, groups.length < MOST_NAMES);
     if (spot) place_name(group, spot, taken);
-    else left_out += group.length;
+    else {
+      failed++;
+      left_out += group.length;
+    }
   }
   labels.hidden = state.names ? left_out : 0;
 }
@@ -80,13 +89,19 @@ function draw_names(inside) {
 // Find where a name fits: clear of other names, and if asked of its own axes.
 function free_spot(group, taken, avoid_axes) {
   const words = words_of(group), wide = pen.measureText(words).width, x = x_of(group[0]), y = y_of(group[0]);
-  const spots = DISTANCES.flatMap((away) => SIDES.map(([dx, dy]) => {
-    const left = x + dx * away - (dx < 0 ? wide : dx === 0 ? wide / 2 : 0), middle = y + dy * away;
-    return {words, away, left, middle, box: [left - 2, middle - LINE / 2, left + wide + 2, middle + LINE / 2]};
-  }));
-  const free = ({box}) => box[0] > 0 && box[2] < width && box[1] > 0 && box[3] < height && !taken.meets(box);
-  const clear = ({box, away}) => away < 40 && free({box}) && !group.some((frame) => crosses_axes(frame, box));
-  return (avoid_axes && spots.find(clear)) || spots.find(free);
+  let second = null;
+  for (const away of DISTANCES) {
+    for (const [dx, dy] of SIDES) {
+      const left = x + dx * away - (dx < 0 ? wide : dx === 0 ? wide / 2 : 0), middle = y + dy * away;
+      const box = [left - 2, middle - LINE / 2, left + wide + 2, middle + LINE / 2];
+      if (box[0] <= 0 || box[2] >= width || box[1] <= 0 || box[3] >= height || taken.meets(box)) continue;
+      const spot = {words, away, left, middle, box};
+      if (!avoid_axes || !group.some((frame) => crosses_axes(frame, box))) return spot;
+      second = second || spot;
+      if (away >= 40) return second;
+    }
+  }
+  return second;
 }
 
 function crosses_axes(frame, box) {
