@@ -1,5 +1,5 @@
-// Rigid-body arithmetic by the very steps of frametool.geometry, so that page and command print the same digits: only
-// + - * / and roots.  Names are those of the Python kernels.  A pose is [tx, ty, tz, x, y, z, w], parent_from_child.
+// Rigid-body arithmetic by the very steps and names of frametool.geometry, only + - * / and roots: page and command
+// print the same digits.  A pose is [tx, ty, tz, x, y, z, w], parent_from_child.
 
 const EPS = 2 ** -52, UNIT = 4 * EPS, TINY = 1e-150, LOCK = EPS * EPS;
 const RADIAN = 180 / Math.PI;

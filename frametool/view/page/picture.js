@@ -1,4 +1,4 @@
-// The picture: ground, links, trails, the way from target to source, axes, names, what lies outside, a scale.
+// The picture: ground, links, trails, the way, axes, what lies outside, a scale.
 
 const MOST_ROUND = 600, MOST_LINES = 5000;                          // frames drawn one by one, and with lines at all
 const AXIS_LENGTHS = [14, 46];                                      // pixels, least and most
