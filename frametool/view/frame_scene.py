@@ -155,7 +155,7 @@ class FrameScene:
         import numpy as np
 
         movers = self._movers_above(name) | self._movers_above(self.fixed)
-        stamps = sorted({stamp for mover in movers for stamp in self.tracks[mover].columns()[0]})
+        stamps = sorted({stamp for mover in movers for stamp, _, _ in self.tracks[mover].walk()})
         stamps = stamps[:: -(-len(stamps) // MOST_STAMPS) or 1]
         parts = 1 if len(stamps) > FEW_STAMPS else PARTS
         times = [a + (b - a) * part // parts for a, b in pairwise(stamps) for part in range(parts)] + stamps[-1:]
@@ -180,7 +180,7 @@ class FrameScene:
                 continue
             if not track.standing:
                 found.add(each)
-            above = set(track.columns()[1]) if not track.standing and track.varies else {track.parent}
+            above = {parent for _, parent, _ in track.walk()} if track.varies else {track.parent}
             waiting += above - seen
             seen |= above
         return found

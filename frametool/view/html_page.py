@@ -19,8 +19,7 @@ from frametool import __version__
 from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from frametool.frames.track import MovingTrack
     from frametool.view.frame_scene import FrameScene
 
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
@@ -99,11 +98,10 @@ def _data(scene: FrameScene) -> tuple[dict[str, Any], array[float]]:
     first_ns, last_ns = scene.span_ns
     tracks = []
     for name, moving in scene.tracks.items():
-        stamps, above, samples = moving.columns()
         at = numbers.itemsize * len(numbers)
-        tracks.append({"frame": index[name], "count": len(stamps), "at": at, "parents": _parents(above, index)})
-        numbers.extend(stamp - first_ns for stamp in stamps)
-        for sample in samples:
+        tracks.append({"frame": index[name], "count": moving.count, "at": at, "parents": _parents(moving, index)})
+        numbers.extend(stamp - first_ns for stamp, _, _ in moving.walk())
+        for _, _, sample in moving.walk():
             numbers.extend(sample)
     if sys.byteorder == "big":
         numbers.byteswap()
@@ -111,6 +109,6 @@ def _data(scene: FrameScene) -> tuple[dict[str, Any], array[float]]:
     return head | {"t0": str(first_ns), "first": 0, "last": last_ns - first_ns}, numbers
 
 
-def _parents(above: Sequence[str], index: dict[str, int]) -> int | list[int]:
+def _parents(track: MovingTrack, index: dict[str, int]) -> int | list[int]:
     """Return the parent of all samples, or that of each where it changes."""
-    return index[above[0]] if len(set(above)) == 1 else [index[parent] for parent in above]
+    return [index[parent] for _, parent, _ in track.walk()] if track.varies else index[track.parent]

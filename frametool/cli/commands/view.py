@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, Command, Text, decorated
+from frametool.cli.command import FILE, TEXT, Command, Text, decorated, verbose_option
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, verbose_option
+from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import ValueInvalid
 from frametool.text.numbers import parse_angle, shown
 
