@@ -15,7 +15,7 @@ import pytest
 from samples import LATTICE, LOCK_GAPS, random_quaternions
 
 import frametool
-from frametool.geometry import euler, floats, quaternion
+from frametool.geometry import axis_angle, euler, floats, quaternion, rotvec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -85,39 +85,47 @@ def hostile_rotations() -> Iterator[tuple[float, float, float, float]]:
                 yield euler.to_quaternion(roll, sign * (math.pi / 2 - gap), yaw, "sxyz", floats)
 
 
-def close(page_pose: list[float], transform: frametool.Transform) -> bool:
-    """Compare a pose of the page with one of ours, q and -q being one."""
-    return bool(frametool.Transform.of(*page_pose).is_close(transform, angle=1e-13, distance=1e-13))
-
-
 @browsers.NEEDS_CHROMIUM
 def test_the_transform_of_the_address_stands_in_the_page(page_of: MakePage) -> None:
     seen = browsers.seen_in_chromium(page_of("robot.yaml"), "target=base_link&source=tool")
     pose = json.loads(re.search('data-pose="([^"]*)"', seen)[1])  # type: ignore[index]
-    assert close(pose, frametool.load("examples/robot.yaml").lookup("base_link", "tool"))
+    assert pose == list(frametool.load("examples/robot.yaml").lookup("base_link", "tool").components)
 
 
 @pytest.mark.parametrize("name", ["robot.yaml", "drive.yaml"])
-def test_every_pair_of_frames_is_what_lookup_says(page_of: MakePage, visit: Visit, name: str) -> None:
+def test_every_pair_of_frames_is_what_lookup_says_to_the_bit(page_of: MakePage, visit: Visit, name: str) -> None:
     tab, tree = visit(page_of(name)), frametool.load(f"examples/{name}")
     for at in SECONDS if name == "drive.yaml" else (0.0,):
         for target, source in itertools.product(tree.frames, repeat=2):
             found = tab.evaluate(LOOKUP, [target, source, at * 1e9])
-            assert close(found["pose"], tree.lookup(target, source, round(at * 1e9))), (target, source, at)
+            assert found["pose"] == list(tree.lookup(target, source, round(at * 1e9)).components), (target, source, at)
 
 
-def test_hostile_rotations_have_the_angles_of_the_command(page_of: MakePage, visit: Visit) -> None:
+def test_hostile_rotations_have_the_numbers_of_the_command_to_the_bit(page_of: MakePage, visit: Visit) -> None:
     tab = visit(page_of("robot.yaml"))
-    rotations = [quaternion.canonical(*quaternion.unit(*each, floats), floats) for each in hostile_rotations()]
+    rotations = [quaternion.from_quaternion(*each, floats) for each in hostile_rotations()]
     assert len(rotations) >= 400
     found = tab.evaluate("(all) => all.map((q) => window.frameview.notations([0, 0, 0, ...q]))", rotations)
     for q, page in zip(rotations, found, strict=True):
-        angles = euler.from_quaternion(*q, "sxyz", floats)
-        assert page["rpy"] == pytest.approx(angles, abs=1e-14), q
-        printed = [[f"{round(angle, 6) + 0.0:.6f}" for angle in each] for each in (page["rpy"], angles)]
-        assert printed[0] == printed[1]
+        *axis, angle = axis_angle.from_quaternion(*q, floats)
+        assert page["q"] == list(q)
+        assert page["rpy"] == list(euler.from_quaternion(*q, "sxyz", floats)), q
+        assert page["rpy_deg"] == list(euler.from_quaternion(*q, "sxyz", floats, degrees=True))
         assert page["locked"] == bool(euler.locked(*q, "sxyz"))
-        assert math.hypot(*page["axis"]) == pytest.approx(1.0)
+        assert (page["axis"], page["angle"]) == (axis, angle)
+        assert page["rotvec"] == list(rotvec.from_quaternion(*q, floats))
+        assert [part for row in page["matrix"] for part in row] == list(quaternion.to_matrix(*q))
+
+
+def test_all_digits_are_written_as_python_writes_them(page_of: MakePage, visit: Visit) -> None:
+    tab = visit(page_of("robot.yaml"), "target=map&source=tool")
+    tab.click("#exact")
+    x, y, z = frametool.load("examples/robot.yaml").lookup("map", "tool").components[:3]
+    assert tab.inner_text("#pose tr:first-child").split("\t")[1:4] == [f"x{x!r}", f"y{y!r}", f"z{z!r}"]
+    tree = "{frames: {a: {b: {xyz: [1.0e-5, 1.0e+17, 3]}}}}"
+    tab = visit(page_of(tree))
+    tab.click("#exact")
+    assert tab.inner_text("#pose tr:first-child").split("\t")[1:4] == ["x1e-05", "y1e+17", "z3.0"]
 
 
 def middle(tab: Any, name: str) -> tuple[float, float]:
