@@ -156,7 +156,7 @@ def test_files_are_written_whole_in_the_form_of_their_suffix(run: Run, tmp_path:
 def test_a_plot_shows_the_world_the_trails_and_three_curves(run: Run, tmp_path: Path) -> None:
     run("sim", "follow", "--leader", "square", "--followers", "2", "--duration", "3", "--plot", "run.svg", "-f", "csv")
     root = ET.fromstring((tmp_path / "run.svg").read_text())  # noqa: S314 - our own
-    lines = root.findall(f".//{SVG}polyline")
+    lines = root.findall(f".//{SVG}path/{SVG}title")  # a line of a turtle says whose it is
     words = [text.text for text in root.iter(f"{SVG}text")]
     assert len(lines) == 3 + 3 * 2
     assert {"distance (m)", "linear.x (m/s)", "angular.z (rad/s)", "turtle1", "turtle3"} <= set(words)

@@ -6,7 +6,6 @@ import os
 import sys
 from contextlib import ExitStack
 from functools import partial
-from importlib import import_module
 from itertools import combinations
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, decorated
+from frametool.cli.pictures import PICTURES, drawn
 from frametool.cli.sim_options import REACH
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
@@ -32,10 +32,9 @@ if TYPE_CHECKING:
     from frametool.cli.sink import Write
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
+    from frametool.view.drawing import Drawing
 
     Watch = Callable[[SimulationStep], None]
-
-PLOTS = {".svg": "frametool.view.plot_svg", ".html": "frametool.view.plot_html", ".png": "frametool.view.plot_png"}
 
 
 def format_options(function: Any) -> Any:
@@ -127,8 +126,8 @@ class SimOutput:
         if self.plot:
             from frametool.view.drawing import Drawing
 
-            drawing, module = Drawing(scene), import_module(PLOTS[suffix_of(self.plot)])
-            pictures[self.plot] = drawing.watch, partial(module.plot, drawing)
+            drawing = Drawing(scene)
+            pictures[self.plot] = drawing.watch, partial(_plot, drawing, suffix_of(self.plot))
         if self.view:
             from frametool.view.run_page import RunPage
 
@@ -159,6 +158,13 @@ class SimOutput:
                 write(text)
 
         return watch
+
+
+def _plot(drawing: Drawing, suffix: str) -> str | bytes:
+    """Return the plot of a run."""
+    from frametool.view.run_plot import last_commands, run_picture
+
+    return drawn(run_picture(drawing), suffix, last_commands(drawing))
 
 
 class RealTimeClock:
@@ -209,8 +215,8 @@ def check_files(plot: str | None, output: str | None, view: str | None = None, *
 
     Raises click.UsageError, FileProblem, ValueInvalid when matplotlib is missing.
     """
-    if plot and suffix_of(plot) not in PLOTS:
-        raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {shown(plot)}")
+    if plot and suffix_of(plot) not in PICTURES:
+        raise click.UsageError(f"--plot takes {', '.join(PICTURES)}; found {shown(plot)}")
     files = {name: path for name, path in (("--output", output), ("--plot", plot), ("--view", view)) if path}
     for (name, path), (other, same) in combinations(files.items(), 2):
         if os.path.realpath(path) == os.path.realpath(same) and not is_special(path):
@@ -220,6 +226,6 @@ def check_files(plot: str | None, output: str | None, view: str | None = None, *
         if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
             raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     if plot and suffix_of(plot) == ".png":
-        from frametool.view.plot_png import require_matplotlib
+        from frametool.view.png import require_matplotlib
 
         require_matplotlib()

@@ -18,12 +18,13 @@ from frametool.frames.tree import FrameTree
 from frametool.geometry.transform import Transform
 from frametool.view.canvas import Canvas
 from frametool.view.frame_scene import FrameScene
-from frametool.view.frames_picture import HEIGHT, SIZE, WIDTH, FrameDot, FrameLine, FrameWords, still_picture
-from frametool.view.frames_png import write_png
-from frametool.view.frames_svg import write_svg
+from frametool.view.frames_picture import HEIGHT, SIZE, WIDTH, still_picture
 from frametool.view.frames_terminal import TerminalPicture
 from frametool.view.label_places import TakenBoxes, place_labels
+from frametool.view.png import write_png
 from frametool.view.projection import EYES, Projection, nice
+from frametool.view.shapes import PictureDot, PictureLine, PictureWords
+from frametool.view.svg import write_svg
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -83,7 +84,7 @@ def test_the_eye_above_sees_x_to_the_right_and_y_up() -> None:
 @pytest.mark.parametrize("name", ODD)
 def test_an_odd_tree_is_drawn_in_every_form(name: str) -> None:
     scene = FrameScene(ODD[name])
-    text = write_svg(still_picture(scene).shapes, name)
+    text = write_svg(still_picture(scene, title=name).picture)
     ET.fromstring(text)  # noqa: S314 - our own
     assert not re.search(r"\b(nan|inf)\b", text)
     for columns, lines in ((80, 24), (200, 60), (20, 4), (1, 1)):
@@ -94,7 +95,7 @@ def test_an_odd_tree_is_drawn_in_every_form(name: str) -> None:
 
 
 def test_hostile_names_are_text_in_the_svg() -> None:
-    root = ET.fromstring(write_svg(still_picture(FrameScene(ODD["hostile names"])).shapes, "</title><script>"))  # noqa: S314 - our own
+    root = ET.fromstring(write_svg(still_picture(FrameScene(ODD["hostile names"]), title="</title><script>").picture))  # noqa: S314 - our own
     assert root.findall(f".//{SVG}script") == []
     titles = {title.text for title in root.iter(f"{SVG}title")}
     assert {"</text><script>", "a&b", "\\x1b[31m"} <= titles
@@ -102,11 +103,11 @@ def test_hostile_names_are_text_in_the_svg() -> None:
 
 def test_the_svg_is_light_and_dark_and_shows_each_frame_with_its_axes() -> None:
     tree = frametool.load("examples/robot.yaml")
-    text = write_svg(still_picture(FrameScene(tree)).shapes, "robot")
+    text = write_svg(still_picture(FrameScene(tree), title="robot").picture)
     root = ET.fromstring(text)  # noqa: S314 - our own
     kinds = [path.get("class") for path in root.iter(f"{SVG}path")]
-    assert [kinds.count(axis) for axis in "xyz"] == [len(tree.frames) + 1] * 3
-    assert kinds.count("link") == len(tree.frames) - 1
+    assert [kinds.count(f"{axis}-line") for axis in "xyz"] == [len(tree.frames) + 1] * 3
+    assert len(root.findall(f".//{SVG}path[@stroke-dasharray]")) == len(tree.frames) - 1
     assert len(root.findall(f".//{SVG}circle")) == len(tree.frames)
     assert "prefers-color-scheme: dark" in text
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
@@ -141,10 +142,10 @@ def test_a_nice_length_is_one_two_or_five(length: float, expected: float) -> Non
 
 
 def test_shapes_of_a_frame_come_farthest_first() -> None:
-    shapes = still_picture(FrameScene(star((0, 0, 0), (2, 0, 0)))).shapes
-    dots = [shape for shape in shapes if isinstance(shape, FrameDot)]
+    shapes = still_picture(FrameScene(star((0, 0, 0), (2, 0, 0)))).picture.shapes
+    dots = [shape for shape in shapes if isinstance(shape, PictureDot)]
     assert [dot.title for dot in dots][-1] == "f1"
-    assert {type(shape) for shape in shapes} == {FrameDot, FrameLine, FrameWords}
+    assert {type(shape) for shape in shapes} == {PictureDot, PictureLine, PictureWords}
 
 
 @pytest.mark.parametrize("tree", ["robot.yaml", "drive.yaml", "hostile"])
@@ -152,9 +153,9 @@ def test_a_png_needs_matplotlib_and_says_so(tree: str) -> None:
     scene = FrameScene(ODD["hostile names"] if tree == "hostile" else frametool.load(f"examples/{tree}"))
     if find_spec("matplotlib") is None:
         with pytest.raises(ValueInvalid, match=r"pip install 'frametool\[plot\]'"):
-            write_png(still_picture(scene).shapes)
+            write_png(still_picture(scene).picture)
     else:
-        data = write_png(still_picture(scene).shapes)
+        data = write_png(still_picture(scene).picture)
         assert data.startswith(b"\x89PNG")
         assert (int.from_bytes(data[16:20]), int.from_bytes(data[20:24])) == (WIDTH, HEIGHT)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import FILE, TEXT, Command, Text, decorated, verbose_option
+from frametool.cli.pictures import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns, rules, rules_options
@@ -68,8 +69,8 @@ def scene_options(function: Any) -> Any:
         click.option("--below", type=FRAME, metavar="FRAME", help="only this frame and those that hang from it"),
         click.option("--only", type=TEXT, metavar="REGEX", help="only frames whose name matches"),
         click.option("--path", "path_only", is_flag=True, help="only the frames between TARGET and SOURCE"),
-        click.option("--from", "eye", type=Eye(), metavar="EYE",
-                     help="slanted, front, side, top, or AZ,EL in degrees  [default: slanted]"),
+        click.option("--from", "eye", type=Eye(), default="slanted", show_default=True, metavar="EYE",
+                     help="slanted, front, side, top, or AZ,EL in degrees"),
     ]  # fmt: skip
     return decorated(function, options)
 
@@ -90,7 +91,7 @@ def scene_options(function: Any) -> Any:
 @click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
               help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
 def command(
-    tree: str, target: str | None, source: str | None, more: Sequence[str], eye: tuple[float, float] | None,
+    tree: str, target: str | None, source: str | None, more: Sequence[str], eye: tuple[float, float],
     moving: bool, cache: int | None, tf2: str | None, form: str | None, output: str | None, force: bool, opens: bool,
     color: str, **options: Any,
 ) -> None:  # fmt: skip
@@ -109,7 +110,7 @@ def command(
     chosen = _form(form, output, opens=opens)
     refuse_existing(output, force=force)
     if chosen == "png":
-        from frametool.view.plot_png import require_matplotlib
+        from frametool.view.png import require_matplotlib
 
         require_matplotlib()
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
@@ -125,7 +126,7 @@ def command(
         from frametool.view.frames_terminal import TerminalPicture, print_terminal
 
         columns, lines = os.get_terminal_size(sys.stdout.fileno())
-        print_terminal(TerminalPicture(scene, columns, lines - 1, *_eye(eye)), color)
+        print_terminal(TerminalPicture(scene, columns, lines - 1, eye), color)
         return
     content = _content(scene, chosen, tree, eye)
     path = _page_file(tree) if opens and output is None else output
@@ -136,10 +137,6 @@ def command(
 
         say(f"the page is {path}")
         webbrowser.open(f"file://{os.path.abspath(path)}")
-
-
-def _eye(eye: tuple[float, float] | None) -> list[tuple[float, float]]:
-    return [] if eye is None else [eye]
 
 
 def _form(form: str | None, output: str | None, *, opens: bool) -> str:
@@ -153,7 +150,7 @@ def _form(form: str | None, output: str | None, *, opens: bool) -> str:
     return chosen or "text"
 
 
-def _content(scene: FrameScene, form: str, tree: str, eye: tuple[float, float] | None) -> str | bytes:
+def _content(scene: FrameScene, form: str, tree: str, eye: tuple[float, float]) -> str | bytes:
     """Return the picture in a form."""
     title = os.path.basename(tree) if len(tree) < 200 else "tree"
     if form == "html":
@@ -167,26 +164,20 @@ def _content(scene: FrameScene, form: str, tree: str, eye: tuple[float, float] |
     if form == "text":
         from frametool.view.frames_terminal import TerminalPicture
 
-        return TerminalPicture(scene, *PIPE_SIZE, *_eye(eye)).text()
+        return TerminalPicture(scene, *PIPE_SIZE, eye).text()
     from frametool.view.frames_picture import still_picture
 
-    picture = still_picture(scene, *_eye(eye))
-    _tell_of_crowd(picture, scene)
-    if form == "svg":
-        from frametool.view.frames_svg import write_svg
-
-        return write_svg(picture.shapes, title)
-    from frametool.view.frames_png import write_png
-
-    return write_png(picture.shapes)
+    still = still_picture(scene, eye, title)
+    _tell_of_crowd(still, scene)
+    return drawn(still.picture, f".{form}")
 
 
-def _tell_of_crowd(picture: StillPicture, scene: FrameScene) -> None:
+def _tell_of_crowd(still: StillPicture, scene: FrameScene) -> None:
     """Say what a still picture does not show."""
-    if picture.crowded:
-        say(f"note: {picture.crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part")
-    if picture.hidden:
-        say(f"note: {picture.hidden} names found no place")
+    if still.crowded:
+        say(f"note: {still.crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part")
+    if still.hidden:
+        say(f"note: {still.hidden} names found no place")
 
 
 def _page_file(tree: str) -> str:
