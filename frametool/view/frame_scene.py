@@ -9,10 +9,9 @@ import re
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.frames.path import IDENTITY
 from frametool.geometry import rigid
-from frametool.text.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

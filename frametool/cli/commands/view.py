@@ -16,7 +16,7 @@ from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import ValueInvalid
-from frametool.text.numbers import parse_angle, shown
+from frametool.text.numbers import parse_angle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
