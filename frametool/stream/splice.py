@@ -100,7 +100,7 @@ class Splicer:
     def run(self) -> list[Edit]:
         """Return the edits, in no order."""
         shape = self.record.shape
-        if type(self.node.value) is not dict:
+        if type(self.node.value) is not dict or not self.node.value:
             return self._numbers(range(len(self.slots)), 0) if self._same_rotation() else self._rewritten()
         self._names()
         if shape.covariance:
