@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.view.label_places import place_labels
-from frametool.view.projection import SLANTED, Projection, Size, nice
+from frametool.view.projection import SLANTED, Projection, Size, axis_tips, nice
 from frametool.view.shapes import Picture, PictureDot, PictureLine, PictureWords
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from frametool.geometry.types import Rigid
     from frametool.view.frame_scene import FrameScene
     from frametool.view.label_places import Label
     from frametool.view.shapes import Shape
@@ -29,8 +30,13 @@ class StillPicture(NamedTuple):
     crowded: int
 
 
-def still_picture(scene: FrameScene, eye: tuple[float, float] = SLANTED, title: str = "") -> StillPicture:
-    """Draw a scene as it is seen from a direction: azimuth and elevation, radians."""
+def still_picture(
+    scene: FrameScene, eye: tuple[float, float] = SLANTED, title: str = "", other: FrameScene | None = None,
+) -> StillPicture:  # fmt: skip
+    """Draw a scene as it is seen from a direction: azimuth and elevation, radians.
+
+    other: another tree seen in the same frame, whose frames are laid faintly over those of the same names.
+    """
     flat = Projection(scene, SIZE, eye)
     blocked = [(0.0, HEIGHT - 92.0, 100.0, HEIGHT), (WIDTH - 330.0, HEIGHT - 58.0, WIDTH, HEIGHT)]
     labels, hidden = place_labels(flat, blocked=blocked)
@@ -45,6 +51,9 @@ def still_picture(scene: FrameScene, eye: tuple[float, float] = SLANTED, title: 
         for stretch in stretches:
             points = [flat.at(point)[:2] for point in stretch]
             shapes.append(PictureLine(points, "trail", 1.5, 0.5, title=frame))
+    for name, pose in other.poses().items() if other else ():
+        if name in flat.poses:
+            shapes += _other(flat, name, pose)
     for name in flat.nearest_last():
         shapes += _frame(flat, name)
     for label in labels:
@@ -59,6 +68,14 @@ def _frame(flat: Projection, name: str) -> Iterator[Shape]:
     tips = flat.tips(name)
     yield from (PictureLine([(x, y), tips[axis][:2]], AXES[axis], 2.0, title=name) for axis in flat.axis_order(name))
     yield PictureDot(x, y, 2.2, "ink", name)
+
+
+def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
+    """Draw where a frame stands in the other tree, and the way there."""
+    x, y, _ = flat.at(pose[:3])
+    for axis, tip in zip(AXES, axis_tips(pose, flat.axis), strict=True):
+        yield PictureLine([(x, y), flat.at(tip)[:2]], axis, 2.0, 0.4, title=name)
+    yield PictureLine([flat.origin(name)[:2], (x, y)], "trail", 1.5)
 
 
 def _label(label: Label) -> Iterator[Shape]:

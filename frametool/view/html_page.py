@@ -27,17 +27,25 @@ PACKED = 48_000  # bytes of doubles, from where on they are compressed
 NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def write_page(scene: FrameScene, *, title: str, file: str = "", eye: tuple[float, float] | None = None) -> str:
+def write_page(
+    scene: FrameScene, *, title: str, file: str = "", eye: tuple[float, float] | None = None,
+    other: FrameScene | None = None, other_title: str = "",
+) -> str:  # fmt: skip
     """Return the page.
 
     title: its heading.  file: the tree's name in the command that the page offers to copy.
     eye: azimuth and elevation of the first view, radians.
+    other: another tree seen in the same frame, laid over this one; other_title: what it is called.
     """
     head, numbers = _data(scene)
     data = numbers.tobytes()
     packed = len(data) > PACKED
     head |= {"title": title, "file": file or title, "made": f"frametool {__version__}", "packed": packed}
     head["show"] = _shown(scene, eye)
+    if other is not None:
+        here = {name: number for number, name in enumerate(scene.names)}
+        poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
+        head["overlay"] = {"title": other_title, "poses": poses}
     if packed:
         from zlib import compress
 

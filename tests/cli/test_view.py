@@ -89,6 +89,9 @@ def test_what_is_drawn_can_be_chosen(run: Run, arguments: tuple[str, ...], names
         (("--from", "x,1"), 2, "'x' is not a number"),
         (("-o", "x.gif"), 2, "no form has the suffix '.gif'"),
         (("-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
+        (("--overlay",), 2, "--overlay takes two trees"),
+        ((ROBOT, "map", "--overlay"), 2, "--overlay takes two trees"),
+        (("{frames: {a: }}", "--overlay", "-f", "svg"), 4, "unknown frame 'map'"),
         (("--open", "-f", "svg"), 2, "--open shows a page"),
         (("--open", "-o", "-"), 2, "--open shows a page"),
     ],
@@ -98,6 +101,19 @@ def test_what_cannot_be_is_one_line_on_stderr(run: Run, arguments: tuple[str, ..
     assert (outcome.status, outcome.out) == (status, "")
     assert outcome.err.startswith("frametool: ")
     assert message in outcome.err.splitlines()[0]
+
+
+@pytest.mark.parametrize("form", ["html", "svg"])
+def test_two_trees_are_laid_over_one_another(run: Run, form: str) -> None:
+    before = Path(ROBOT).read_text().replace("xyz: [0.285, 0, 0.310]", "xyz: [0.285, 0, 0.322]")
+    outcome = run("view", ROBOT, "before.yaml", "--overlay", "--below", "base_link", "-f", form, files={"before.yaml": before})
+    assert (outcome.status, outcome.err) == (0, "")
+    if form == "svg":
+        assert outcome.out.count('opacity="0.4"') == 3 * 13
+    else:
+        head = json.loads(re.search('id="head-data">([^<]*)<', outcome.out)[1])  # type: ignore[index]
+        assert head["overlay"]["title"] == "before.yaml"
+        assert len(head["overlay"]["poses"]) == 17
 
 
 def test_an_empty_tree_and_a_missing_file_are_told(run: Run) -> None:

@@ -16,6 +16,8 @@ from samples import LATTICE, LOCK_GAPS, random_quaternions
 
 import frametool
 from frametool.geometry import axis_angle, euler, floats, quaternion, rotvec
+from frametool.view.frame_scene import FrameScene
+from frametool.view.html_page import write_page
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -269,6 +271,26 @@ def test_no_name_lies_over_another(page_of: MakePage, visit: Visit, name: str, w
     assert boxes
     for a, b in itertools.combinations(boxes, 2):
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+
+
+def test_what_moved_between_two_trees_is_listed(tmp_path: Path, visit: Visit) -> None:
+    after, before = ("{frames: {map: {a: {xyz: [1, 0, 0]}, b: {xyz: [0, 2, 0]}}}}", "{frames: {map: {a: {xyz: [1, 0, 0.012], rpy_deg: [0, 0, 3]}, b: {xyz: [0, 2, 0]}}}}")
+    for name, text in (("after", after), ("before", before)):
+        (tmp_path / f"{name}.yaml").write_text(text)
+    scenes = [FrameScene(frametool.load(tmp_path / f"{name}.yaml")) for name in ("after", "before")]
+    path = tmp_path / "moved.html"
+    path.write_text(write_page(scenes[0], title="after", other=scenes[1], other_title="before"))
+    tab = visit(path)
+    assert tab.locator("#list div").all_inner_texts() == ["map\n0 m 0°", "a\n1.2 cm 3°", "b\n0 m 0°"]
+    tab.mouse.move(*middle(tab, "a"))
+    tab.wait_for_selector("#tip:not([hidden])")
+    assert "1.2 cm 3° from before" in tab.inner_text("#tip")
+    tab.locator("#source").fill("a")
+    tab.locator("#source").dispatch_event("change")
+    tab.locator("#view").focus()
+    tab.keyboard.press("x")
+    tab.keyboard.press("v")
+    assert tab.locator("#list div").all_inner_texts()[1] == "a\n0 m 0°"
 
 
 def test_hostile_names_are_text(page_of: MakePage, visit: Visit) -> None:

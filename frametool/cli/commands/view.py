@@ -87,13 +87,14 @@ def scene_options(function: Any) -> Any:
               help="form of the picture  [default: by the suffix of --output, else text]")
 @click.option("-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all")
 @click.option("--force", is_flag=True, help="let --output replace an existing file")
+@click.option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
 @click.option("--open", "opens", is_flag=True, help="show the page in the browser")
 @click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
               help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], eye: tuple[float, float],
     moving: bool, cache: int | None, tf2: str | None, form: str | None, output: str | None, force: bool, opens: bool,
-    color: str, **options: Any,
+    overlay: bool, color: str, **options: Any,
 ) -> None:  # fmt: skip
     """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
 
@@ -102,6 +103,7 @@ def command(
       frametool view robot.yaml --below base_link --from side
       frametool view robot.yaml map tool -o robot.html
       frametool view drive.yaml --at 2.5 -o drive.svg
+      frametool view after.yaml before.yaml --overlay -o moved.html
 
     The page needs nothing beside it and asks nothing of anybody: turn it, search, click a frame to see its transform
     from TARGET in every notation, play what moves. TREE is a file, a recording, - for standard input, or . for the
@@ -113,22 +115,25 @@ def command(
         from frametool.view.png import require_matplotlib
 
         require_matplotlib()
+    if overlay and (source or not target):
+        raise click.UsageError("--overlay takes two trees: frametool view AFTER BEFORE --overlay")
+    if options["path_only"] and not (target and source):
+        raise click.UsageError("--path draws the way between TARGET and SOURCE; name both")
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
     from frametool.view.frame_scene import FrameScene
 
-    if options["path_only"] and not (target and source):
-        raise click.UsageError("--path draws the way between TARGET and SOURCE; name both")
-    names = {"target": target, "source": source, "fixed": options["fixed"], "below": options["below"]}
+    stamp_ns, ends = at_ns(options.pop("at")), {} if overlay else {"target": target, "source": source}
+    names = ends | {"fixed": options["fixed"], "below": options["below"]}
     options |= {key: name and frame_name(name, frames) for key, name in names.items()}
-    stamp_ns = at_ns(options.pop("at"))
     scene = FrameScene(frames, at_ns=stamp_ns, **options)
+    before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed) if overlay else None
     if chosen == "text" and output is None and sys.stdout.isatty():
         from frametool.view.frames_terminal import TerminalPicture, print_terminal
 
         columns, lines = os.get_terminal_size(sys.stdout.fileno())
         print_terminal(TerminalPicture(scene, columns, lines - 1, eye), color)
         return
-    content = _content(scene, chosen, tree, eye)
+    content = _content(scene, chosen, tree, eye, before, str(target))
     path = _page_file(tree) if opens and output is None else output
     with writing(path, force=force or output is None) as write:
         write(content)
@@ -150,13 +155,15 @@ def _form(form: str | None, output: str | None, *, opens: bool) -> str:
     return chosen or "text"
 
 
-def _content(scene: FrameScene, form: str, tree: str, eye: tuple[float, float]) -> str | bytes:
+def _content(
+    scene: FrameScene, form: str, tree: str, eye: tuple[float, float], before: FrameScene | None, before_tree: str,
+) -> str | bytes:  # fmt: skip
     """Return the picture in a form."""
-    title = os.path.basename(tree) if len(tree) < 200 else "tree"
+    title, other_title = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, before_tree))
     if form == "html":
         from frametool.view.html_page import write_page
 
-        return write_page(scene, title=title, file=tree, eye=eye)
+        return write_page(scene, title=title, file=tree, eye=eye, other=before, other_title=other_title)
     if form == "glb":
         from frametool.view.glb import write_glb
 
@@ -167,7 +174,7 @@ def _content(scene: FrameScene, form: str, tree: str, eye: tuple[float, float]) 
         return TerminalPicture(scene, *PIPE_SIZE, eye).text()
     from frametool.view.frames_picture import still_picture
 
-    still = still_picture(scene, eye, title)
+    still = still_picture(scene, eye, title, before)
     _tell_of_crowd(still, scene)
     return drawn(still.picture, f".{form}")
 

@@ -1,11 +1,11 @@
 // From metres in `fixed` to pixels: an orthographic or perspective view that turns about a point.
 
-const SLANTED = [-0.9, 0.5];                                        // azimuth and elevation of the eye, radians
+const SLANTED = [-0.9, 0.5];  // azimuth and elevation of the eye, radians
 const cam = {azimuth: SLANTED[0], elevation: SLANTED[1], scale: 60, at: [0, 0, 0], radius: 1};
 const canvas = document.getElementById("view"), pen = canvas.getContext("2d", {alpha: false});
-let view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];                       // rows: right, up, toward the eye
-let width = 1, height = 1, far = 1;                                 // pixels, pixels, metres from the eye
-const AT = new Float32Array(3 * COUNT);                             // of every drawn frame: pixels x, y, metres of depth
+let view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];  // rows: right, up, toward the eye
+let width = 1, height = 1, far = 1;  // pixels, pixels, metres from the eye
+const AT = new Float32Array(3 * COUNT);  // of every drawn frame: pixels x, y, metres of depth
 
 function view_axes() {
   const ca = Math.cos(cam.azimuth), sa = Math.sin(cam.azimuth);

@@ -2,9 +2,9 @@
 // 104 days.  Frames are numbers: places in head.names; -1 is none.
 
 const NAMES = head.names, COUNT = NAMES.length;
-const PARENT = Int32Array.from(head.parents);                       // of frames that stand still
+const PARENT = Int32Array.from(head.parents);  // of frames that stand still
 const POSE = new Float64Array(blob, 0, 7 * COUNT);
-const TRACKS = new Map(head.tracks.map((track) => [track.frame, {   // of those that move
+const TRACKS = new Map(head.tracks.map((track) => [track.frame, {  // of those that move
   parents: track.parents, last: track.count - 1,
   stamps: new Float64Array(blob, track.at, track.count),
   samples: new Float64Array(blob, track.at + 8 * track.count, 7 * track.count),

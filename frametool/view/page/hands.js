@@ -1,8 +1,8 @@
 // Mouse, touch, keys and buttons.
 
-const TOUCH = 24, MOUSE = 13;                                       // pixels from a frame that still hit it
+const TOUCH = 24, MOUSE = 13;  // pixels from a frame that still hit it
 const fingers = new Map();
-let dragged = 0;                                                    // pixels since the first finger came down
+let dragged = 0;  // pixels since the first finger came down
 
 // ---- what is under the pointer
 function frame_near(x, y, reach = MOUSE) {
@@ -43,6 +43,7 @@ function description(frame) {
     lines.push(`  xyz  ${columns(position(pose))}  m`, `  rpy  ${columns(rpy_deg)}  deg`, `  xyzw ${columns(q)}`);
     lines.push(`  axis ${columns(axis)}${columns([angle * RADIAN])} deg`);
   }
+  if (difference(frame)) lines.push(`${difference(frame)} from ${head.overlay.title}`);
   if (others.length) lines.push(`same place: ${others.slice(0, 4).join(", ")}${others.length > 4 ? " …" : ""}`);
   return lines.join("\n");
 }
@@ -114,11 +115,7 @@ const SWITCHES = {names: "n", axes: "a", links: "l", grid: "g", trails: "t", per
 const switches = {};
 
 function add_button(text, title, act) {
-  const button = document.createElement("button");
-  button.textContent = text;
-  button.title = title;
-  button.setAttribute("aria-label", title);
-  button.onclick = act;
+  const button = make("button", {textContent: text, title, ariaLabel: title, onclick: act});
   $("tools").append(button);
   return button;
 }
@@ -162,13 +159,6 @@ function toggle_path() {
 }
 
 // ---- keys
-const KEY_HELP = [
-  ["drag · arrows", "turn"], ["shift-drag · right drag · two fingers", "move"], ["wheel · + −", "zoom"],
-  ["click · shift-click", "source · target"], ["double click", "go to a frame; beside it: show all"],
-  ["x", "swap source and target"], ["v", "see all in the target"], ["h", "only the path"], ["/", "search"],
-  ["space , .", "play, step"], ["n a l g t p d", "names axes links grid trails perspective dark"],
-  ["[ ]", "shorter, longer axes"], ["0 1 3 7 f", "slanted front side top all"]];
-
 const KEYS = {
   ArrowLeft: () => orbit(0.1, 0),
   ArrowRight: () => orbit(-0.1, 0),
@@ -251,8 +241,7 @@ async function copy(button, text) {
   try {
     await navigator.clipboard.writeText(text);
   } catch {
-    const area = document.createElement("textarea");
-    area.value = text;
+    const area = make("textarea", {value: text});
     document.body.append(area);
     area.select();
     document.execCommand("copy");

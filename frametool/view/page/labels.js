@@ -1,7 +1,7 @@
 // Names beside frames, none over another: the chosen first, then those that move, then the nearest.
 
 const MOST_NAMES = 160, MOST_FAILED = 60, MANY = 3000, CELL = 64, LINE = 16;
-const DISTANCES = [9, 20, 34, 52, 74];                              // pixels from a frame to its name
+const DISTANCES = [9, 20, 34, 52, 74];  // pixels from a frame to its name
 const SIDES = [[1, -0.6], [1, 0.6], [-1, -0.6], [-1, 0.6], [0, -1.3], [0, 1.3], [1, 0], [-1, 0]];
 const labels = {placed: [], outside: [], hidden: 0};
 

@@ -11,19 +11,7 @@ const roots = ALL.filter((frame) => first_parent(frame) < 0).length;
 const moving = TRACKS.size ? `, ${TRACKS.size} moving` : "", several = roots > 1 ? `, ${roots} roots` : "";
 $("head").textContent = head.title;
 $("foot").textContent = `${COUNT} frames${moving}${several} · ${head.made}`;
-if (COUNT <= 2000) {
-  for (const name of NAMES) {
-    const option = document.createElement("option");
-    option.value = name;
-    $("names").append(option);
-  }
-}
-for (const [keys, meaning] of KEY_HELP) {
-  const row = $("help").tBodies[0].insertRow(), key = document.createElement("kbd");
-  key.textContent = keys;
-  row.insertCell().append(key);
-  row.insertCell().textContent = meaning;
-}
+if (COUNT <= 2000) $("names").append(...NAMES.map((value) => make("option", {value})));
 $("bar").hidden = !TRACKS.size;
 $("source").value = NAMES[state.source];
 $("target").value = NAMES[state.target];

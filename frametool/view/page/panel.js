@@ -2,7 +2,9 @@
 
 const MOST_LISTED = 300;
 const $ = (id) => document.getElementById(id);
-let answer = {path: []};                                            // of `lookup` for target and source
+const make = (tag, properties) => Object.assign(document.createElement(tag), properties);
+const bold = (text) => make("b", {textContent: text});
+let answer = {path: []};  // of `lookup` for target and source
 
 // Write a number for reading, or with all its digits as the command does.
 function digits(value) {
@@ -13,7 +15,7 @@ function digits(value) {
 function all_digits(value) {
   const size = Math.abs(value);
   if (value === 0) return "0.0";
-  if (size >= 1e16 || size < 1e-4) {                                // Python's repr has two digits of exponent at least
+  if (size >= 1e16 || size < 1e-4) {  // Python's repr has two digits of exponent at least
     return value.toExponential().replace(/e([+-])(\d)$/, "e$10$2");
   }
   return Number.isInteger(value) ? value.toFixed(1) : String(value);
@@ -47,38 +49,21 @@ function show_answer() {
   pose.matrix.forEach((row, at) => add_row(body, at ? "" : "matrix", row.map((value) => ["", value])));
   add_row(body, "distance", [["", length(...position(answer.pose))]], "m");
   if (pose.locked) {
-    const note = body.insertRow().insertCell();
-    note.colSpan = 5;
-    note.className = "bad note";
-    note.textContent = "⚠ gimbal lock: roll and yaw turn about one axis; yaw is set to 0";
+    const textContent = "⚠ gimbal lock: roll and yaw turn about one axis; yaw is set to 0";
+    Object.assign(body.insertRow().insertCell(), {colSpan: 5, className: "bad note", textContent});
   }
-}
-
-function bold(text) {
-  const element = document.createElement("b");
-  element.textContent = text;
-  return element;
 }
 
 const at_time = () => (TRACKS.size ? ` at ${stamp(state.t)}` : "");
 
 function add_row(body, label, cells, unit = "") {
-  const row = body.insertRow(), head_cell = document.createElement("th");
-  head_cell.textContent = label;
-  row.append(head_cell);
+  const row = body.insertRow();
+  row.append(make("th", {textContent: label}));
   for (let at = cells.length; at < 3; at++) row.insertCell();
   for (const [letter, value] of cells) {
-    const cell = row.insertCell();
-    if (letter) {
-      const small = document.createElement("small");
-      small.textContent = letter;
-      cell.append(small);
-    }
-    cell.append(digits(value));
+    row.insertCell().append(...letter ? [make("small", {textContent: letter})] : [], digits(value));
   }
-  const last = row.insertCell();
-  last.className = "unit";
-  last.textContent = unit;
+  Object.assign(row.insertCell(), {className: "unit", textContent: unit});
 }
 
 // Return the answer as an entry of a tree.
@@ -104,7 +89,7 @@ function matcher(text) {
     const pattern = new RegExp(text.slice(1, -1), "i");
     return (name) => pattern.test(name);
   } catch {
-    return plain;                                                   // half typed
+    return plain;  // half typed
   }
 }
 
@@ -114,27 +99,15 @@ function show_list() {
   state.found = text ? new Set(found) : null;
   box.textContent = "";
   for (const frame of found.slice(0, MOST_LISTED)) box.append(list_row(frame, text));
-  if (found.length > MOST_LISTED) box.append(paragraph(`… and ${found.length - MOST_LISTED} more: search`));
-  if (!found.length) box.append(paragraph("no frame of this name"));
+  const more = found.length - MOST_LISTED, said = more > 0 ? `… and ${more} more: search` : "no frame of this name";
+  if (more > 0 || !found.length) box.append(make("p", {textContent: said}));
   redraw();
 }
 
-function paragraph(text) {
-  const element = document.createElement("p");
-  element.textContent = text;
-  return element;
-}
-
 function list_row(frame, searching) {
-  const row = document.createElement("div"), tick = document.createElement("input");
-  const name = document.createElement("span"), note = document.createElement("em");
-  row.setAttribute("role", "option");
-  row.dataset.frame = frame;
-  mark_row(row);
-  tick.type = "checkbox";
-  tick.checked = !state.hidden.has(frame);
-  tick.tabIndex = -1;
-  tick.title = "Draw it (Alt: with all below it)";
+  const note = !SEEN[frame] ? "elsewhere" : difference(frame) || (TRACKS.has(frame) ? "moves" : "");
+  const tick = make("input", {
+    type: "checkbox", checked: !state.hidden.has(frame), tabIndex: -1, title: "Draw it (Alt: with all below it)"});
   tick.onclick = (event) => {
     event.stopPropagation();
     for (const each of event.altKey ? below(frame) : [frame]) {
@@ -144,12 +117,16 @@ function list_row(frame, searching) {
     if (event.altKey) show_list();
     redraw();
   };
-  name.textContent = name.title = NAMES[frame];
+  const name = make("span", {textContent: NAMES[frame], title: NAMES[frame]});
   name.style.paddingLeft = searching ? 0 : `${Math.min(DEPTH[frame], 12) * 10}px`;
-  note.textContent = !SEEN[frame] ? "elsewhere" : TRACKS.has(frame) ? "moves" : "";
-  row.append(tick, name, note);
-  row.onclick = (event) => choose(frame, event.shiftKey ? "target" : "source");
-  row.ondblclick = () => focus_on(frame);
+  const row = make("div", {
+    role: "option",
+    onclick: (event) => choose(frame, event.shiftKey ? "target" : "source"),
+    ondblclick: () => focus_on(frame),
+  });
+  row.dataset.frame = frame;
+  mark_row(row);
+  row.append(tick, name, make("em", {textContent: note}));
   return row;
 }
 

@@ -1,11 +1,11 @@
 // The picture: ground, links, trails, the way, axes, what lies outside, a scale.
 
-const MOST_ROUND = 600, MOST_LINES = 5000;                          // frames drawn one by one, and with lines at all
-const AXIS_LENGTHS = [14, 46];                                      // pixels, least and most
-const EDGE = 60;                                                    // pixels beyond the picture that still count
+const MOST_ROUND = 600, MOST_LINES = 5000;  // frames drawn one by one, and with lines at all
+const AXIS_LENGTHS = [14, 46];  // pixels, least and most
+const EDGE = 60;  // pixels beyond the picture that still count
 const SMALL = "11px system-ui, sans-serif", NORMAL = "12px system-ui, 'DejaVu Sans', sans-serif";
 const tint = {};
-let drawing = false;                                                // whether the next picture is on its way
+let drawing = false;  // whether the next picture is on its way
 
 function take_colours() {
   const style = getComputedStyle(document.documentElement);
@@ -36,6 +36,7 @@ function draw() {
   draw_way();
   if (inside.length > MOST_LINES) draw_dust(inside);
   else draw_axes(inside);
+  draw_others(inside);
   draw_outside(frames);
   draw_names(inside);
   draw_corner();
@@ -194,6 +195,25 @@ function draw_frame(frame, metres) {
   stroke(tint_of(frame, tint.ink), 1.5);
 }
 
+// Draw where the frames stand in the other tree, and how they got there.
+function draw_others(inside) {
+  const metres = axis_metres();
+  for (const frame of OTHER.size ? inside : []) {
+    const pose = other_pose(frame);
+    if (!pose) continue;
+    const place = project(pose);
+    const rows = to_matrix(rotation(pose));
+    for (const axis of [0, 1, 2]) {
+      pen.beginPath();
+      segment(place, project(rows.map((row, k) => pose[k] + metres * row[axis])));
+      stroke(tint.axes[axis], 2, 0.4);
+    }
+    pen.beginPath();
+    segment([x_of(frame), y_of(frame)], place);
+    stroke(tint.hot, 1.5);
+  }
+}
+
 function depth_of_axis(frame, axis) {
   const at = 12 * frame + 3 + 3 * axis;
   return view[2][0] * WORLD[at] + view[2][1] * WORLD[at + 1] + view[2][2] * WORLD[at + 2];
@@ -236,6 +256,6 @@ function draw_corner() {
 }
 
 function in_words(metres) {
-  if (metres >= 1) return `${+metres.toPrecision(3)} m`;
+  if (metres >= 1 || metres === 0) return `${+metres.toPrecision(3)} m`;
   return metres >= 0.01 ? `${+(metres * 100).toPrecision(3)} cm` : `${+(metres * 1000).toPrecision(3)} mm`;
 }

@@ -38,7 +38,7 @@ function first_common() {
 
 // Where every frame is in `fixed` at state.t: origin, then the axes x, y, z.
 const WORLD = new Float64Array(12 * COUNT), SEEN = new Uint8Array(COUNT), UP = new Int32Array(COUNT);
-let link_length = 0.5;                                              // the usual distance from a frame to its parent
+let link_length = 0.5;  // the usual distance from a frame to its parent
 
 function place_frames() {
   const poses = new Array(COUNT), base = new Int32Array(COUNT).fill(-1);
@@ -81,6 +81,23 @@ const distance = (a, b) => length(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 function on_axis(frame, axis, metres) {
   const at = 12 * frame, along_axis = at + 3 + 3 * axis;
   return [0, 1, 2].map((k) => WORLD[at + k] + metres * WORLD[along_axis + k]);
+}
+
+// ---- another tree laid over this one: poses of the frames of the same names, as they were in the first `fixed`
+const OTHER = new Map(Object.entries(head.overlay ? head.overlay.poses : {}).map(([key, pose]) => [Number(key), pose]));
+
+function other_pose(frame) {
+  const back = OTHER.get(state.fixed), pose = OTHER.get(frame);
+  return back && pose ? compose(inverse(back), pose) : null;
+}
+
+// Return in words how far a frame stands from itself in the other tree; "" where it is not in both.
+function difference(frame) {
+  const here = lookup(state.fixed, frame, state.t).pose, there = other_pose(frame);
+  if (!here || !there) return "";
+  const turned = compose_rotations(rotation(inverse(here)), rotation(there));
+  const degrees = to_axis_angle(unit(turned)).angle * RADIAN;
+  return `${in_words(distance(here, there))} ${+degrees.toPrecision(3)}°`;
 }
 
 // List the frames that are drawn.
