@@ -102,3 +102,8 @@ def test_the_command_shows_the_conventions_it_found(run: Run) -> None:
     assert run("convert", pose, "--find", "31,20,10", "--deg", "--tolerance", "0.02").status == 0
     for wrong in ("1,2", "1,2,x", "1,2,3,4"):
         assert run("convert", pose, "--find", wrong).status == 2
+
+
+def test_drawings_show_no_noise(run: Run) -> None:
+    tree = "frames: {a: {b: {xyz: [1e-16, 9.999999999999998, 2e-5], rpy_deg: [0, -1e-14, 90]}}}"
+    assert "b  xyz 0 10 2.0e-05  rpy_deg 0 0 90\n" in run("tree", "-", "-f", "text", stdin=tree).out

@@ -70,8 +70,8 @@ def command(
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
       frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle --format json
       frametool convert --axes optical --to rpy_deg
-      frametool convert --from xyzw 0 0 0.6 0.8 --to euler:all
-      frametool convert --from wxyz 0.8 0 0 0.6 --find 1.287,0,0 --tolerance 1e-3
+      frametool convert --from rpy_deg 10 20 30 --to euler:all
+      frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
