@@ -99,7 +99,9 @@ def test_echo_tells_of_times_without_data_and_goes_on(run: Run) -> None:
     found = run("echo", *BOTH, "map", "cam", "--start", "1699999999", "-f", "json", files=FILES)
     assert found.status == 3
     assert len(found.out.splitlines()) == 2
-    assert "2 times without data" in found.err
+    told = [json.loads(line) for line in found.err.splitlines()]
+    assert [each["error"] for each in told] == ["too_early", "times_skipped"]
+    assert (told[-1]["skipped"], told[-1]["asked"]) == (2, 4)
 
 
 @pytest.mark.parametrize("times", [("--start", "1800000000"), ("--stop", "0"), ("--start", "1", "--stop", "2")])
@@ -274,6 +276,12 @@ def moving(*stamps_and_places: tuple[float, float], parents: str = "m") -> str:
     )
 
 
+def bridged(*topics: str) -> str:
+    """Return lines of rosbridge, the same transform by each topic."""
+    message = transform("map", "b", EPOCH)
+    return "".join(json.dumps({"op": "publish", "topic": topic, "msg": message}) + "\n" for topic in topics)
+
+
 STEADY = [(0.1 * at, 0.01 * at) for at in range(20)]
 RECORDINGS = {
     "repeated": moving(*STEADY, STEADY[-1]),
@@ -286,6 +294,8 @@ RECORDINGS = {
     "flicker": moving(*STEADY, parents="mo"),
     "static-and-moving": moving(*STEADY),
     "noise": "WARNING: topic [/tf] does not appear to be published yet\n" + moving(*STEADY),
+    "topics": bridged("/tf", "/tf_static"),
+    "two-topics": bridged("/tf", "/robot1/tf"),
 }
 
 

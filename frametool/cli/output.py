@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from frametool.cli.command import FULL
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.errors import printable
@@ -14,12 +16,15 @@ from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
+
+
+BATCH = 256  # poses
 
 
 class Output:
@@ -45,11 +50,35 @@ class Output:
         form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
-        self.style = Style(form, chosen, degrees=deg, precision=precision, keep_sign=keep_sign)
+        full = precision == FULL
+        digits = None if full else precision
+        self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
+
+    def use(self, notations: tuple[Notation, ...]) -> None:
+        """Write rotations in these notations."""
+        self.style = self.style.in_notations(notations)
 
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""
         self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))
+
+    def poses_as_they_come(self, results: Iterator[Result]) -> None:
+        """Write poses that have the same keys, in batches."""
+        self.pieces(self._batches(results))
+
+    def _batches(self, results: Iterator[Result]) -> Iterator[str]:
+        """Yield the text of some results after the other, short batches first.
+
+        In every form the text of several results begins with that of the first: what follows it is the batch's.
+        """
+        write_poses = self._module("frametool.view.pose_text").write_poses
+        size = 2
+        begin = list(islice(results, size))
+        yield write_poses(begin, self.style)
+        known = len(write_poses(begin[:1], self.style))
+        while batch := list(islice(results, size)):
+            yield write_poses([begin[0], *batch], self.style)[known:]
+            size = min(2 * size, BATCH)
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""

@@ -7,19 +7,69 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Text, decorated
-from frametool.errors import FormatError, ValueInvalid
+from frametool.cli.error_json import as_json
+from frametool.cli.stderr import say_error, tell
+from frametool.errors import FormatError, FrametoolError, ValueInvalid
 from frametool.formats.assembly import Rules
-from frametool.frames.stamps import parse_stamp
+from frametool.frames.stamps import NotATime, parse_stamp, whole_stamp
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator, Sequence
     from typing import TypeVar
+
+    from frametool.grammar.result import Result
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 LATEST = "latest"
 POLICIES = ("ros1", "ros2")
 MOST_TIMES = 100_000_000
+MOST_TOLD = 10  # times without a result
+
+
+class TimesSkipped(FrametoolError):
+    """Report how many of the times asked for have no result."""
+
+    exit_code = 3
+
+
+class Skipped:
+    """Times that are left out: the first are reported, all are counted."""
+
+    def __init__(self, *, in_json: bool) -> None:
+        """Create an empty count; `in_json` says how errors are written."""
+        self.in_json = in_json
+        self.errors: list[FrametoolError] = []
+        self.count = 0
+        self.found = 0
+
+    @property
+    def is_full(self) -> bool:
+        """Return whether further errors are only counted."""
+        return len(self.errors) >= MOST_TOLD
+
+    def add(self, error: FrametoolError | None, count: int = 1) -> None:
+        """Count one time, or several in a row; keep why they are left out, if that is told and will be reported."""
+        self.count += count
+        if error is not None and not self.is_full:
+            self.errors.append(error)
+
+    def counted(self, results: Iterator[Result]) -> Iterator[Result]:
+        """Yield results and count them."""
+        for result in results:
+            self.found += 1
+            yield result
+
+    def finish(self) -> int:
+        """Report what was left out; return the exit status."""
+        if not self.count:
+            return 0
+        for error in self.errors:
+            tell(as_json(error) if self.in_json else f"frametool: {error} (skipped)")
+        asked = self.found + self.count
+        total = TimesSkipped(f"{self.count} of {asked} times skipped", skipped=self.count, asked=asked)
+        say_error(total, in_json=self.in_json)
+        return total.exit_code
 
 
 class Time(Text):
@@ -37,9 +87,11 @@ class Time(Text):
         if not isinstance(text, str) or (self.latest and text == LATEST):
             return text
         try:
-            return parse_stamp(text)
+            return whole_stamp(parse_stamp(text))
+        except NotATime as error:
+            self.fail(f"{error}{', or latest' if self.latest else ''}", param, ctx)
         except ValueInvalid as error:
-            self.fail(f"{error}{', or latest' if self.latest and 'write' in str(error) else ''}", param, ctx)
+            self.fail(str(error), param, ctx)
 
 
 TIME = Time()
@@ -63,31 +115,36 @@ def rules_options(function: Function) -> Function:
     return decorated(function, options)
 
 
-def rules(*, moving: bool, cache: int | None, tf2: str | None) -> Rules:
-    """Settle how moving frames are taken."""
+def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:
+    """Collect what the options say about how frames are taken."""
+    if tf2 is not None and normalize:
+        raise click.UsageError("--tf2 takes rotations as tf2 does; leave --normalize out")
     if cache is not None and cache < 0:
         raise click.UsageError("--cache takes seconds, not less than 0")
-    return Rules(moving=moving, policy=tf2 or "frametool", keep_ns=cache)
+    return Rules(moving=moving, policy=tf2 or "frametool", keep_ns=cache, normalize=normalize)
 
 
-def read_times(text: str) -> list[int] | range:
+def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:
     """Read START:STOP:STEP (seconds; STOP counts if a step meets it), or the lines of a file or `-`, in order.
 
-    Empty lines and those that begin with `#` are passed over.  Raises FormatError with the line.
+    Empty lines and those that begin with `#` are passed over.
+    report: takes the errors of lines that are no time.
     """
     from frametool.cli.poses import source_of
 
     if text.count(":") == 2:
         return _range(text)
     source = source_of(text)
-    times = []
+    times: list[int] = []
+    bad = 0
     for number, line in enumerate(source.text.splitlines(), 1):
         if (stripped := line.strip()) and not stripped.startswith("#"):
             try:
-                times.append(parse_stamp(stripped))
+                times.append(whole_stamp(parse_stamp(stripped)))
             except ValueInvalid as error:
-                raise FormatError(str(error), source=source.name, line=number) from None
-    if not times:
+                bad += 1
+                report(FormatError(str(error), source=source.name, line=number))
+    if not times and not bad:
         raise FormatError("no times in it; write one a line", source=source.name)
     return times
 
@@ -95,7 +152,7 @@ def read_times(text: str) -> list[int] | range:
 def _range(text: str) -> range:
     """Read START:STOP:STEP."""
     try:
-        start, stop, step = map(parse_stamp, text.split(":"))
+        start, stop, step = (whole_stamp(parse_stamp(part)) for part in text.split(":"))
     except ValueInvalid as error:
         raise click.UsageError(f"--times {text}: {error}; a range is START:STOP:STEP in seconds") from None
     if step <= 0 or stop < start:

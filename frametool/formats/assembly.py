@@ -27,17 +27,21 @@ if TYPE_CHECKING:
 
 
 class Rules:
-    """How moving frames are taken."""
+    """How frames are taken that move, and rotations that are none."""
 
-    __slots__ = ("keep_ns", "moving", "policy")
+    __slots__ = ("keep_ns", "moving", "normalize", "policy")
 
-    def __init__(self, *, moving: bool = False, policy: str = "frametool", keep_ns: int | None = None) -> None:
+    def __init__(
+        self, *, moving: bool = False, policy: str = "frametool", keep_ns: int | None = None, normalize: bool = False
+    ) -> None:
         """Keep the rules.
 
         moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still.
         policy, keep_ns: as TransformBuffer has them.
+        normalize: any non-zero quaternion and any matrix near a rotation is taken.
         """
         self.moving = moving
+        self.normalize = normalize
         self.policy = policy
         self.keep_ns = keep_ns
 

@@ -12,7 +12,7 @@ from frametool.formats.assembly import Assembly, Rules
 from frametool.formats.recordings import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from os import PathLike
 
     from frametool.formats.assembly import Place
@@ -41,31 +41,39 @@ class EdgePlace(NamedTuple):
 
 
 def load(
-    *paths: str | PathLike[str], moving: bool = False, policy: str = "frametool", keep_ns: int | None = None
+    *paths: str | PathLike[str],
+    moving: bool = False,
+    policy: str = "frametool",
+    keep_ns: int | None = None,
+    normalize: bool = False,
+    topics: Iterable[str] = (),
 ) -> FrameTree | TransformBuffer:
     """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 
     paths: files in any form that `frametool.formats.FORMATS` reads a tree from; `-` is standard input.
     moving: an edge with a single stamp answers only that instant; otherwise it counts as standing.
-    policy, keep_ns: as TransformBuffer has them.
+    policy, keep_ns: as TransformBuffer has them.  topics: those of a recording that are read  [default: all].
+    normalize: take any non-zero quaternion and any matrix near a rotation.
     Raises FormatError and BadTopology with file, line and column; FileProblem.
     """
-    return load_sources([Recording(path) for path in paths], Rules(moving=moving, policy=policy, keep_ns=keep_ns))
+    rules = Rules(moving=moving, policy=policy, keep_ns=keep_ns, normalize=normalize)
+    chosen = tuple(topics)
+    return load_sources([Recording(path, topics=chosen) for path in paths], rules)
 
 
 def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = None) -> FrameTree | TransformBuffer:
     """Merge the frames of several texts and files; otherwise as `load`."""
     assembly = Assembly(", ".join(source.name for source in sources), rules)
-    raw = assembly.rules.policy != "frametool"
     with paused_collector():
         for source in sources:
-            _add(assembly, Recording.inline(source) if isinstance(source, Source) else source, raw=raw)
+            _add(assembly, Recording.inline(source) if isinstance(source, Source) else source)
         return assembly.finish()
 
 
-def _add(assembly: Assembly, file: Recording, *, raw: bool) -> None:
+def _add(assembly: Assembly, file: Recording) -> None:
     edge = None
-    for edge in file.edges(raw=raw):
+    rules = assembly.rules
+    for edge in file.edges(raw=rules.policy != "frametool", normalize=rules.normalize):
         if edge.parent is None:
             assembly.add_root(edge.child)
         else:

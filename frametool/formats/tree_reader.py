@@ -40,7 +40,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     source = file.source
     notes: list[Note] = []
     for document in parse_documents(source.text, source.name):
-        reading = Reading(source, raw=options.raw)
+        reading = Reading(source, raw=options.raw, normalize=options.normalize)
         try:
             for edge in read_edges(document.value, reading):
                 bare = edge if options.raw else without_slashes(edge, reading)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from frametool.errors import LookupFailed
     from frametool.frames.policy import BufferPolicy
+    from frametool.frames.replay import Replayed
     from frametool.frames.track import Track
     from frametool.frames.tree import FrameTree
     from frametool.geometry.types import Rigid
@@ -162,8 +163,10 @@ class Frames:
 
     def replay(
         self, target: str, source: str, *, rate_hz: float, start_ns: int | None = None, stop_ns: int | None = None
-    ) -> Iterator[tuple[int | None, Transform | NoDataAt]]:
-        """Yield (time, target_from_source) again and again while time goes by; the error where there is no data.
+    ) -> Iterator[Replayed]:
+        """Yield (at_ns, found, steps) again and again while time goes by: found is target_from_source.
+
+        Where there is no data found is the error; steps is 1, but all before or behind the `span` come as one.
 
         rate_hz: steps in a second.  start_ns, stop_ns: None for the `span`.  If nothing moves there is one step.
         Raises ValueInvalid for a rate whose steps are not between a nanosecond and a century; otherwise as `lookup`.

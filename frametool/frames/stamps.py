@@ -19,6 +19,10 @@ _NANOSECONDS = r"(?a)([-+]?\d{1,30})ns"
 FURTHEST_NS = 1 << 62  # differences of two such stamps fit into 64 bits; the year 2116
 
 
+class NotATime(ValueInvalid):
+    """Report a text that is written in no way that a time is."""
+
+
 def whole_stamp(stamp_ns: Any) -> int:
     """Check a stamp: an integer, never a float.
 
@@ -42,7 +46,7 @@ def parse_stamp(text: str) -> int:
         return int(match[1])
     match = re.fullmatch(_SECONDS, text)
     if match is None or not (match[2] or match[3]) or len(text) > 60:
-        raise ValueInvalid(f"{shown(text)} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
+        raise NotATime(f"{shown(text)} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
     sign, whole, fraction, exponent = match[1], match[2], match[3] or "", int(match[4] or 0)
     shift = 9 - len(fraction) + exponent
     digits = int(whole + fraction)

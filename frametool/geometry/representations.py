@@ -376,6 +376,12 @@ def notation(spec: str) -> Notation:
     return Notation(spec, row, checked_axes(axes) if colon else None, degrees=degrees)
 
 
+def notations(spec: str) -> tuple[Notation, ...]:
+    """Read the name of a notation, or `euler:all` for the 24 conventions there are; raises as `notation` does."""
+    name, _, axes = spec.partition(":")
+    return tuple(notation(f"{name}:{each}") for each in sorted(euler.AXES)) if axes == "all" else (notation(spec),)
+
+
 def checked_axes(axes: str) -> str:
     """Return the name of an Euler convention back if it is one; else raise ValueInvalid with those there are."""
     if axes in euler.AXES:

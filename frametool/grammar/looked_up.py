@@ -10,10 +10,12 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
+
+BLOCK = 1 << 14  # times
 
 
 def result_at(components: Rigid, target: str, source: str, at_ns: int | None) -> Result:
@@ -39,20 +41,27 @@ def looked_up_across(
 
 
 def looked_up_many(
-    frames: Frames, target: str, source: str, times: Sequence[int], *, missing: str = "raise"
+    frames: Frames, target: str, source: str, times: Sequence[int], *, miss: Callable[[int], None] | None = None
 ) -> Iterator[Result]:
-    """Look up at many times, in their order; those without data raise, or are left out if `missing` is "nan"."""
-    found = frames.lookup_many(target, source, times, missing=missing)
-    rows = zip(*(column.tolist() for column in found.components), strict=True)
-    for at_ns, row in zip(times, rows, strict=True):
-        if isfinite(row[6]):
-            yield result_at(row, target, source, at_ns)
+    """Look up at many times, in their order, block by block.
+
+    miss: takes each time without data, which then has no result; without it the first one raises.
+    """
+    for begin in range(0, len(times), BLOCK):
+        block = times[begin : begin + BLOCK]
+        found = frames.lookup_many(target, source, block, missing="nan" if miss else "raise")
+        rows = zip(*(column.tolist() for column in found.components), strict=True)
+        for at_ns, row in zip(block, rows, strict=True):
+            if isfinite(row[6]):
+                yield result_at(row, target, source, at_ns)
+            elif miss:
+                miss(at_ns)
 
 
-def reasons(frames: Frames, target: str, source: str, times: Sequence[int]) -> Iterator[LookupFailed]:
-    """Yield why there is no answer at each of some times."""
-    for at_ns in times:
-        try:
-            frames.lookup_components(target, source, at_ns)
-        except LookupFailed as error:
-            yield error
+def why_missing(frames: Frames, target: str, source: str, at_ns: int) -> LookupFailed | None:
+    """Return the error of a lookup at a time without data."""
+    try:
+        frames.lookup_components(target, source, at_ns)
+    except LookupFailed as error:
+        return error
+    return None

@@ -15,17 +15,19 @@ if TYPE_CHECKING:
     from frametool.formats.recordings import Recording
 
 
-def monitor(files: Sequence[Recording], *ends: str) -> list[dict[str, Any]]:
+def monitor(files: Sequence[Recording], *ends: str, normalize: bool = False) -> list[dict[str, Any]]:
     """Describe every edge of some files; or, of `ends` (target, source), those between the two and their chain.
 
     Raises FormatError for files without transforms, UnknownFrame, NotConnected.
     """
     logs: dict[str, EdgeLog] = {}
     for file in files:
-        for edge in file.edges():
+        for edge in file.edges(normalize=normalize):
             if edge.parent is not None:
                 log = logs.get(edge.child) or logs.setdefault(edge.child, EdgeLog(edge.child))
                 log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)
+                if edge.topic:
+                    log.topics[edge.topic] = log.topics.get(edge.topic, 0) + 1
     if not logs:
         raise FormatError("no transforms in it", source=", ".join(file.name for file in files))
     if not ends:
@@ -55,6 +57,7 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
         "backward": log.backward,
         "parents": ", ".join(log.parents),
         "parent_changes": log.changes,
+        "topics": ", ".join(f"{topic} ({count})" for topic, count in log.topics.items()),
         "overlap": None,
     }
 
@@ -80,6 +83,7 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
         "backward": sum(entry["backward"] for entry in entries),
         "parents": " <- ".join(frames_on(target, source, logs)),
         "parent_changes": sum(log.changes for log in logs),
+        "topics": "",
         "overlap": None if interval is None else interval[0] <= interval[1],
     }
 

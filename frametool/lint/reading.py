@@ -44,21 +44,24 @@ class Statement(NamedTuple):
         return Finding(rule, message, self.source, self.line, self.column)
 
 
-def read_all(recording: Recording, find: Find) -> Iterator[Statement]:
+def read_all(recording: Recording, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
     """Yield everything that can be read of a file, and report what cannot."""
     if recording.holds_samples:
-        yield from _read_recording(recording, find)
+        yield from _read_recording(recording, find, normalize=normalize)
     else:
-        yield from _read_tree(recording.source, find)
+        yield from _read_tree(recording.source, find, normalize=normalize)
 
 
-def _read_recording(recording: Recording, find: Find) -> Iterator[Statement]:
+def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Iterator[Statement]:
     def report(error: FormatError) -> None:
         find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
 
-    for edge in recording.edges(report, tell=False):
+    for edge in recording.edges(report, tell=False, normalize=normalize):
         w_first = looks_w_first(edge.components)
         yield Statement(edge.parent or "", *edge[1:4], recording.name, edge.line, 1 if edge.line else 0, w_first)
+    if counts := recording.topics.counts:
+        listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
+        find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
     for told in recording.tally.told():
         find(Finding(told.rule, told.message, recording.name, told.line, 1))
 
@@ -69,7 +72,7 @@ def looks_w_first(components: Rigid) -> bool:
     return bool(abs(x) == 1.0 and y == z == w == 0.0)
 
 
-def _read_tree(source: Source, find: Find) -> Iterator[Statement]:
+def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[Statement]:
     """Read a tree; places are looked up once, for all that was found and read."""
     try:
         documents = parse_documents(source.text, source.name)
@@ -77,7 +80,9 @@ def _read_tree(source: Source, find: Find) -> Iterator[Statement]:
         find(Finding("syntax", error.message, source.name, error.line, error.column))
         return
     said: list[Note] = []
-    edges = [each for document in documents for each in _read_document(document, source, said)]
+    edges = []
+    for document in documents:
+        edges += _read_document(document, Reading(source, normalize=normalize), said)
     places = locate_many(source.text, [*(note.path for note in said), *(edge.path for edge, _ in edges)])
     for note, (line, column) in zip(said, places, strict=False):
         find(Finding(note.rule, note.message, source.name, line, column))
@@ -85,9 +90,8 @@ def _read_tree(source: Source, find: Find) -> Iterator[Statement]:
         yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
 
 
-def _read_document(document: Document, source: Source, said: list[Note]) -> list[tuple[Edge, bool]]:
+def _read_document(document: Document, reading: Reading, said: list[Note]) -> list[tuple[Edge, bool]]:
     """Return the edges of a document, each with whether it looks written w first; keep what is to be said."""
-    reading = Reading(source)
     reading.faults = []
     edges = []
     try:

@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 FLICKER = 3  # so many changes of parent are no picking up and putting down
 
 
-def check(files: Sequence[Recording]) -> list[Finding]:
+def check(files: Sequence[Recording], *, normalize: bool = False) -> list[Finding]:
     """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines."""
     findings: list[Finding] = []
-    findings += lint(_statements(files, findings))
+    findings += lint(_statements(files, findings, normalize=normalize))
     order = {file.name: index for index, file in enumerate(files)}
     return sorted(findings, key=lambda each: (order.get(each.source, 0), each.line, each.column))
 
 
-def _statements(files: Sequence[Recording], findings: list[Finding]) -> Iterator[Statement]:
+def _statements(files: Sequence[Recording], findings: list[Finding], *, normalize: bool) -> Iterator[Statement]:
     """Read all files; what cannot be read is found at once."""
     for file in files:
         before = len(findings)
         statement = None
-        for statement in read_all(file, findings.append):
+        for statement in read_all(file, findings.append, normalize=normalize):
             yield statement
         if statement is None and len(findings) == before:
             findings.append(Finding("empty", "no transforms in it", file.name, 1, 1))

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Tally
 
 INFINITE = float("inf")
+LATEST = 1 << 32  # seconds that no message can hold
 NUMBER = "([-+0-9.eE]+)"
 WHOLE = " *([0-9]{1,20})"
 NAME = r"""([A-Za-z0-9_/][\w/.+-]*|"[^"\\\n]+"|'[^'\n]+')"""
@@ -119,13 +120,15 @@ def _edge(texts: tuple[str, ...], tally: Tally, line: int) -> Edge | None:
         components = unit_components(tally, line, *map(float, texts[4:]))
     except ValueError:
         return None
-    if not parent or not child or components is None:
+    seconds, nanoseconds = int(texts[0]), int(texts[1])
+    if not parent or not child or components is None or nanoseconds >= BILLION or seconds >= LATEST:
         return None
-    return Edge(parent, child, components, int(texts[0]) * BILLION + int(texts[1]), line)
+    return Edge(parent, child, components, seconds * BILLION + nanoseconds, line)
 
 
 def unit_components(
-    tally: Tally, line: int, tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float
+    tally: Tally, line: int, tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float, *,
+    normalize: bool = False,
 ) -> Rigid | None:
     """Check the numbers of one transform as every door does; None for those that are refused there."""
     squared = x * x + y * y + z * z + w * w
@@ -134,8 +137,8 @@ def unit_components(
     if abs(squared - 1.0) <= quaternion.UNIT:
         return tx, ty, tz, x, y, z, w
     off = abs(squared**0.5 - 1.0)
-    if not off <= quaternion.TOLERATED:
+    if not off <= quaternion.TOLERATED and not (normalize and 0.0 < squared < INFINITE):
         return None
-    if off > quaternion.SILENT:
+    if off > quaternion.SILENT and not normalize:
         tally.rough.append(line)
     return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)

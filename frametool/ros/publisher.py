@@ -93,7 +93,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         for number, line in enumerate(piece.text.split("\n"), piece.line):
             if not line.strip() or line.lstrip().startswith("#"):
                 continue
-            reading = Reading(Source(file.name, line))
+            reading = Reading(Source(file.name, line), normalize=options.normalize)
             try:
                 pose = read_call(line, reading)
             except ValueInvalid as error:

@@ -72,7 +72,9 @@ def read_poses(source: Source, *, degrees: bool = False, normalize: bool = False
 def pose_of(record: Record, request: Request) -> Pose:
     """Return a record as a named pose; position or rotation is None where it has none."""
     shape = record.shape
-    rotation = checked_rotation(shape, record.values, request)[0] if shape.notation is not None else None
+    rotation = None
+    if shape.notation is not None:
+        rotation, _ = checked_rotation(shape, record.values, normalize=request.normalize)
     placed_at = shape.whole or shape.unit is not None
     pose = Pose(shape.position(record.values) if placed_at else None, rotation, record.name.text, record.parent.text)
     return inverted(pose) if record.inverse else pose
@@ -177,7 +179,7 @@ def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Re
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     """Return what a record and the mappings around it say beside the pose, its frames and its stamp."""
     used = {record.key, record.rotation, *record.others, *record.flat, *NOT_PLAIN}
-    used |= set(XYZ) if not record.key and record.shape.unit is not None else set()
+    used |= set(record.members)
     names = {path for each in (record.name, record.parent) for path in each.paths}
     rest: dict[str, Any] = {}
     for depth in range(len(unit), len(record.path) + 1):

@@ -31,6 +31,12 @@ class RowNote(NamedTuple):
         return cls(line, "unnamed", f"frame {shown(name)} is left out: the frames of the result are not known")
 
     @classmethod
+    def of_latest(cls, line: int, column: str) -> RowNote:
+        """Tell that a column of stamps is not looked at."""
+        remedy = f"give --time-column {column}, or --at TIME"
+        return cls(line, "latest", f"column {column!r} is not looked at, rows move at the latest time; {remedy}")
+
+    @classmethod
     def of_rounding(cls, line: int) -> RowNote:
         """Tell that a rotation had to be normalised."""
         return cls(line, "rounded", "the rotation is off by more than 1e-6 and was normalised")

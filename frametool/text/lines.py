@@ -52,7 +52,7 @@ def read_blocks(
     ready = _readiness(stream)
     begun: list[bytes] = []  # the beginning of a record
     pieces: list[bytes] = []  # what follows it
-    held = 0
+    held, line = 0, 1
     while piece := _read_piece(stream, min(size, longest - held), ready):
         pieces.append(piece)
         held += len(piece)
@@ -60,15 +60,16 @@ def read_blocks(
             text = b"".join(pieces)
             end = whole(text)
             if end > 0:
-                yield b"".join((*begun, text[:end]))
+                block = b"".join((*begun, text[:end]))
+                yield block
+                line += block.count(b"\n")
                 begun, held = [], len(text) - end
             elif end < 0:
                 begun.append(text[:-end])
             pieces = [text[abs(end) :]]
         if held >= longest:
-            raise FormatError(
-                f"a record is longer than {longest} bytes: this is no text in lines, or a quote is not closed"
-            )
+            what = f"the record that begins in line {line} is longer than {longest} bytes"
+            raise FormatError(f"{what}: this is no text in lines, or a quote is not closed")
     if rest := b"".join((*begun, *pieces)):
         yield rest
 

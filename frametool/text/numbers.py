@@ -6,6 +6,7 @@ octal, hexadecimal, underscores) is refused with the reason.  An angle may also 
 
 from __future__ import annotations
 
+import math
 import re
 
 from frametool.errors import ValueInvalid, shown
@@ -66,6 +67,19 @@ def parse_angle(text: str) -> Angle:
     if (match := re.fullmatch(_MULTIPLE_OF_PI, text)) and not re.match(_BARE_STAR, text):
         return _degrees_of_pi(text, match[1], match[2], match[3]), "deg"
     raise _refusal(text, explain_angle(text))
+
+
+def read_number_or_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
+    """Read a cell: a plain number, or an angle, which may say its own unit, in degrees or radians.
+
+    Raises ValueInvalid.
+    """
+    if degrees is None:
+        return parse_number(text)
+    value, unit = parse_angle(text)
+    if unit is None or (unit == "deg") == degrees:
+        return value
+    return math.degrees(value) if degrees else math.radians(value)
 
 
 def _refusal(text: str, message: str) -> ValueInvalid:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,7 @@ def answers(frames: Frames, target: str, source: str) -> list[Any]:
         lambda: frames.lookup_across(target, 1, source, None, "base").components,
         lambda: frames.latest(target, source),
         lambda: frames.span(target, source),
-        lambda: [(at, found.components) for at, found in frames.replay(target, source, rate_hz=1.0)],  # type: ignore[union-attr]
+        lambda: [(at, found.components) for at, found, _ in frames.replay(target, source, rate_hz=1.0)],  # type: ignore[union-attr]
         lambda: frames.tree_at(5).lookup(target, source).components,
     )
     found = []
@@ -279,13 +280,30 @@ def drive() -> TransformBuffer:
 
 
 def test_a_replay_goes_through_the_span_in_equal_steps() -> None:
-    found = [(at, pose.components[0]) for at, pose in drive().replay("map", "base", rate_hz=2.0)]  # type: ignore[union-attr]
+    found = [(at, pose.components[0]) for at, pose, _ in drive().replay("map", "base", rate_hz=2.0)]  # type: ignore[union-attr]
     assert found == [(round(seconds * 10**9), seconds) for seconds in (1.0, 1.5, 2.0, 2.5, 3.0)]
 
 
 def test_a_replay_yields_the_error_where_there_is_no_data() -> None:
     found = list(drive().replay("map", "base", rate_hz=1.0, start_ns=2 * 10**9, stop_ns=4 * 10**9))
-    assert [isinstance(each, TooLate) for _, each in found] == [False, False, True]
+    assert [isinstance(each.found, TooLate) for each in found] == [False, False, True]
+
+
+@pytest.mark.parametrize("rate", [0.3, 1.0, 7.0, 1e9 / 3])
+def test_the_steps_before_and_behind_the_data_are_counted_and_not_tried(rate: float) -> None:
+    begin, end = -2 * 10**9, 4 * 10**9 if rate < 10 else 10**9 + 50
+    begin = begin if rate < 10 else 10**9 - 50
+    period = Fraction(10**9) / Fraction(rate)
+    times = [begin + round(step * period) for step in range(int((end - begin) / period) + 2)]
+    times = [at for at in times if at <= end]
+    found = list(drive().replay("map", "base", rate_hz=rate, start_ns=begin, stop_ns=end))
+    assert [each.at_ns for each in found if isinstance(each.found, Transform)] == [at for at in times if 10**9 <= at <= 3 * 10**9]
+    assert sum(each.steps for each in found) == len(times)
+    assert len([each for each in found if isinstance(each.found, NoDataAt)]) <= 2
+
+
+def test_a_replay_of_centuries_takes_the_steps_of_the_data() -> None:
+    assert len(list(drive().replay("map", "base", rate_hz=1.0, start_ns=-(10**18), stop_ns=4 * 10**18))) == 5
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf"), 1e-300, 1e-10, 1.1e9, 1e300])
@@ -295,7 +313,7 @@ def test_a_replay_takes_steps_of_a_nanosecond_up_to_a_century(rate: float) -> No
 
 
 def test_the_fastest_replay_never_repeats_a_stamp() -> None:
-    times = [at for at, _ in drive().replay("map", "base", rate_hz=1e9, stop_ns=10**9 + 1000)]
+    times = [each.at_ns for each in drive().replay("map", "base", rate_hz=1e9, stop_ns=10**9 + 1000)]
     assert times == list(range(10**9, 10**9 + 1001))
 
 

@@ -6,22 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Command, result_options, rotation_options
+from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
-from frametool.cli.stderr import tell
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.times import TIME, at_ns, read_times, rules, rules_options, times_option
-from frametool.cli.trees import FRAME, frame_name, load_tree
-from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, reasons
+from frametool.cli.times import TIME, Skipped, at_ns, read_times, rules, rules_options, times_option
+from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
+from frametool.grammar.edges import stop
+from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, why_missing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.frames.lookups import Frames
-
-MOST_TOLD = 10  # times without data
-SKIPPED = 3
 
 
 @click.command(cls=Command, name="lookup")
@@ -34,6 +31,8 @@ SKIPPED = 3
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")
 @times_option
 @rules_options
+@topic_option
+@pose_options
 @rotation_options
 @result_options("poses")
 @column_options
@@ -41,7 +40,7 @@ SKIPPED = 3
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], at: int | str | None,
     source_at: int | str | None, fixed: str | None, times: str | None, moving: bool, cache: int | None, tf2: str | None,
-    **options: Any,
+    normalize: bool, **options: Any,
 ) -> int:  # fmt: skip
     """Print the pose of SOURCE in TARGET: the transform that maps points in SOURCE to points in TARGET.
 
@@ -64,7 +63,7 @@ def command(
     _check(at, source_at, fixed, times)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
-    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
+    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize))
     if by_row or target is None or source is None:
         return by_row.run(stream, output, frames, target=target, source=source, at=at_ns(at))
     if tf2 is None:
@@ -72,7 +71,7 @@ def command(
         fixed = fixed and frame_name(fixed, frames)
     if times is not None:
         skip = stream.options["on_error"] == "skip"
-        return _many(output, frames, target, source, read_times(times), skip=skip)
+        return _many(output, frames, target, source, times, skip=skip)
     if fixed is not None:
         output.poses([looked_up_across(frames, target, at_ns(at), source, at_ns(source_at), fixed)])
     else:
@@ -88,21 +87,14 @@ def _check(at: int | str | None, source_at: int | str | None, fixed: str | None,
         raise click.UsageError("--times says all the times; leave --at, --source-at and --fixed out")
 
 
-def _many(output: Output, frames: Frames, target: str, source: str, times: Sequence[int], *, skip: bool) -> int:
-    """Print the results at many times, and say which times are skipped."""
-    results = list(looked_up_many(frames, target, source, times, missing="nan" if skip else "raise"))
-    output.poses(results)
-    if len(results) == len(times):
-        return 0
-    from frametool.cli.error_json import as_json
-    from frametool.documents.json_writer import dump
+def _many(output: Output, frames: Frames, target: str, source: str, times: str, *, skip: bool) -> int:
+    """Print the results at many times; with `skip` those without data are left out and reported."""
+    skipped = Skipped(in_json=output.told == "json")
+    asked = read_times(times, skipped.add if skip else stop)
 
-    found = {result.extras["stamp_ns"] for result in results}
-    skipped = [at for at in times if at not in found]
-    in_json = output.told == "json"
-    for error in reasons(frames, target, source, skipped[:MOST_TOLD]):
-        tell(as_json(error) if in_json else f"frametool: {error} (skipped)")
-    total = f"{len(skipped)} of {len(times)} times skipped"
-    whole = {"error": "times_skipped", "message": total, "skipped": len(skipped), "asked": len(times)}
-    tell(dump(whole) if in_json else f"frametool: {total}")
-    return SKIPPED
+    def miss(at_ns: int) -> None:
+        skipped.add(None if skipped.is_full else why_missing(frames, target, source, at_ns))
+
+    results = looked_up_many(frames, target, source, asked, miss=miss if skip else None)
+    output.poses_as_they_come(skipped.counted(results))
+    return skipped.finish()

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, Command, result_options, verbose_option
+from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, verbose_option
 from frametool.cli.output import Output
-from frametool.cli.trees import opened
+from frametool.cli.trees import opened, topic_option
 from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:
@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 @click.argument("recording", type=TEXT)
 @click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
+@topic_option
 @verbose_option
+@pose_options
 @result_options("report")
-def command(recording: str, frames: Sequence[str], more: Sequence[str], **options: Any) -> None:
+def command(recording: str, frames: Sequence[str], more: Sequence[str], normalize: bool, **options: Any) -> None:
     """Print the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
 
     \b
@@ -38,4 +40,4 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], **option
     if len(frames) not in (0, 2):
         raise click.UsageError(f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
     output = Output("report", **options)
-    output.report(monitor(opened((recording, *more)), *frames))
+    output.report(monitor(opened((recording, *more)), *frames, normalize=normalize))

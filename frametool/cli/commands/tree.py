@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Command, result_options, rotation_options, verbose_option
+from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options, verbose_option
 from frametool.cli.output import Output
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import load_tree
+from frametool.cli.trees import load_tree, topic_option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,12 +22,14 @@ if TYPE_CHECKING:
 @click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
               help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
 @rules_options
+@topic_option
 @verbose_option
+@pose_options
 @rotation_options
 @result_options("tree")
 def command(
     tree: str, more: Sequence[str], at: int | str | None, color: str, moving: bool, cache: int | None, tf2: str | None,
-    **options: Any,
+    normalize: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Draw the frames of TREE, each with its pose in its parent; those that move with their rate and interval too.
 
@@ -42,6 +44,6 @@ def command(
     listing of tf2's all_frames_as_yaml. --at draws the tree as it stood at one time.
     """
     output = Output("tree", **options)
-    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
+    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize))
     stamp = at_ns(at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), color)
