@@ -15,7 +15,7 @@ from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import parse_angle
 
 if TYPE_CHECKING:
