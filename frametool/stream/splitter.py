@@ -212,9 +212,14 @@ def _behind(data: bytes, at: int) -> Iterator[Part]:
 
 
 def _end_of_broken(data: bytes, start: int, wrong: int, *, array: bool) -> int:
-    """Return where a value that goes wrong ends: before the next line or object that begins, or at the end."""
+    """Return where a value that goes wrong ends: before the next line or object that begins, or at the end.
+
+    A line that begins as the value's own first line does is the next value, even if it could be a part of this one.
+    """
     line = data.rfind(b"\n", start, wrong + 1)
-    following = _NEXT.search(data, wrong if line < 0 else line)
+    indent = re.escape(data[data.rfind(b"\n", 0, start) + 1 : start])
+    following = re.compile(rb"\n" + indent + rb"(?=[{\[])").search(data, start, wrong + 1)
+    following = following or _NEXT.search(data, wrong if line < 0 else line)
     end = len(data) if following is None else following.start() + data.startswith(b"}", following.start())
     body = data[start:end].rstrip(b" \t\r\n,")
     if array and following is None and body.endswith(b"]") and body.count(b"]") > body.count(b"["):
