@@ -144,8 +144,8 @@ def not_text(data: bytes) -> str:
     for zeros, others, encoding in ((odd, even, "UTF-16LE"), (even, odd, "UTF-16BE")):
         if zeros > len(head) // 5 and others <= zeros // 20:
             return f"{encoding} without a byte order mark; convert it: iconv -f {encoding} -t UTF-8"
-    unprintable = len(head) - len(head.translate(None, _CONTROLS))
-    return "not text but binary data" if head.count(0) or unprintable > len(head) // 50 else ""
+    controls = len(head) - len(head.translate(None, _CONTROLS))
+    return "not text but binary data" if controls > max(2, len(head) // 10) else ""
 
 
 def check_text(source: Source) -> None:

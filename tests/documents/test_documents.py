@@ -280,7 +280,7 @@ BINARY = {
     b"\x7fELF\x02\x01\x01\x00": "f:1:8: not text but a program (ELF)",
     b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR": "f:1:1: not text but a PNG picture",
     b"\x1f\x8b\x08\x00": "f:1:2: not text but gzip data; unpack it first",
-    b"a: 1\n\x00": "f:2:1: not text but binary data",
+    b"a: 1\n\x00": "f:2:1: not text: it holds a NUL byte",
     bytes(range(256)): "f:3:115: not text but binary data",
 }
 
