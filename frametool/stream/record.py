@@ -295,7 +295,8 @@ def _refuse_disagreement(
     if len(rotations) > 1 or len(positions) > 1:
         from frametool.grammar.pose import read_pose
 
-        read_pose({key: value[key] for key in value if key in (*positions, *rotations)}, reading)
+        keys = (*rotations, *(positions if len(positions) > 1 else ()))
+        read_pose({key: value[key] for key in value if key in keys}, reading)
 
 
 def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns:
