@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.stream.faults import BadRows
     from frametool.stream.record import Record
-    from frametool.text.lines import Source as ByteStream
+    from frametool.text.lines import ByteStream
 
     Value = Result | dict[str, Any]
 

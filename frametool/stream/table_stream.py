@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
-    from frametool.text.lines import Source
+    from frametool.text.lines import ByteStream
 
 STAMPS = re.compile(r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
 DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b""}
 
 
 def run_table(
-    stream: Source,
+    stream: ByteStream,
     form: str,
     request: Request,
     *,
@@ -60,7 +60,7 @@ def run_table(
     yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
 
 
-def _blocks(stream: Source, delimiter: bytes, size: int) -> Iterator[bytes]:
+def _blocks(stream: ByteStream, delimiter: bytes, size: int) -> Iterator[bytes]:
     """Return blocks of whole rows; cells in quotes may hold line ends."""
     size = size or BLOCK_BYTES
     if not delimiter:

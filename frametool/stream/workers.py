@@ -34,7 +34,7 @@ class WorkerDied(FrametoolError):
     exit_code = 5
 
 
-class Answer(NamedTuple):
+class Reply(NamedTuple):
     """What a worker sends back for a block: its outcome, or what was raised instead, and the warnings."""
 
     outcome: Outcome | None
@@ -114,10 +114,10 @@ class Worker:
         except OSError:
             raise self._died() from None
 
-    def receive(self) -> Answer:
+    def receive(self) -> Reply:
         """Wait for the answer to the oldest block."""
         try:
-            answer: Answer = self.connection.recv()
+            answer: Reply = self.connection.recv()
         except (EOFError, OSError):
             raise self._died() from None
         return answer
@@ -136,7 +136,7 @@ class Worker:
 
 
 def _work(process: Process, connection: Connection, others: list[Connection]) -> None:
-    """Answer blocks until the parent is gone, which also ends a block that is being worked on."""
+    """Reply blocks until the parent is gone, which also ends a block that is being worked on."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent hears it too, and ends its workers
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -160,10 +160,10 @@ def _work(process: Process, connection: Connection, others: list[Connection]) ->
         os._exit(1)  # the parent is gone, or there is no memory: it notices, and nobody else has to be told
 
 
-def _answer(process: Process, block: bytes) -> Answer:
+def _answer(process: Process, block: bytes) -> Reply:
     warned: list[tuple[str, str, type[FrametoolWarning]]] = []
     try:
         with heard_by(lambda *warning: warned.append(warning)):
-            return Answer(process(block), None, warned)
+            return Reply(process(block), None, warned)
     except Exception as error:  # noqa: BLE001 - raised again by the parent
-        return Answer(None, error, warned)
+        return Reply(None, error, warned)

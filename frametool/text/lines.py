@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Protocol
 
-    class Source(Protocol):
+    class ByteStream(Protocol):
         """A binary stream that gives what has arrived."""
 
         def read1(self, size: int, /) -> bytes:
@@ -36,7 +36,7 @@ def whole_lines(text: bytes) -> int:
 
 
 def read_blocks(
-    stream: Source,
+    stream: ByteStream,
     *,
     size: int = BLOCK_BYTES,
     longest: int = LONGEST_RECORD,
@@ -74,7 +74,7 @@ def read_blocks(
         yield rest
 
 
-def _read_piece(stream: Source, size: int, ready: Callable[[int], bool]) -> bytes:
+def _read_piece(stream: ByteStream, size: int, ready: Callable[[int], bool]) -> bytes:
     """Read what has arrived, and what arrives right after it if that is much."""
     piece = stream.read1(size)
     if not piece or len(piece) >= size:
@@ -91,7 +91,7 @@ def _read_piece(stream: Source, size: int, ready: Callable[[int], bool]) -> byte
     return b"".join(pieces)
 
 
-def _readiness(stream: Source) -> Callable[[int], bool]:
+def _readiness(stream: ByteStream) -> Callable[[int], bool]:
     """Return a function that tells whether more comes within so many milliseconds; False if it cannot tell."""
     import select
 

@@ -6,6 +6,7 @@ Knows no form: the page, SVG, PNG, GLB and the terminal ask here.
 from __future__ import annotations
 
 import re
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +15,7 @@ from frametool.frames.path import IDENTITY
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
@@ -143,11 +144,11 @@ class FrameScene:
             return self.names
         return _in_order(self.tree, {name: self.parent(name) for name in self.names})[0]
 
-    def trails(self) -> Iterator[Trail]:
-        """Yield where each chosen frame that moves went in `fixed`."""
-        for name in self.tracks:
-            if self._is_chosen(name) and (stretches := self._stretches(name)):
-                yield Trail(name, stretches)
+    @cached_property
+    def trails(self) -> list[Trail]:
+        """Return where each chosen frame that moves went in `fixed`."""
+        chosen = ((name, self._stretches(name)) for name in self.tracks if self._is_chosen(name))
+        return [Trail(name, stretches) for name, stretches in chosen if stretches]
 
     def _stretches(self, name: str) -> list[list[Point]]:
         """Look a frame up at the stamps of all that moves on its way, and between them."""

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
+import sys
 from itertools import groupby, pairwise
 from operator import itemgetter
+from time import monotonic, sleep
 from typing import TYPE_CHECKING
 from unicodedata import east_asian_width
 
 from frametool.errors import printable
+from frametool.frames.stamps import BILLION, format_stamp
 from frametool.view.canvas import Canvas
 from frametool.view.label_places import words_of
 from frametool.view.projection import SLANTED, Flat, Projection, Size, nice
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from rich.console import Console
+    from rich.text import Text
 
     from frametool.view.frame_scene import FrameScene
 
@@ -24,6 +30,7 @@ if TYPE_CHECKING:
 LINK, TRAIL, AXIS = range(3)  # ranks of dots
 AXES = ("red", "green", "blue")
 LEAST_LINES, LEAST_COLUMNS = 4, 20
+FRAME = 0.1  # seconds between two pictures
 SAME = 3.0  # dots within which frames share a name
 
 
@@ -106,24 +113,47 @@ class TerminalPicture:
         azimuth, elevation = (round(math.degrees(angle)) + 0 for angle in eye)
         more = f", {hidden} name{'s' * (hidden > 1)} hidden" if hidden else ""
         fixed = printable(self._flat.scene.fixed)[:40]
-        said = f"├{bar}┤ {metres:g} m  in {fixed}, from {azimuth}, {elevation} deg{more}  axes "
+        stamp_ns = self._flat.scene.at_ns
+        time = "" if stamp_ns is None else f" at {format_stamp(stamp_ns)[:-6]} s"
+        said = f"├{bar}┤ {metres:g} m  in {fixed}{time}, from {azimuth}, {elevation} deg{more}  axes "
         said = said[: self._canvas.columns - 6]
         return [(said, ""), ("x", AXES[0]), (" ", ""), ("y", AXES[1]), (" ", ""), ("z", AXES[2])]
 
 
 def print_terminal(picture: TerminalPicture, color: str = "auto") -> None:
     """Print a picture, in colour where the terminal has any, or as `color` says: always or never."""
-    import sys
+    _console(color).print(_rich_text(picture))
 
+
+def play(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
+    """Show a scene from its time on to the last stamp, a second a second, in the whole terminal."""
+    from rich.live import Live
+
+    begin_ns, (_, last_ns) = scene.at_ns or 0, scene.span_ns
+    console, begin = _console(color), monotonic()
+    with Live(console=console, auto_refresh=False) as live:
+        while True:
+            scene.at_ns = min(begin_ns + round((monotonic() - begin) * BILLION), last_ns)
+            picture = TerminalPicture(scene, console.width, console.height - 1, eye)
+            live.update(_rich_text(picture), refresh=True)
+            if scene.at_ns >= last_ns:
+                return
+            sleep(FRAME)
+
+
+def _console(color: str) -> Console:
     from rich.console import Console
-    from rich.text import Text
 
-    console = Console(
+    return Console(
         file=sys.stdout, highlight=False, soft_wrap=True, no_color=True if color == "never" else None,
         force_terminal=True if color == "always" else None, color_system="auto" if color == "auto" else "standard",
     )  # fmt: skip
-    for line in picture.lines():
-        console.print(Text.assemble(*line))
+
+
+def _rich_text(picture: TerminalPicture) -> Text:
+    from rich.text import Text
+
+    return Text("\n").join(Text.assemble(*line) for line in picture.lines())
 
 
 def _cells(words: str) -> Iterator[str]:

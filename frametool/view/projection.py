@@ -66,7 +66,7 @@ class Projection:
         self.scene, self.size = scene, size
         self.view = _view(*eye)
         self.poses = {name: pose for name, pose in scene.poses().items() if max(map(abs, pose[:3])) < FURTHEST}
-        self.trails: list[Trail] = list(scene.trails())
+        self.trails: list[Trail] = scene.trails
         self.links = [(parent, name) for name in self.poses if (parent := scene.parent(name)) in self.poses and parent]
         usual = self._usual_link()
         self.low, self.high = _bounds(self._points())

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import pty
 import re
+import struct
 import subprocess
+import termios
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -89,6 +92,7 @@ def test_what_is_drawn_can_be_chosen(run: Run, arguments: tuple[str, ...], names
         (("--from", "x,1"), 2, "'x' is not a number"),
         (("-o", "x.gif"), 2, "no form has the suffix '.gif'"),
         (("-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
+        (("--live",), 2, "--live plays what moves in a terminal"),
         (("--overlay",), 2, "--overlay takes two trees"),
         ((ROBOT, "map", "--overlay"), 2, "--overlay takes two trees"),
         (("{frames: {a: }}", "--overlay", "-f", "svg"), 4, "unknown frame 'map'"),
@@ -126,17 +130,13 @@ def test_a_crowded_picture_says_how_to_see_a_part(run: Run) -> None:
     assert run("view", ROBOT, "--below", "base_link", "-f", "svg").err == ""
 
 
-@pytest.mark.parametrize("no_color", [False, True])
-def test_a_terminal_gets_a_picture_of_its_own_size_in_colour(no_color: bool) -> None:  # noqa: FBT001
-    import fcntl
-    import struct
-    import termios
-
+def shown_in_a_terminal(*arguments: str, **environment: str) -> bytes:
+    """Return what the command writes to a terminal of 60 columns and 20 lines."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 20, 60, 0, 0))
-    environment = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "COLUMNS", "LINES")}
-    environment |= {"TERM": "xterm-256color", "PYTHONPATH": str(console.ROOT)} | ({"NO_COLOR": "1"} if no_color else {})
-    tool = subprocess.Popen([*TOOL, "view", ROBOT], stdout=theirs, stderr=theirs, env=environment)
+    inherited = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "COLUMNS", "LINES")}
+    environment = inherited | {"TERM": "xterm-256color", "PYTHONPATH": str(console.ROOT)} | environment
+    tool = subprocess.Popen([*TOOL, "view", *arguments], stdout=theirs, stderr=theirs, env=environment)
     os.close(theirs)
     drawn = b""
     while True:
@@ -146,6 +146,20 @@ def test_a_terminal_gets_a_picture_of_its_own_size_in_colour(no_color: bool) -> 
             break
     assert tool.wait(20) == 0
     os.close(ours)
+    return drawn
+
+
+def test_a_moving_tree_is_played_to_its_end_and_the_cursor_comes_back() -> None:
+    drawn = shown_in_a_terminal(DRIVE, "--live", "--at", "3.6")
+    times = re.findall(r"at (\d\.\d{3}) s", drawn.decode())
+    assert times[-1] == "4.000"
+    assert times == sorted(times)
+    assert drawn.rindex(b"\x1b[?25h") > drawn.rindex(b"\x1b[?25l")
+
+
+@pytest.mark.parametrize("no_color", [False, True])
+def test_a_terminal_gets_a_picture_of_its_own_size_in_colour(no_color: bool) -> None:  # noqa: FBT001
+    drawn = shown_in_a_terminal(ROBOT, **({"NO_COLOR": "1"} if no_color else {}))
     lines = re.sub(r"\x1b\[[\d;]*m", "", drawn.decode()).split("\r\n")
     assert len(lines) == 19 + 1
     assert max(map(len, lines)) <= 60

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import pytest
 from flow import INVERT, MOVE, Flow, convert, flow
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from frametool.stream.request import Request
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frametool.stream.request import Request
 
 RECORDS = {
     "flat": '{{"x":{0},"y":2,"z":3,"qx":0,"qy":0,"qz":1,"qw":0}}',
@@ -19,7 +23,7 @@ RECORDS = {
     '{{"translation":{{"x":{0},"y":2,"z":3}},"rotation":{{"x":0,"y":0,"z":0,"w":1}}}}}}',
     "plane": '{{"x":1,"y":{0},"yaw":0.25}}',
 }
-MUTATIONS = {
+MUTATIONS: dict[str, Callable[[str], str]] = {
     "cut off": lambda text: text[:-1],
     "no beginning": lambda text: text[1:],
     "one bracket more": lambda text: text + "}",

@@ -87,6 +87,7 @@ def scene_options(function: Any) -> Any:
               help="form of the picture  [default: by the suffix of --output, else text]")
 @click.option("-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all")
 @click.option("--force", is_flag=True, help="let --output replace an existing file")
+@click.option("--live", is_flag=True, help="play what moves in the terminal, a second a second, from --at on")
 @click.option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
 @click.option("--open", "opens", is_flag=True, help="show the page in the browser")
 @click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
@@ -94,7 +95,7 @@ def scene_options(function: Any) -> Any:
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], eye: tuple[float, float],
     moving: bool, cache: int | None, tf2: str | None, form: str | None, output: str | None, force: bool, opens: bool,
-    overlay: bool, color: str, **options: Any,
+    live: bool, overlay: bool, color: str, **options: Any,
 ) -> None:  # fmt: skip
     """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
 
@@ -103,7 +104,7 @@ def command(
       frametool view robot.yaml --below base_link --from side
       frametool view robot.yaml map tool -o robot.html
       frametool view drive.yaml --at 2.5 -o drive.svg
-      frametool view after.yaml before.yaml --overlay -o moved.html
+      frametool view robot.yaml arm.yaml --overlay -o moved.html
 
     The page needs nothing beside it and asks nothing of anybody: turn it, search, click a frame to see its transform
     from TARGET in every notation, play what moves. TREE is a file, a recording, - for standard input, or . for the
@@ -127,6 +128,13 @@ def command(
     options |= {key: name and frame_name(name, frames) for key, name in names.items()}
     scene = FrameScene(frames, at_ns=stamp_ns, **options)
     before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed) if overlay else None
+    if live:
+        if chosen != "text" or output is not None or not sys.stdout.isatty() or scene.at_ns is None:
+            raise click.UsageError("--live plays what moves in a terminal: give it a tree that moves and no -o")
+        from frametool.view.frames_terminal import play
+
+        play(scene, eye, color)
+        return
     if chosen == "text" and output is None and sys.stdout.isatty():
         from frametool.view.frames_terminal import TerminalPicture, print_terminal
 
