@@ -18,7 +18,7 @@ from frametool.cli.sim_options import REACH
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.errors import FileProblem, shown
-from frametool.formats import FORMATS
+from frametool.formats import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.grammar.result import Style
 from frametool.sim.run_summary import RunSummary
@@ -198,10 +198,9 @@ class EventLog:
 
 def style_of(format_name: str | None, output: str | None, precision: int | None) -> Style:
     """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
-    suffix = suffix_of(output or "")
-    by_suffix = next((name for name in FORMS if name in FORMATS and suffix in FORMATS[name].suffixes), None)
-    default = "text" if suffix == ".txt" or (output is None and sys.stdout.isatty()) else "yaml"
-    return Style(format_name or by_suffix or default, precision=precision)
+    is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
+    form = format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
+    return Style(form, precision=precision)
 
 
 def suffix_of(path: str) -> str:

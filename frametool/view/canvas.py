@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
 BRAILLE = 0x2800
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # by row, then column of a cell
@@ -51,6 +53,11 @@ class Canvas:
         for column in range(self.columns):
             bits, colour, _ = self._cells.get((line, column), (0, "", 0))
             yield (chr(BRAILLE + bits) if bits else " "), colour
+
+    def runs(self, line: int, over: Mapping[tuple[int, int], tuple[str, str]]) -> list[tuple[str, str]]:
+        """Return a line as pieces of one colour; `over` holds what stands in cells instead of dots."""
+        cells = (over.get((line, column), cell) for column, cell in enumerate(self.row(line)))
+        return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(cells, key=itemgetter(1))]
 
     def _dots(self, x: float, y: float) -> tuple[int, int]:
         across = int(x * 2 * self.columns)

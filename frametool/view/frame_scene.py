@@ -17,6 +17,9 @@ from frametool.geometry import rigid
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
 
 PARTS = 8  # of the way between two stamps, so that a trail is round where a frame turns
 FEW_STAMPS = 500  # above, a trail has one point a stamp
+FURTHEST = 1e30  # metres; beyond, nothing is drawn: programs that read GLB have float32
+STILL = 1e-9  # metres: a frame that stays within has no trail
 MOST_STAMPS = 4000  # of a trail; of more, every second, third, .. is taken
 
 
@@ -159,15 +164,16 @@ class FrameScene:
         stamps = stamps[:: -(-len(stamps) // MOST_STAMPS) or 1]
         parts = 1 if len(stamps) > FEW_STAMPS else PARTS
         times = [a + (b - a) * part // parts for a, b in pairwise(stamps) for part in range(parts)] + stamps[-1:]
-        points = self.tree.lookup_many(self.fixed, name, times, missing="nan").xyz
-        known = ~np.isnan(points[:, 0])
+        with np.errstate(over="ignore", invalid="ignore"):  # what is too far is not drawn
+            points = self.tree.lookup_many(self.fixed, name, times, missing="nan").xyz
+        known: NDArray[np.bool_] = np.max(np.abs(points), axis=1) < FURTHEST
         changes = sorted(stamp for mover in movers for stamp in self.tracks[mover].changes())
         epoch = np.searchsorted(changes, times, side="right")
         cuts = np.flatnonzero((known[1:] != known[:-1]) | (epoch[1:] != epoch[:-1])) + 1
-        pieces = [piece.tolist() for piece in np.split(points, cuts) if not np.isnan(piece[0, 0])]
-        if np.ptp(points[known], axis=0).max(initial=0.0) < 1e-9:
+        pieces = [piece for piece, here in zip(np.split(points, cuts), known[[0, *cuts]], strict=True) if here]
+        if not pieces or np.ptp(np.concatenate(pieces), axis=0).max() < STILL:
             return []
-        return [[(x, y, z) for x, y, z in piece] for piece in pieces]
+        return [[(x, y, z) for x, y, z in piece.tolist()] for piece in pieces]
 
     def _movers_above(self, name: str) -> set[str]:
         """Return the moving frames on any way from a frame to a root."""
@@ -184,6 +190,11 @@ class FrameScene:
             waiting += above - seen
             seen |= above
         return found
+
+
+def can_be_drawn(point: Sequence[float]) -> bool:
+    """Tell whether a point is near enough to be drawn."""
+    return all(abs(value) < FURTHEST for value in point)
 
 
 def _first_parent(tree: Frames, name: str) -> str | None:

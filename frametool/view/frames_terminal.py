@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
-from itertools import groupby, pairwise
-from operator import itemgetter
+from itertools import pairwise
 from time import monotonic, sleep
 from typing import TYPE_CHECKING
 from unicodedata import east_asian_width
@@ -19,7 +17,6 @@ from frametool.view.projection import SLANTED, Flat, Projection, Size, nice
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from rich.console import Console
     from rich.text import Text
 
     from frametool.view.frame_scene import FrameScene
@@ -42,7 +39,7 @@ class TerminalPicture:
         self._canvas = Canvas(max(lines, LEAST_LINES) - 1, max(columns, LEAST_COLUMNS))
         wide, high = 2.0 * self._canvas.columns, 4.0 * self._canvas.lines
         self._flat = Projection(scene, Size(wide, high, min(14.0, wide / 8.0, high / 8.0), (6.0, 14.0)), eye)
-        self._names: dict[Spot, str] = {}  # the first cell of a name holds it, the others nothing
+        self._names: dict[Spot, Run] = {}  # letter by letter
         self._draw()
         hidden = sum(not self._place(place, names) for place, names in self._flat.groups(SAME))
         self._scale = self._scale_line(eye, hidden)
@@ -50,16 +47,12 @@ class TerminalPicture:
     def lines(self) -> Iterator[list[Run]]:
         """Yield the lines, each as pieces of one style."""
         for line in range(self._canvas.lines):
-            cells = [self._cell(line, column, cell) for column, cell in enumerate(self._canvas.row(line))]
-            yield [("".join(map(itemgetter(0), run)), style) for style, run in groupby(cells, key=itemgetter(1))]
+            yield self._canvas.runs(line, self._names)
         yield self._scale
 
     def text(self) -> str:
         """Return the picture without colours."""
         return "".join("".join(text for text, _ in line).rstrip() + "\n" for line in self.lines())
-
-    def _cell(self, line: int, column: int, cell: Run) -> Run:
-        return (self._names[line, column], "bold") if (line, column) in self._names else cell
 
     def _draw(self) -> None:
         """Draw the links, the trails and the axes."""
@@ -93,7 +86,8 @@ class TerminalPicture:
         for crossing in (False, True):
             for spot in spots:
                 if self._is_free(spot, len(cells), crossing=crossing):
-                    self._names |= {(spot[0], spot[1] + offset): letter for offset, letter in enumerate(cells)}
+                    row, first = spot
+                    self._names |= {(row, first + offset): (letter, "bold") for offset, letter in enumerate(cells)}
                     return True
         return False
 
@@ -122,15 +116,19 @@ class TerminalPicture:
 
 def print_terminal(picture: TerminalPicture, color: str = "auto") -> None:
     """Print a picture, in colour where the terminal has any, or as `color` says: always or never."""
-    _console(color).print(_rich_text(picture))
+    from frametool.view.terminal_console import coloured_console
+
+    coloured_console(color).print(_rich_text(picture))
 
 
 def play(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
     """Show a scene from its time on to the last stamp, a second a second, in the whole terminal."""
     from rich.live import Live
 
+    from frametool.view.terminal_console import coloured_console
+
     begin_ns, (_, last_ns) = scene.at_ns or 0, scene.span_ns
-    console, begin = _console(color), monotonic()
+    console, begin = coloured_console(color), monotonic()
     with Live(console=console, auto_refresh=False) as live:
         while True:
             scene.at_ns = min(begin_ns + round((monotonic() - begin) * BILLION), last_ns)
@@ -139,15 +137,6 @@ def play(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "au
             if scene.at_ns >= last_ns:
                 return
             sleep(FRAME)
-
-
-def _console(color: str) -> Console:
-    from rich.console import Console
-
-    return Console(
-        file=sys.stdout, highlight=False, soft_wrap=True, no_color=True if color == "never" else None,
-        force_terminal=True if color == "always" else None, color_system="auto" if color == "auto" else "standard",
-    )  # fmt: skip
 
 
 def _rich_text(picture: TerminalPicture) -> Text:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool import __version__
 from frametool.frames.stamps import BILLION
+from frametool.view.frame_scene import can_be_drawn
 from frametool.view.projection import Projection, Size
 
 if TYPE_CHECKING:
@@ -132,7 +133,8 @@ def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> di
     samplers: list[dict[str, Any]] = []
     first_ns, _ = scene.span_ns
     for name, track in scene.tracks.items():
-        if track.varies or name not in index or track.parent not in index:
+        drawn = name in index and track.parent in index and not track.varies
+        if not drawn or not all(can_be_drawn(sample[:3]) for _, _, sample in track.walk()):
             continue
         seconds, places, rotations = _keys(track, first_ns)
         times = part.floats([[each] for each in seconds], "SCALAR", min=[seconds[0]], max=[seconds[-1]])

@@ -6,13 +6,13 @@ lets nothing else run.  Poses go in as doubles, stamps as doubles of nanoseconds
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from array import array
 from base64 import b64encode
 from hashlib import sha256
 from html import escape
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from frametool import __version__
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from frametool.frames.track import MovingTrack
     from frametool.view.frame_scene import FrameScene
 
+FOLDER = os.path.join(os.path.dirname(__file__), "page")
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
 PACKED = 48_000  # bytes of doubles, from where on they are compressed
 NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -63,7 +64,8 @@ def write_page(
 
 
 def _file(name: str) -> str:
-    return files("frametool.view").joinpath("page", name).read_text("utf-8")
+    with open(os.path.join(FOLDER, name), encoding="utf-8") as stream:
+        return stream.read()
 
 
 def _policy(script: str, style: str) -> str:

@@ -6,12 +6,13 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.geometry import quaternion
+from frametool.view.frame_scene import can_be_drawn
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.geometry.types import Rigid
-    from frametool.view.frame_scene import FrameScene, Point, Trail
+    from frametool.view.frame_scene import FrameScene, Point
 
 SLANTED = (-0.9, 0.5)
 # name -> azimuth and elevation of the eye, radians: from where one looks along -x, along +y, and down
@@ -25,7 +26,6 @@ AXIS_PART = 0.55  # of the usual distance between a frame and its parent
 USUAL_LINK = 0.5  # metres, where there is none
 LEAST = 1e-9  # metres; below, frames lie on one point
 SPOT = 0.12  # of the picture: a small part of it
-FURTHEST = 1e150  # metres; beyond, squares overflow
 
 
 class Flat(NamedTuple):
@@ -65,8 +65,8 @@ class Projection:
         """Fit all that is drawn into the picture."""
         self.scene, self.size = scene, size
         self.view = _view(*eye)
-        self.poses = {name: pose for name, pose in scene.poses().items() if max(map(abs, pose[:3])) < FURTHEST}
-        self.trails: list[Trail] = scene.trails
+        self.poses = {name: pose for name, pose in scene.poses().items() if can_be_drawn(pose[:3])}
+        self.trails = scene.trails
         self.links = [(parent, name) for name in self.poses if (parent := scene.parent(name)) in self.poses and parent]
         usual = self._usual_link()
         self.low, self.high = _bounds(self._points())

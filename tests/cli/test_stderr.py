@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 PACKAGE = Path(frametool.__file__).parent
 TALKING = {"echo", "secho", "warn", "catch_warnings", "print"}  # as names of functions
 ALLOWED = {
-    ("errors.py", "warn"), ("cli/stderr.py", "print"), ("view/tree_text.py", "print"), ("view/frames_terminal.py", "print"),
+    ("errors.py", "warn"), ("cli/stderr.py", "print"), ("view/tree_text.py", "print"),
     ("view/png.py", "catch_warnings"),  # what a drawing library says of fonts
 }  # fmt: skip
 MOVE = ["apply", "--transform", "{xyz: [1, 0, 0]}"]

@@ -8,6 +8,7 @@ import struct
 from typing import Any
 
 import pytest
+from console import ROOT
 
 import frametool
 from frametool.frames.buffer import TransformBuffer
@@ -63,7 +64,7 @@ def world(document: dict[str, Any]) -> dict[str, Transform]:
 @pytest.mark.parametrize("name", ["robot.yaml", "drive.yaml"])
 @pytest.mark.parametrize("at_ns", [None, 2_500_000_000])
 def test_every_node_stands_where_lookup_says(name: str, at_ns: int | None) -> None:
-    tree = frametool.load(f"examples/{name}")
+    tree = frametool.load(ROOT / "examples" / name)
     scene = FrameScene(tree, at_ns=at_ns)
     document, _ = parts(write_glb(scene))
     nodes = world(document)
@@ -74,7 +75,7 @@ def test_every_node_stands_where_lookup_says(name: str, at_ns: int | None) -> No
 
 @pytest.mark.parametrize("name", ["robot.yaml", "drive.yaml"])
 def test_the_file_keeps_the_validators_rules(name: str) -> None:
-    document, numbers = parts(write_glb(FrameScene(frametool.load(f"examples/{name}"))))
+    document, numbers = parts(write_glb(FrameScene(frametool.load(ROOT / "examples" / name))))
     assert document["buffers"] == [{"byteLength": len(numbers)}]
     for index, accessor in enumerate(document["accessors"]):
         values = rows(document, numbers, index)
@@ -113,6 +114,6 @@ def test_samples_are_animated_with_times_that_rise_and_rotations_that_turn_the_s
 
 
 def test_a_frame_that_changes_its_parent_is_drawn_and_not_animated() -> None:
-    document, _ = parts(write_glb(FrameScene(frametool.load("examples/drive.yaml"))))
+    document, _ = parts(write_glb(FrameScene(frametool.load(ROOT / "examples" / "drive.yaml"))))
     moved = {document["nodes"][channel["target"]["node"]]["name"] for channel in document["animations"][0]["channels"]}
     assert moved == {"base_link"}

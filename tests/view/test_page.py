@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import browsers
 import pytest
+from console import ROOT
 
 import frametool
 from frametool.errors import UnknownFrame, ValueInvalid
@@ -111,7 +112,7 @@ def test_poses_and_stamps_are_in_the_page_to_the_bit() -> None:
 
 
 def test_the_command_chooses_what_the_page_shows_first() -> None:
-    tree = frametool.load("examples/robot.yaml")
+    tree = frametool.load(ROOT / "examples" / "robot.yaml")
     scene = FrameScene(tree, fixed="odom", target="map", source="tool", only="link|map|odom|tool")
     shown = head_of(write_page(scene, title="robot", eye=(1.0, 0.25)))["show"]
     assert (shown["fixed"], shown["target"], shown["source"], shown["view"]) == ("odom", "map", "tool", [1.0, 0.25])
@@ -142,7 +143,7 @@ def test_an_empty_tree_is_refused() -> None:
 @pytest.mark.parametrize("name", ["robot.yaml", "drive.yaml"])
 @pytest.mark.parametrize("at_ns", [None, 0, 500_000_000, 1_999_999_999, 2_000_000_000, 3_999_999_999])
 def test_poses_are_those_of_lookup(name: str, at_ns: int | None) -> None:
-    tree = frametool.load(f"examples/{name}")
+    tree = frametool.load(ROOT / "examples" / name)
     scene = FrameScene(tree, at_ns=at_ns)
     poses = scene.poses()
     assert set(poses) == set(tree.frames)
@@ -152,13 +153,13 @@ def test_poses_are_those_of_lookup(name: str, at_ns: int | None) -> None:
 
 
 def test_below_takes_what_hangs_there_at_the_time() -> None:
-    tree = frametool.load("examples/drive.yaml")
+    tree = frametool.load(ROOT / "examples" / "drive.yaml")
     names = [set(FrameScene(tree, below="base_link", at_ns=at).poses()) for at in (1_000_000_000, 3_000_000_000)]
     assert names == [{"base_link", "lidar", "gripper"}, {"base_link", "lidar", "gripper", "box"}]
 
 
 def test_a_trail_breaks_where_the_parent_changes_and_nowhere_else() -> None:
-    trails = {trail.frame: trail for trail in FrameScene(frametool.load("examples/drive.yaml")).trails}
+    trails = {trail.frame: trail for trail in FrameScene(frametool.load(ROOT / "examples" / "drive.yaml")).trails}
     assert {name: len(trail.stretches) for name, trail in trails.items()} == {"base_link": 1, "box": 2}
     assert trails["base_link"].stretches[0][-1] == pytest.approx((2.0, 2.0, 0.0))
     assert len(trails["base_link"].stretches[0]) == 4 * 8 + 1

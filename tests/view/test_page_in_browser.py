@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import browsers
 import pytest
+from console import ROOT
 from samples import LATTICE, LOCK_GAPS, random_quaternions
 
 import frametool
@@ -91,12 +92,12 @@ def hostile_rotations() -> Iterator[tuple[float, float, float, float]]:
 def test_the_transform_of_the_address_stands_in_the_page(page_of: MakePage) -> None:
     seen = browsers.seen_in_chromium(page_of("robot.yaml"), "target=base_link&source=tool")
     pose = json.loads(re.search('data-pose="([^"]*)"', seen)[1])  # type: ignore[index]
-    assert pose == list(frametool.load("examples/robot.yaml").lookup("base_link", "tool").components)
+    assert pose == list(frametool.load(ROOT / "examples" / "robot.yaml").lookup("base_link", "tool").components)
 
 
 @pytest.mark.parametrize("name", ["robot.yaml", "drive.yaml"])
 def test_every_pair_of_frames_is_what_lookup_says_to_the_bit(page_of: MakePage, visit: Visit, name: str) -> None:
-    tab, tree = visit(page_of(name)), frametool.load(f"examples/{name}")
+    tab, tree = visit(page_of(name)), frametool.load(ROOT / "examples" / name)
     for at in SECONDS if name == "drive.yaml" else (0.0,):
         for target, source in itertools.product(tree.frames, repeat=2):
             found = tab.evaluate(LOOKUP, [target, source, at * 1e9])
@@ -122,7 +123,7 @@ def test_hostile_rotations_have_the_numbers_of_the_command_to_the_bit(page_of: M
 def test_all_digits_are_written_as_python_writes_them(page_of: MakePage, visit: Visit) -> None:
     tab = visit(page_of("robot.yaml"), "target=map&source=tool")
     tab.click("#exact")
-    x, y, z = frametool.load("examples/robot.yaml").lookup("map", "tool").components[:3]
+    x, y, z = frametool.load(ROOT / "examples" / "robot.yaml").lookup("map", "tool").components[:3]
     assert tab.inner_text("#pose tr:first-child").split("\t")[1:4] == [f"x{x!r}", f"y{y!r}", f"z{z!r}"]
     tree = "{frames: {a: {b: {xyz: [1.0e-5, 1.0e+17, 3]}}}}"
     tab = visit(page_of(tree))
@@ -160,7 +161,7 @@ def test_what_is_copied_reads_back_as_the_same_pose(page_of: MakePage, visit: Vi
     tab.click("#copy")
     tab.click("#shell")
     yaml, command = tab.evaluate("() => window.copied")
-    tree = frametool.load("examples/robot.yaml")
+    tree = frametool.load(ROOT / "examples" / "robot.yaml")
     from frametool.cli.poses import poses_from
 
     (pose,) = poses_from(yaml)

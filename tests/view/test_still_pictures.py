@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import pytest
+from console import ROOT
 
 import frametool
 from frametool.errors import ValueInvalid
@@ -56,7 +57,7 @@ ODD = {
 @pytest.mark.parametrize("eye", EYES)
 @pytest.mark.parametrize("name", ["robot.yaml", "drive.yaml"])
 def test_everything_lies_inside_the_picture_and_no_name_over_another(name: str, eye: str) -> None:
-    flat = Projection(FrameScene(frametool.load(f"examples/{name}")), SIZE, EYES[eye])
+    flat = Projection(FrameScene(frametool.load(ROOT / "examples" / name)), SIZE, EYES[eye])
     labels, _ = place_labels(flat)
     for frame in flat.poses:
         x, y, _ = flat.origin(frame)
@@ -102,7 +103,7 @@ def test_hostile_names_are_text_in_the_svg() -> None:
 
 
 def test_the_svg_is_light_and_dark_and_shows_each_frame_with_its_axes() -> None:
-    tree = frametool.load("examples/robot.yaml")
+    tree = frametool.load(ROOT / "examples" / "robot.yaml")
     text = write_svg(still_picture(FrameScene(tree), title="robot").picture)
     root = ET.fromstring(text)  # noqa: S314 - our own
     kinds = [path.get("class") for path in root.iter(f"{SVG}path")]
@@ -114,7 +115,7 @@ def test_the_svg_is_light_and_dark_and_shows_each_frame_with_its_axes() -> None:
 
 
 def test_a_picture_says_when_most_frames_lie_in_a_small_spot() -> None:
-    tree = frametool.load("examples/robot.yaml")
+    tree = frametool.load(ROOT / "examples" / "robot.yaml")
     assert still_picture(FrameScene(tree)).crowded > 10
     assert still_picture(FrameScene(tree, below="base_link")).crowded == 0
 
@@ -150,7 +151,7 @@ def test_shapes_of_a_frame_come_farthest_first() -> None:
 
 @pytest.mark.parametrize("tree", ["robot.yaml", "drive.yaml", "hostile"])
 def test_a_png_needs_matplotlib_and_says_so(tree: str) -> None:
-    scene = FrameScene(ODD["hostile names"] if tree == "hostile" else frametool.load(f"examples/{tree}"))
+    scene = FrameScene(ODD["hostile names"] if tree == "hostile" else frametool.load(ROOT / "examples" / tree))
     if find_spec("matplotlib") is None:
         with pytest.raises(ValueInvalid, match=r"pip install 'frametool\[plot\]'"):
             write_png(still_picture(scene).picture)
@@ -165,7 +166,7 @@ def test_a_png_needs_matplotlib_and_says_so(tree: str) -> None:
 
 @pytest.mark.parametrize(("columns", "lines"), [(80, 24), (200, 60), (40, 12)])
 def test_a_terminal_shows_names_axes_and_how_long_a_metre_is(columns: int, lines: int) -> None:
-    picture = TerminalPicture(FrameScene(frametool.load("examples/robot.yaml"), below="base_link"), columns, lines)
+    picture = TerminalPicture(FrameScene(frametool.load(ROOT / "examples" / "robot.yaml"), below="base_link"), columns, lines)
     text = picture.text()
     assert "tool" in text
     assert any(0x2800 < ord(letter) < 0x2900 for letter in text)
