@@ -19,7 +19,7 @@ from frametool.stream.record_values import read_poses, results
 from frametool.stream.request import Request
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 H = math.sqrt(0.5)
 HEADER = {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "a"}
@@ -102,7 +102,7 @@ def ways(record: dict[str, Any], request: Request) -> Iterator[tuple[str, int, S
     """Run a record in every way of a stream."""
     line = json.dumps(record)
     document = yaml.safe_dump(record, default_flow_style=False, sort_keys=False)
-    texts = {
+    texts: dict[str, tuple[str, Callable[[int], str]]] = {
         "lines": ("json", lambda count: f"{line}\n" * count),
         "array": ("json", lambda count: "[" + ",\n".join([line] * count) + "]\n"),
         "array on a line": ("json", lambda count: "[" + ", ".join([line] * count) + "]"),
