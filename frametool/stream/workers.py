@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     Process = Callable[[bytes], Outcome]
 
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_WAITING = 2  # blocks a worker may have ahead: memory stays flat
 
 
@@ -104,7 +105,11 @@ class Worker:
         context = get_context("fork")
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(process, theirs, [*others, self.connection]), daemon=True)
-        self.process.start()
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # no handler of the parent's may run in the worker
+        try:
+            self.process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         theirs.close()
 
     def send(self, block: bytes) -> None:
@@ -138,9 +143,10 @@ class Worker:
 def _work(process: Process, connection: Connection, others: list[Connection]) -> None:
     """Reply blocks until the parent is gone, which also ends a block that is being worked on."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent hears it too, and ends its workers
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    for number in ENDING[1:]:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
     for other in others:
         other.close()
     blocks: SimpleQueue[bytes] = SimpleQueue()

@@ -44,7 +44,7 @@ def calls(path: Path) -> set[str]:
 
 def test_nothing_is_printed_but_by_the_sink_and_the_voice() -> None:
     found = {(str(path.relative_to(PACKAGE)), name) for path in PACKAGE.rglob("*.py") for name in calls(path)}
-    assert found == ALLOWED
+    assert found <= ALLOWED
 
 
 @pytest.mark.parametrize("on_error", ["skip", "null", "stop"])
