@@ -35,10 +35,12 @@ class FrametoolError(Exception):
 
     exit_code: the status its commands end with
     rule: the rule of `check` that is broken, if any
+    many_lines: the message is tf2's and has several lines; no other has
     """
 
     exit_code = 1
     rule = ""
+    many_lines = False
 
     def __init__(self, *message: object, **fields: object) -> None:
         """Keep what the message says as fields too, for those who do not read sentences."""
@@ -125,7 +127,7 @@ class UnknownFrame(LookupFailed):
         self.known = tuple(known)
         place = f" in {where}" if where else ""
         near = did_you_mean(name, self.known)
-        self.short = f"unknown frame {quoted(name)}{place}{near}"
+        self.short = f"unknown frame {shown(name)}{place}{near}"
         super().__init__(
             f"{self.short}{'' if near else ';'} frames: {listing(self.known)}",
             frame=name,
@@ -203,7 +205,7 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
     from difflib import get_close_matches
 
     near = get_close_matches(name[:LONGEST_NAME], _likely(name[:LONGEST_NAME], list(known)), n=1, cutoff=cutoff)
-    return f"; did you mean {quoted(near[0])}?" if near else ""
+    return f"; did you mean {shown(near[0])}?" if near else ""
 
 
 def _likely(name: str, known: list[str]) -> list[str]:
@@ -251,7 +253,13 @@ def listing(names: Iterable[str], most: int = 20) -> str:
 
     everything = list(names)
     more = f" and {len(everything) - most} more" if len(everything) > most else ""
-    return ", ".join(cut(name) for name in nsmallest(most, everything)) + more
+    return ", ".join(bare(name) for name in nsmallest(most, everything)) + more
+
+
+def bare(name: str) -> str:
+    """Return a name for a list in a message: as `shown`, without quotes."""
+    kept = _cut(name, printable)
+    return printable(name) if kept == name else f"{printable(kept)}..."
 
 
 def printable(name: str) -> str:
@@ -261,19 +269,18 @@ def printable(name: str) -> str:
     return "".join(each if each.isprintable() else repr(each)[1:-1] for each in name)
 
 
-def cut(name: str) -> str:
-    """Return a name for a message without quotes: on one line, within 60 characters."""
-    return name if len(name) <= SHOWN - 2 and name.isprintable() else quoted(name)[1:-1]
-
-
-def quoted(value: object) -> str:
+def shown(value: object) -> str:
     """Return a value from the input for a message: on one line, within 60 characters, escapes and quotes included."""
-    text = value if isinstance(value, str) else repr(value)
-    show = repr if isinstance(value, str) else str
-    whole, size = show(text[:SHOWN]), SHOWN
-    if len(text) <= SHOWN and len(whole) <= SHOWN:
-        return whole
-    while len(whole) > SHOWN - 3:
-        size -= 1
-        whole = show(text[:size])
-    return f"{whole[:-1]}...{whole[-1]}" if show is repr else f"{whole}..."
+    is_text = isinstance(value, str)
+    text = str(value) if is_text else repr(value)
+    quote = repr if is_text else str
+    kept = _cut(text, quote)
+    return quote(text) if kept == text else f"{quote(kept)}... ({len(text)} characters)"
+
+
+def _cut(text: str, quote: Callable[[str], str]) -> str:
+    """Return as much of a text as is 60 characters long once it is quoted."""
+    kept = text[:SHOWN]
+    while len(quote(kept)) > SHOWN:
+        kept = kept[:-1]
+    return kept

@@ -276,6 +276,12 @@ def moving(*stamps_and_places: tuple[float, float], parents: str = "m") -> str:
     )
 
 
+def bridged(*topics: str) -> str:
+    """Return lines of rosbridge, the same transform by each topic."""
+    message = transform("map", "b", EPOCH)
+    return "".join(json.dumps({"op": "publish", "topic": topic, "msg": message}) + "\n" for topic in topics)
+
+
 STEADY = [(0.1 * at, 0.01 * at) for at in range(20)]
 RECORDINGS = {
     "repeated": moving(*STEADY, STEADY[-1]),
@@ -288,6 +294,8 @@ RECORDINGS = {
     "flicker": moving(*STEADY, parents="mo"),
     "static-and-moving": moving(*STEADY),
     "noise": "WARNING: topic [/tf] does not appear to be published yet\n" + moving(*STEADY),
+    "topics": bridged("/tf", "/tf_static"),
+    "two-topics": bridged("/tf", "/robot1/tf"),
 }
 
 

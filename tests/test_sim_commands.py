@@ -100,6 +100,8 @@ def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> Non
         (("follow", "--reach", "-1"), 2, "--reach must be 0 or more"),
         (("follow", "--live"), 2, "--live draws in a terminal"),
         (("follow", "--plot", "a.gif"), 2, "--plot takes .svg, .html, .png"),
+        (("follow", "--view", "a.svg"), 2, "--view takes a file .html"),
+        (("follow", "--view", "a.html", "--plot", "a.html"), 2, "--plot and --view are the same file"),
         (("follow", "--plot", "taken.svg"), 5, "taken.svg: exists; give --force"),
         (("follow", "-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
         (("follow", "--plot", "nowhere/f.svg"), 5, "nowhere/f.svg: no directory nowhere"),
@@ -154,11 +156,23 @@ def test_files_are_written_whole_in_the_form_of_their_suffix(run: Run, tmp_path:
 def test_a_plot_shows_the_world_the_trails_and_three_curves(run: Run, tmp_path: Path) -> None:
     run("sim", "follow", "--leader", "square", "--followers", "2", "--duration", "3", "--plot", "run.svg", "-f", "csv")
     root = ET.fromstring((tmp_path / "run.svg").read_text())  # noqa: S314 - our own
-    lines = root.findall(f".//{SVG}polyline")
+    lines = root.findall(f".//{SVG}path/{SVG}title")  # a line of a turtle says whose it is
     words = [text.text for text in root.iter(f"{SVG}text")]
     assert len(lines) == 3 + 3 * 2
     assert {"distance (m)", "linear.x (m/s)", "angular.z (rad/s)", "turtle1", "turtle3"} <= set(words)
     assert root.find(f".//{SVG}rect[@fill='#4556ff']") is not None
+
+
+@pytest.mark.parametrize("arguments", [("follow", "--target", "carrot"), ("run", "s.yaml")])
+def test_a_run_can_be_looked_at_as_frames_over_time(run: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    outcome = run("sim", *arguments, "--duration", "1", "--view", "run.html", "-f", "csv", files={"s.yaml": SCENE})
+    assert outcome.status == 0
+    text = (tmp_path / "run.html").read_text()
+    head = json.loads(re.search('id="head-data">([^<]*)<', text)[1])  # type: ignore[index]
+    assert head["names"][0] == "world"
+    assert {"turtle1", "turtle2"} < set(head["names"])
+    assert ("carrot1" in head["names"]) == ("carrot" in arguments)
+    assert [track["count"] for track in head["tracks"]][:2] == [63, 63]
 
 
 @pytest.mark.parametrize("arguments", [("follow", "--duration", "1"), ("sweep", "--gain-linear", "1", "--duration", "1")])

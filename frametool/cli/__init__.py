@@ -25,6 +25,7 @@ COMMANDS = {
     "lookup": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
     "tree": ("frametool.cli.commands.tree", "the tree of frames, drawn or written in another form"),
+    "view": ("frametool.cli.commands.view", "the frames seen: in the terminal, as a page that turns, as a picture"),
     "echo": ("frametool.cli.commands.echo", "where SOURCE is seen from TARGET as a recording goes by"),
     "monitor": ("frametool.cli.commands.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
     "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
@@ -50,6 +51,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
     from frametool.cli.signals import die_of
     from frametool.cli.stderr import discard, say, say_warning
+    from frametool.documents.limits import DEEPEST
     from frametool.errors import heard_by
 
     if sys.stdout is None:
@@ -57,6 +59,7 @@ def run(arguments: list[str]) -> int:
         return IN_OUT
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.encoding.lower() != "utf-8":
         sys.stdout.reconfigure(encoding="utf-8")  # the same bytes in every locale
+    sys.setrecursionlimit(max(sys.getrecursionlimit(), 20 * DEEPEST))  # a document may be so deep, a walk some calls
     status = 0
     try:
         with heard_by(say_warning):
@@ -109,12 +112,12 @@ def _run(arguments: list[str]) -> int:
 
 def _usage(error: click.ClickException, arguments: list[str]) -> str:
     """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
-    from frametool.errors import SHOWN, quoted
+    from frametool.errors import SHOWN, shown
 
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
-        message = message.replace(repr(text), quoted(text)).replace(text, quoted(text)[1:-1])
+        message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
     if ctx is None or ctx.parent is None:

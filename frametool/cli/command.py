@@ -9,10 +9,10 @@ import click
 
 from frametool.cli.help import WithHelp
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid, quoted
+from frametool.errors import ValueInvalid, shown
 from frametool.formats import writers
 from frametool.geometry.euler import AXES
-from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notation
+from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Utf8(Text):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse bytes that are no text."""
         if any("\ud800" <= each <= "\udfff" for each in str(value)):
-            self.fail(f"{quoted(value)} is not UTF-8 text", param, ctx)
+            self.fail(f"{shown(value)} is not UTF-8 text", param, ctx)
         return super().convert(value, param, ctx)
 
 
@@ -91,6 +91,19 @@ class Number(Text):
             self.fail(str(error), param, ctx)
 
 
+FULL = -1  # digits: as many as the number has
+
+
+class Digits(Text):
+    """How many digits stand after the point: a number, or `full`."""
+
+    name = "digits"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Take the word for all, or count."""
+        return FULL if value in ("full", FULL) else click.IntRange(0, 30).convert(value, param, ctx)
+
+
 class Notations(click.ParamType["tuple[Notation, ...]"]):
     """Names of representations, separated by commas."""
 
@@ -101,7 +114,7 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
         if not isinstance(value, str):
             return tuple(value)
         try:
-            chosen = tuple(notation(spec.strip()) for spec in value.split(","))
+            chosen = tuple(form for spec in value.split(",") for form in notations(spec.strip()))
             for form in chosen:
                 form.bound_axes()  # euler without its axes is refused before any work
         except ValueInvalid as error:
@@ -116,7 +129,7 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
         names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
         spec = begun.partition(":")[0]
         if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
-            names += [f"{spec}:{axes}" for axes in AXES]
+            names += [f"{spec}:{axes}" for axes in ("all", *AXES)]
         return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
 
 
@@ -155,9 +168,10 @@ def result_options(what: str) -> Callable[[Function], Function]:
         ),
         click.option(
             "--precision",
-            type=click.IntRange(0, 30),
-            metavar="N",
-            help="digits after the point  [default: the shortest text that reads back to the same bits]",
+            type=Digits(),
+            metavar="N|full",
+            help="digits after the point  [default: full, the shortest text that reads back to the same bits; "
+            "6 in an overview for people]",
         ),
         click.option(
             "-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all"

@@ -12,7 +12,7 @@ from frametool import __version__
 from frametool.cli import COMMANDS
 from frametool.cli.help import WithHelp
 from frametool.cli.sink import writing
-from frametool.errors import alternatives
+from frametool.errors import alternatives, shown
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -53,7 +53,7 @@ class Group(WithHelp, click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command, or say which ones there are."""
         if args and args[0] not in self.table:
-            raise click.UsageError(f"no command {args[0]!r}{alternatives(args[0], self.table, 'commands')}", ctx)
+            raise click.UsageError(f"no command {shown(args[0])}{alternatives(args[0], self.table, 'commands')}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.documents.source import Source, decode, read_text
-from frametool.errors import FormatError, alternatives
+from frametool.errors import FormatError, alternatives, shown
 from frametool.sim.command_file import read_commands, read_script
 from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
-from frametool.text.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

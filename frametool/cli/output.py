@@ -7,6 +7,7 @@ from importlib import import_module
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from frametool.cli.command import FULL
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.errors import printable
@@ -49,7 +50,13 @@ class Output:
         form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
-        self.style = Style(form, chosen, degrees=deg, precision=precision, keep_sign=keep_sign)
+        full = precision == FULL
+        digits = None if full else precision
+        self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
+
+    def use(self, notations: tuple[Notation, ...]) -> None:
+        """Write rotations in these notations."""
+        self.style = self.style.in_notations(notations)
 
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""

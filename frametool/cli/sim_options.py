@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Number, Text, decorated
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.sim.controllers import LAWS
 from frametool.sim.scene import LONGEST
 from frametool.sim.targets import TARGETS
 from frametool.sim.world import VARIANTS
-from frametool.text.numbers import parse_angle, parse_number, shown
+from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -5,24 +5,25 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import ExitStack
-from importlib import import_module
+from functools import partial
+from itertools import combinations
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import TEXT, decorated
+from frametool.cli.pictures import PICTURES, drawn
 from frametool.cli.sim_options import REACH
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.errors import FileProblem
-from frametool.formats import FORMATS
+from frametool.errors import FileProblem, shown
+from frametool.formats import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.grammar.result import Style
 from frametool.sim.run_summary import RunSummary
 from frametool.sim.simulate import simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
-from frametool.text.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     from frametool.view.drawing import Drawing
 
     Watch = Callable[[SimulationStep], None]
-
-PLOTS = {".svg": "frametool.view.plot_svg", ".html": "frametool.view.plot_html", ".png": "frametool.view.plot_png"}
 
 
 def format_options(function: Any) -> Any:
@@ -60,6 +59,7 @@ def output_options(function: Any) -> Any:
         REACH,
         click.option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
         click.option("--live", is_flag=True, help="draw the turtles in the terminal, in real time"),
+        click.option("--view", type=TEXT, metavar="FILE.html", help="show their frames over time in a page, as `view`"),
         format_options,
     )  # fmt: skip
     return decorated(function, options)
@@ -71,7 +71,7 @@ class SimOutput:
     def __init__(
         self, *, emit: str = "commands", format_name: str | None = None, precision: int | None = None,
         output: str | None = None, reach: float = 0.5, realtime: bool = False, live: bool = False,
-        plot: str | None = None, force: bool = False, leaders: bool = False,
+        plot: str | None = None, view: str | None = None, force: bool = False, leaders: bool = False,
     ) -> None:  # fmt: skip
         """Check what can be checked before anything runs.
 
@@ -85,12 +85,15 @@ class SimOutput:
         self.realtime = realtime or live
         self.live = live
         self.plot = plot
+        self.view = view
         self.force = force
         if reach < 0.0:
             raise click.UsageError(f"--reach must be 0 or more, found {reach:g}")
         if live and not (sys.stdout.isatty() or sys.stderr.isatty()):
             raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        check_files(plot, self.output, force=force)
+        if view and suffix_of(view) != ".html":
+            raise click.UsageError(f"--view takes a file .html; found {shown(view)}")
+        check_files(plot, self.output, view, force=force)
 
     def run(self, scene: Scene) -> None:
         """Run a scene to its end and sum it up on stderr.
@@ -98,11 +101,11 @@ class SimOutput:
         Raises KeyboardInterrupt after the summary if it was interrupted.
         """
         summary = RunSummary(scene, self.reach)
-        drawing = self._drawing(scene)
+        pictures = self._pictures(scene)
         interrupted = False
         try:
             with ExitStack() as stack:
-                watchers = [summary.watch, *self._watchers(scene, stack), *([drawing.watch] if drawing else [])]
+                watchers = [summary.watch, *self._watchers(scene, stack), *(watch for watch, _ in pictures.values())]
                 for step in simulate(scene):
                     for watch in watchers:
                         watch(step)
@@ -110,19 +113,26 @@ class SimOutput:
             interrupted = True
         for line in summary.lines():
             say(line)
-        if drawing and self.plot:
-            with writing(self.plot, force=self.force) as write:
-                write(import_module(PLOTS[suffix_of(self.plot)]).plot(drawing))
+        for path, (_, content) in pictures.items():
+            with writing(path, force=self.force) as write:
+                write(content())
         if interrupted:
             raise KeyboardInterrupt
 
-    def _drawing(self, scene: Scene) -> Drawing | None:
-        """Return what remembers the run for the plot, if there is to be one."""
-        if not self.plot:
-            return None
-        from frametool.view.drawing import Drawing
+    def _pictures(self, scene: Scene) -> dict[str, tuple[Watch, Callable[[], str | bytes]]]:
+        """Return what is written after the run, by file: what watches the steps, and what then makes the content."""
+        pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
+        if self.plot:
+            from frametool.view.drawing import Drawing
 
-        return Drawing(scene)
+            drawing = Drawing(scene)
+            pictures[self.plot] = drawing.watch, partial(_plot, drawing, suffix_of(self.plot))
+        if self.view:
+            from frametool.view.run_page import RunPage
+
+            page = RunPage()
+            pictures[self.view] = page.watch, page.content
+        return pictures
 
     def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
         """Open what the steps go to; the stack closes it."""
@@ -147,6 +157,13 @@ class SimOutput:
                 write(text)
 
         return watch
+
+
+def _plot(drawing: Drawing, suffix: str) -> str | bytes:
+    """Return the plot of a run."""
+    from frametool.view.run_plot import last_commands, run_picture
+
+    return drawn(run_picture(drawing), suffix, last_commands(drawing))
 
 
 class RealTimeClock:
@@ -181,10 +198,9 @@ class EventLog:
 
 def style_of(format_name: str | None, output: str | None, precision: int | None) -> Style:
     """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
-    suffix = suffix_of(output or "")
-    by_suffix = next((name for name in FORMS if name in FORMATS and suffix in FORMATS[name].suffixes), None)
-    default = "text" if suffix == ".txt" or (output is None and sys.stdout.isatty()) else "yaml"
-    return Style(format_name or by_suffix or default, precision=precision)
+    is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
+    form = format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
+    return Style(form, precision=precision)
 
 
 def suffix_of(path: str) -> str:
@@ -192,20 +208,22 @@ def suffix_of(path: str) -> str:
     return os.path.splitext(path)[1].lower()
 
 
-def check_files(plot: str | None, output: str | None, *, force: bool) -> None:
+def check_files(plot: str | None, output: str | None, view: str | None = None, *, force: bool) -> None:
     """Refuse before any work what could not be written after it.
 
     Raises click.UsageError, FileProblem, ValueInvalid when matplotlib is missing.
     """
-    if plot and suffix_of(plot) not in PLOTS:
-        raise click.UsageError(f"--plot takes {', '.join(PLOTS)}; found {shown(plot)}")
-    if plot and output and os.path.realpath(plot) == os.path.realpath(output) and not is_special(plot):
-        raise click.UsageError(f"--output and --plot are the same file: {shown(plot)}")
-    for path in filter(None, (plot, output)):
+    if plot and suffix_of(plot) not in PICTURES:
+        raise click.UsageError(f"--plot takes {', '.join(PICTURES)}; found {shown(plot)}")
+    files = {name: path for name, path in (("--output", output), ("--plot", plot), ("--view", view)) if path}
+    for (name, path), (other, same) in combinations(files.items(), 2):
+        if os.path.realpath(path) == os.path.realpath(same) and not is_special(path):
+            raise click.UsageError(f"{name} and {other} are the same file: {shown(path)}")
+    for path in files.values():
         refuse_existing(path, force=force)
         if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
             raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     if plot and suffix_of(plot) == ".png":
-        from frametool.view.plot_png import require_matplotlib
+        from frametool.view.png import require_matplotlib
 
         require_matplotlib()

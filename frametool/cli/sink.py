@@ -11,7 +11,7 @@ from itertools import count
 from typing import TYPE_CHECKING, BinaryIO
 
 from frametool.cli.signals import whole_lines
-from frametool.errors import FileProblem, ValueInvalid, printable, quoted
+from frametool.errors import FileProblem, ValueInvalid, printable, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -80,7 +80,7 @@ def _encoded(text: str) -> bytes:
     try:
         return text.encode()
     except UnicodeEncodeError as error:
-        raise ValueInvalid(f"{quoted(error.object[error.start :])} cannot be written as UTF-8 text") from None
+        raise ValueInvalid(f"{shown(error.object[error.start :])} cannot be written as UTF-8 text") from None
 
 
 @contextmanager

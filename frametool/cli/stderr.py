@@ -7,7 +7,7 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from frametool.errors import FrametoolError, FrametoolWarning, LookupFailed, Tf2Warning, printable
+from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, printable
 
 if TYPE_CHECKING:
     from typing import TextIO
@@ -40,10 +40,10 @@ def say_error(error: FrametoolError, *, in_json: bool) -> None:
 
         tell(as_json(error))
         return
-    if isinstance(error, LookupFailed):  # a loop is told by tf2 on a line for each frame
-        tell("\n".join(map(printable, f"frametool: {error}".split("\n"))))
-    else:
-        say(str(error))
+    first, *rest = str(error).split("\n") if error.many_lines else [str(error)]
+    say(first)
+    for line in rest:
+        tell(printable(line))
     if snippet := getattr(error, "snippet", ""):
         tell(snippet)
 

@@ -121,7 +121,8 @@ class Stream:
             request = self._completed(request, output, form)
             if form in RECORDS and (output.told or form) != form:
                 return self._run_as_values(stream, form, request, output)
-            if form not in RECORDS and output.told not in (None, form) and not (output.told == "csv" and form == "tsv"):
+            kindred = output.told == "csv" and form in ("tsv", "semicolon")
+            if form not in RECORDS and output.told not in (None, form) and not kindred:
                 raise click.UsageError(
                     f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
                 )

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import Text, say_if_verbose
+from frametool.cli.command import TEXT, Text, say_if_verbose
 from frametool.cli.poses import is_inline, source_of
-from frametool.errors import warn
+from frametool.errors import shown, warn
 from frametool.formats.load import load_sources
 from frametool.formats.recordings import Recording
 
@@ -36,15 +36,29 @@ def opened(arguments: Sequence[str]) -> list[Recording]:
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
     return [
-        Recording.inline(source_of(each)) if is_inline(each) else announced(Recording(tree_file(each)))
-        for each in arguments
+        Recording.inline(source_of(each)) if is_inline(each) else _opened(tree_file(each)) for each in arguments
     ]
 
 
-def announced(file: Recording) -> Recording:
-    """Say what a file was taken for, if the command was asked to."""
+def _opened(path: str) -> Recording:
+    """Open one file, of a recording the topics chosen; say what it was taken for, if the command was asked to."""
+    context = click.get_current_context(silent=True)
+    file = Recording(path, topics=() if context is None else context.meta.get(TOPICS, ()))
     say_if_verbose(file.described)
     return file
+
+
+TOPICS = "frametool.topics"  # where a command's context keeps those of --topic
+
+
+def _keep_topics(context: click.Context, _: click.Parameter, chosen: Sequence[str]) -> None:
+    context.meta[TOPICS] = chosen
+
+
+topic_option = click.option(
+    "--topic", type=TEXT, multiple=True, metavar="NAME", expose_value=False, callback=_keep_topics,
+    help="read only this topic of a recording; may be repeated",
+)  # fmt: skip
 
 
 def tree_file(argument: str) -> str:
@@ -83,6 +97,6 @@ FRAME = Frame()
 def frame_name(name: str, tree: FrameTree | TransformBuffer) -> str:
     """Return a frame's name without a leading `/`, which tf2 has given up, unless a frame is called so."""
     if name.startswith("/") and name not in tree.frames:
-        warn(f"frame {name!r}: the leading / is no part of a name and was left out")
+        warn(f"frame {shown(name)}: the leading / is no part of a name and was left out")
         return name[1:]
     return name

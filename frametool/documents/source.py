@@ -12,7 +12,7 @@ from bisect import bisect_right
 from io import BufferedReader
 from typing import NamedTuple
 
-from frametool.errors import FileProblem, FormatError
+from frametool.errors import FileProblem, FormatError, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -24,12 +24,32 @@ HEAD = 1 << 16
 """How many bytes of a file are looked at before it is read."""
 
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
+UTF32 = (b"\xff\xfe\x00\x00", b"\x00\x00\xfe\xff")
+LOOKED_AT = 4096
+MAGIC = {
+    b"\x7fELF": "a program (ELF)",
+    b"\x89PNG": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"%PDF": "a PDF",
+    b"\x1f\x8b": "gzip data; unpack it first",
+    b"BZh": "bzip2 data; unpack it first",
+    b"\xfd7zXZ": "xz data; unpack it first",
+    b"\x28\xb5\x2f\xfd": "zstd data; unpack it first",
+    b"PK\x03\x04": "a zip archive; unpack it first",
+    b"\x93NUMPY": "a NumPy array",
+    b"\x89HDF": "HDF5",
+    b"PAR1": "Parquet",
+    b"LASF": "a LAS point cloud",
+    b"glTF": "a binary glTF scene",
+    b"PXR-USDC": "a USD scene",
+}
+_CONTROLS = bytes(code for code in range(32) if code not in b"\t\n\r\f\x1b")
 
 MOST_CHARACTERS = 3 << 24
 """Longest text read as one file of documents, also in bytes: 400 000 frames in 0.7 GB, at worst 1.4 GB."""
 
 _LINE_END = "\r\n|[\r\n\x85\u2028\u2029]"
-_WIDEST_SNIPPET = 100
+_WIDEST_SNIPPET = 74  # and three dots on either side
 
 
 class Source(NamedTuple):
@@ -55,7 +75,7 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
     except OSError as error:
         raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:
-        raise FileProblem(f"{name!r} is no file name: {error}") from None
+        raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 
 
 def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
@@ -82,15 +102,13 @@ def decode(data: bytes, name: str) -> str:
 
     Raises FormatError at the first byte that is something else.
     """
-    if data.startswith((b"\xff\xfe\x00\x00", b"\x00\x00\xfe\xff")):
-        raise FormatError("not UTF-8 but UTF-32; convert the file", source=name, line=1, column=1)
     encoding = "utf-16" if data.startswith(UTF16) else "utf-8-sig"
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
         raise _undecodable(data, name, encoding, error) from None
     if "\0" in text:
-        raise error_at(Source(name, text), text.index("\0"), "not UTF-8 text: it holds a NUL byte")
+        raise _no_text(name, text[: text.index("\0")], not_text(data) or "not text: it holds a NUL byte")
     return text
 
 
@@ -98,10 +116,36 @@ def _undecodable(data: bytes, name: str, encoding: str, error: UnicodeDecodeErro
     """Place the first bad byte; what precedes it is good text, what follows is shown as far as it goes."""
     start = error.start + (3 if encoding == "utf-8-sig" and data.startswith(b"\xef\xbb\xbf") else 0)
     before = data[:start].decode(encoding, "ignore")
+    if what := not_text(data):
+        return _no_text(name, before, what)
     after = data[start : start + 200].decode(encoding, "replace")
     label = "UTF-16" if encoding == "utf-16" else "UTF-8"
     message = f"not {label}: byte 0x{data[start]:02x} does not belong there; convert the file (from Latin-1?)"
     return error_at(Source(name, before + after), len(before), message)
+
+
+def _no_text(name: str, before: str, what: str) -> FormatError:
+    """Make the error for bytes behind some text; a line of them would show nothing."""
+    ((line, column),) = places_of(f"{before}.", [len(before)])
+    return FormatError(what, source=name, line=line, column=column)
+
+
+def not_text(data: bytes) -> str:
+    """Say what bytes are that are no UTF-8; "" if they may be text in some other encoding."""
+    head = data[:LOOKED_AT]
+    for magic, what in MAGIC.items():
+        if head.startswith(magic):
+            return f"not text but {what}"
+    if head.startswith(UTF32):
+        return "UTF-32, which is not read; convert it: iconv -f UTF-32 -t UTF-8"
+    if head.startswith(UTF16):
+        return "UTF-16, which is not read here; convert it: iconv -f UTF-16 -t UTF-8"
+    even, odd = head[::2].count(0), head[1::2].count(0)
+    for zeros, others, encoding in ((odd, even, "UTF-16LE"), (even, odd, "UTF-16BE")):
+        if zeros > len(head) // 5 and others <= zeros // 20:
+            return f"{encoding} without a byte order mark; convert it: iconv -f {encoding} -t UTF-8"
+    controls = len(head) - len(head.translate(None, _CONTROLS))
+    return "not text but binary data" if controls > max(2, len(head) // 10) else ""
 
 
 def check_text(source: Source) -> None:

@@ -7,6 +7,7 @@ import re
 from yaml.error import MarkedYAMLError
 
 from frametool.documents.source import Source, error_at, line_of
+from frametool.errors import shown
 from frametool.text.numbers import odd_characters
 
 TYPE_CHECKING = False
@@ -67,7 +68,7 @@ def _message(error: MarkedYAMLError, line: str, column: int) -> str:
         word = line.split(maxsplit=1)[0] if line.strip() else ""
     if word.startswith(_NEVER_FIRST) and re.search(_ABOUT_BEGINNINGS, problem + context):
         name = word.rstrip(":,]}")[:_LONGEST_SHOWN]
-        return f'nothing can begin with {word[0]!r} here; quote the name: "{name}"'
+        return f'nothing can begin with {shown(word[0])} here; quote the name: "{name}"'
     if word == ":" and problem == "did not find expected key":
         return "an empty key; write a name before the colon"
     begun = f" begun at line {error.context_mark.line + 1}" if error.context_mark else ""

@@ -10,7 +10,7 @@ class Format(NamedTuple):
 
     summary: what it is, in a line
     suffixes: of files in this form
-    reads: what is read from it: `tree` by `read` of `reader`; `messages`, `records` and `rows` by the streams
+    reads: what is read from it: `tree` by `read` of `reader`; `records` and `rows` by the streams
     writes: what is written in it, by `write_poses`, `write_points` (also for a `report`), `write_tree` of `writer`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     """
@@ -26,7 +26,7 @@ class Format(NamedTuple):
 
 _TREE = "frametool.formats.tree_reader"
 _MESSAGES = "frametool.ros.message_reader"
-_BAG = "frametool.ros.bags"
+BAG = "frametool.ros.bags"
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
@@ -65,17 +65,20 @@ FORMATS = {
     "tsv": Format(
         "tab-separated values with a header", (".tsv", ".tab"), reads=("rows",), signs=(("header", r".*\t"),)
     ),
+    "semicolon": Format(
+        "CSV with semicolons and a header", reads=("rows",), signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),)
+    ),
     "columns": Format("columns between blanks, # comments", reads=("rows",), signs=(("header", r"#|\s*\S+\s+\S"),)),
     "tum": Format("trajectory: t x y z qx qy qz qw", suffixes=(".tum",), reads=("rows",)),
     "echo": Format(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
-        reads=("tree", "messages"),
+        reads=("tree",),
         reader=_MESSAGES,
         signs=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
     ),
     "jsonl": Format(
         "messages as JSON, one a line (rosbridge, Foxglove)",
-        reads=("tree", "messages"),
+        reads=("tree",),
         reader=_MESSAGES,
         signs=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
     ),
@@ -96,15 +99,15 @@ FORMATS = {
             ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
         ),
     ),
-    "bag1": Format("ROS 1 bag", (".bag",), ("tree",), _BAG, signs=(("magic", b"#ROSBAG V2.0"),)),
+    "bag1": Format("ROS 1 bag", (".bag",), ("tree",), BAG, signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),)),
     "bag2": Format(
-        "ROS 2 bag (sqlite3)",
+        "ROS 2 bag: sqlite3, or a folder",
         suffixes=(".db3",),
         reads=("tree",),
-        reader=_BAG,
-        signs=(("magic", b"SQLite format 3\0"), ("folder", "metadata.yaml")),
+        reader=BAG,
+        signs=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
     ),
-    "mcap": Format("MCAP file", (".mcap",), ("tree",), _BAG, signs=(("magic", b"\x89MCAP0\r\n"),)),
+    "mcap": Format("MCAP file", (".mcap",), ("tree",), BAG, signs=(("magic", rb"\x89MCAP0\r\n"),)),
     "ros1": Format(
         "messages as `rostopic echo` prints them",
         writes=("poses", "points", "tree"),
@@ -131,7 +134,7 @@ FORMATS = {
 
 
 def readers(*what: str) -> tuple[str, ...]:
-    """Name the forms from which any of `tree`, `messages`, `records` and `rows` is read."""
+    """Name the forms from which any of `tree`, `records` and `rows` is read."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
 
 

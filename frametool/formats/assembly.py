@@ -5,7 +5,7 @@ Knows nothing of text: whoever reads says where each edge stood.
 
 from __future__ import annotations
 
-from frametool.errors import BadTopology, FormatError, Tf2Warning, ValueInvalid, quoted, warn
+from frametool.errors import BadTopology, FormatError, Tf2Warning, ValueInvalid, shown, warn
 from frametool.frames.policy import Refused
 from frametool.frames.tree import FrameTree
 
@@ -167,7 +167,7 @@ class Assembly:
             if each.child in standing:
                 raise self._placed(BadTopology("", rule="two-poses"), each.parent, each.child, each.later)
         for each in self._replaced[:most]:
-            what = f"frame {quoted(each.child)} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
+            what = f"frame {shown(each.child)} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
             warn(f"{self.name}: {what}; the last one holds")
         if len(self._replaced) > most:
             warn(f"{self.name}: {len(self._replaced) - most} more stamps with two poses of one frame")
@@ -192,10 +192,10 @@ class Assembly:
         if error.rule not in ("cycle", "self") and known is not None and known[2] is not place:
             first, second = known[2].seen_from(place), place.seen_from(place)
             if known[0] != parent:
-                parents = f"{quoted(known[0])} ({first}) and {quoted(parent)} ({second})"
-                message = f"frame {quoted(child)} has two parents: {parents}"
+                parents = f"{shown(known[0])} ({first}) and {shown(parent)} ({second})"
+                message = f"frame {shown(child)} has two parents: {parents}"
             elif error.rule == "two-poses":
-                message = f"frame {quoted(child)} has two different poses in {quoted(parent)}: {first} and {second}"
+                message = f"frame {shown(child)} has two different poses in {shown(parent)}: {first} and {second}"
             else:
                 message = f"{error}: {first} and {second}"
         return place.error(message, BadTopology)

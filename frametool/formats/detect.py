@@ -2,7 +2,7 @@
 
 Kinds of signs in the table, the strongest first.  Above the suffix, a sign belongs to one form alone:
 
-    magic      the first bytes
+    magic      a pattern of the first bytes
     folder     a file that the folder holds
     xml        the root element
     json key   a key of the outermost object, or of the objects in the outermost list
@@ -21,8 +21,8 @@ import os
 import re
 from functools import cached_property
 
-from frametool.documents.source import UTF16
-from frametool.errors import FormatError
+from frametool.documents.source import LOOKED_AT, UTF16, not_text
+from frametool.errors import FormatError, shown
 from frametool.formats import FORMATS, by_suffix, readers
 
 TYPE_CHECKING = False
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from typing import Any, TypeAlias
 
     Shows: TypeAlias = Callable[["Beginning", Any], bool]
-
-LOOKED_AT = 4096  # characters in which keys are searched
 
 
 class Beginning:
@@ -98,7 +96,7 @@ def _has_delimiter(line: str) -> bool:
 
 # kind -> whether a beginning shows what a row says, the strongest first
 _STRONG: dict[str, Shows] = {
-    "magic": lambda begin, what: begin.head.startswith(what),
+    "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
     "xml": lambda begin, what: begin.root == what,
     "json key": lambda begin, what: what in begin.json_keys,
     "yaml key": lambda begin, what: what in begin.yaml_keys,
@@ -148,6 +146,8 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "") -> tup
     """
     if form := by_sign(head, *reads, name=name):
         return form, "its first bytes"
+    if "tree" not in reads and (what := not_text(head)):
+        raise FormatError(what, source=name or "stdin")
     if form := by_suffix(name, readers(*reads)):
         return form, f"the suffix {name[name.rfind('.'):].lower()}"
     begin = Beginning(head)
@@ -158,7 +158,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "") -> tup
     if not begin.text.strip():
         raise FormatError("nothing in it", source=name or "stdin")
     raise FormatError(
-        f"cannot tell the form of {begin.first_line[:60]!r}; give --in {'|'.join(readers(*reads))}",
+        f"cannot tell the form of {shown(begin.first_line[:60])}; give --in {'|'.join(readers(*reads))}",
         source=name or "stdin",
         line=1,
     )

@@ -12,7 +12,7 @@ from frametool.formats.assembly import Assembly, Rules
 from frametool.formats.recordings import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from os import PathLike
 
     from frametool.formats.assembly import Place
@@ -41,19 +41,24 @@ class EdgePlace(NamedTuple):
 
 
 def load(
-    *paths: str | PathLike[str], moving: bool = False, policy: str = "frametool", keep_ns: int | None = None,
+    *paths: str | PathLike[str],
+    moving: bool = False,
+    policy: str = "frametool",
+    keep_ns: int | None = None,
     normalize: bool = False,
+    topics: Iterable[str] = (),
 ) -> FrameTree | TransformBuffer:
     """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 
     paths: files in any form that `frametool.formats.FORMATS` reads a tree from; `-` is standard input.
     moving: an edge with a single stamp answers only that instant; otherwise it counts as standing.
-    policy, keep_ns: as TransformBuffer has them.
+    policy, keep_ns: as TransformBuffer has them.  topics: those of a recording that are read  [default: all].
     normalize: take any non-zero quaternion and any matrix near a rotation.
     Raises FormatError and BadTopology with file, line and column; FileProblem.
     """
     rules = Rules(moving=moving, policy=policy, keep_ns=keep_ns, normalize=normalize)
-    return load_sources([Recording(path) for path in paths], rules)
+    chosen = tuple(topics)
+    return load_sources([Recording(path, topics=chosen) for path in paths], rules)
 
 
 def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = None) -> FrameTree | TransformBuffer:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from io import BytesIO
 from typing import TYPE_CHECKING
 
 from frametool.documents.input_file import InputFile
-from frametool.errors import warn
-from frametool.formats import FORMATS
-from frametool.formats.detect import by_sign, detect, of_folder
-from frametool.grammar.edges import Edge, Options, Tally, stop
+from frametool.errors import FileProblem, FormatError, warn
+from frametool.formats import BAG, FORMATS
+from frametool.formats.detect import detect, of_folder
+from frametool.grammar.edges import Edge, Options, Tally, Topics, stop
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from os import PathLike
     from typing import BinaryIO
 
@@ -24,15 +25,25 @@ if TYPE_CHECKING:
 class Recording(InputFile):
     """A file of frames and its form."""
 
-    def __init__(self, path: str | PathLike[str], stream: BinaryIO | None = None, form: str | None = None) -> None:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        stream: BinaryIO | None = None,
+        form: str | None = None,
+        topics: Iterable[str] = (),
+    ) -> None:
         """Open a file, a bag's folder, or standard input for `-`, and find its form, unless it is told.
 
-        stream: what was opened already, with nothing of it read.  Raises FileProblem.
+        stream: what was opened already, with nothing of it read.  topics: those of a recording that are read.
+        Raises FileProblem.
         """
         folder = None if form else of_folder(str(path))
+        if not (form or folder) and os.path.isdir(path):
+            raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
         self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
         self.tally = Tally()
+        self.topics = Topics(topics)
 
     @classmethod
     def inline(cls, source: Source) -> Recording:
@@ -61,15 +72,18 @@ class Recording(InputFile):
         normalize: take any non-zero quaternion and any matrix near a rotation.
         """
         try:
-            yield from import_module(FORMATS[self.form].reader).read(self, Options(self.tally, report, raw, normalize))
+            options = Options(self.tally, self.topics, report, raw, normalize)
+            yield from import_module(FORMATS[self.form].reader).read(self, options)
         finally:
             self.close()
+        if missing := self.topics.missing():
+            report(FormatError(missing, source=self.name))
         for told in self.tally.told() if tell else ():
             warn(f"{self.name}:{told.line}: {told.message}")
 
 
-def open_messages(path: str, stream: BinaryIO) -> Recording | None:
-    """Take a stream that begins with a ROS message, as text or JSON lines; None for any other, nothing of it read."""
-    head = stream.peek(1)  # type: ignore[attr-defined]
-    form = by_sign(head, "messages")
-    return Recording(path, stream, form) if form else None
+def _about_folder(path: str) -> str:
+    """Say why a folder is not read, and which of its files would be."""
+    bags = tuple(suffix for row in FORMATS.values() if row.reader == BAG for suffix in row.suffixes)
+    files = sorted(name for name in os.listdir(path) if name.endswith(bags))[:5]
+    return f"a folder without metadata.yaml; name a file in it: {', '.join(files)}" if files else "is a directory"

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.errors import ValueInvalid, warn
+from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.edges import Edge
 from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
@@ -92,7 +92,7 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
 
 def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
     if unknown := [key for key in document if key not in TREE_KEYS]:
-        raise Misfit(f"unknown key {unknown[0]!r} beside frames; expected angles", (unknown[0],), key=True)
+        raise Misfit(f"unknown key {shown(unknown[0])} beside frames; expected angles", (unknown[0],), key=True)
     if "angles" in document:
         reading.degrees = read_angle_unit(document["angles"])
     frames = document["frames"]
@@ -137,11 +137,12 @@ def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -
             entry = {}
         if child in POSE_KEYS and type(entry) is not dict:
             raise Misfit(
-                f"{child!r} stands where a frame's name is expected: a root has no pose, its keys are its children",
+                f"{shown(child)} stands where a frame's name is expected: "
+                "a root has no pose, its keys are its children",
                 key=True,
             )
         for key in ("name", "parent"):
-            if key in as_mapping(entry, f"the pose of frame {child!r}"):
+            if key in as_mapping(entry, f"the pose of frame {shown(child)}"):
                 raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)
         pose = read_pose(entry, reading, CHILDREN)
         yield from _edges(entry, pose, parent, child, path, reading)
@@ -167,7 +168,7 @@ def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
         if pose.name is None:
             raise Misfit("missing name; an entry is {name: .., parent: .., xyz: [..], ..}")
         if pose.parent is None and (pose.position or pose.rotation):
-            raise Misfit(f"frame {pose.name!r} has a pose but no parent")
+            raise Misfit(f"frame {shown(pose.name)} has a pose but no parent")
         return _edges(entry, pose, pose.parent, pose.name, path, reading)
     except Misfit as misfit:
         reading.refuse(misfit.below(*path))
@@ -181,7 +182,7 @@ def _edges(
     if entry is not None and "samples" in entry:
         return read_samples(entry, pose, parent, child, path, reading)
     if parent is not None and pose.position is None and pose.rotation is None:
-        reading.note(f"frame {child!r} has neither position nor rotation: taken as the identity", rule="identity")
+        reading.note(f"frame {shown(child)} has neither position nor rotation: taken as the identity", rule="identity")
     return [Edge(parent, child, pose.components, stamp_of(entry or {}), path=path)]
 
 
@@ -211,7 +212,7 @@ def read_samples(
 ) -> list[Edge]:
     """Read `samples: [{stamp: 0.0, xyz: [..]}, ..]`; a sample may name a parent of its own."""
     if pose.position is not None or pose.rotation is not None or not STAMP_KEYS.isdisjoint(entry):
-        message = f"frame {child!r} has samples and a pose or a stamp beside them; put all into samples"
+        message = f"frame {shown(child)} has samples and a pose or a stamp beside them; put all into samples"
         raise Misfit(message, ("samples",), key=True)
     samples = entry["samples"]
     if type(samples) is not list or not samples:
@@ -225,7 +226,7 @@ def read_samples(
             moved, stamp_ns = within(("samples", index), _sample, sample, reading)
             above = moved.parent or parent
             if above is None:
-                raise Misfit(f"frame {child!r} moves but has no parent", ("samples", index))
+                raise Misfit(f"frame {shown(child)} moves but has no parent", ("samples", index))
             edges.append(Edge(above, child, moved.components, stamp_ns, path=reading.here))
     finally:
         reading.degrees = outer

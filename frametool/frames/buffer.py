@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import BadTopology, ValueInvalid, quoted, warn
+from frametool.errors import BadTopology, ValueInvalid, shown, warn
 from frametool.frames.lookups import Frames
 from frametool.frames.path import cycle_message
 from frametool.frames.policy import FRAMETOOL, policy_named
@@ -54,7 +54,7 @@ class TransformBuffer(Frames):
         if type(components[6]) is not float and transform.shape:
             raise ValueInvalid(f"insert takes one transform, found {len(transform)}; insert them one by one")
         if self.insert_components(parent, child, components, stamp_ns, static=static, authority=authority):
-            warn(f"frame {quoted(child)} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
+            warn(f"frame {shown(child)} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
 
     def insert_components(
         self, parent: str, child: str, components: Rigid, stamp_ns: int | None = None, *,

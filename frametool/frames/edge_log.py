@@ -49,6 +49,7 @@ class EdgeLog:
         self.child = child
         self.parent = ""  # the newest
         self.parents: dict[str, int] = {}  # each once, numbered as it was first named
+        self.topics: dict[str, int] = {}  # how many samples came by each, where that is known
         self.changes = 0
         self.count = 0
         self.standing = False

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, quoted
+from frametool.errors import ValueInvalid, shown
 from frametool.geometry import arrays, quaternion, segment
 from frametool.geometry.transform import Transform
 
@@ -32,7 +32,7 @@ SHARED = 4  # times a sample
 def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
     """Return target_from_source at each of many times; see Frames.lookup_many."""
     if missing not in ("raise", "nan"):
-        raise ValueInvalid(f"missing is 'raise' or 'nan', found {quoted(missing)}")
+        raise ValueInvalid(f"missing is 'raise' or 'nan', found {shown(missing)}")
     times = as_stamps(at_ns)
     flat = times.reshape(-1)
     order = None if bool(np.all(flat[1:] >= flat[:-1])) else np.argsort(flat)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from frametool.errors import NoDataAt, TooEarly, TooLate, cut
+from frametool.errors import NoDataAt, TooEarly, TooLate, bare
 from frametool.frames.stamps import BILLION, format_stamp
 
 TYPE_CHECKING = False
@@ -29,7 +29,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
     parent = worst.parent_near(at_ns)
     off = f"{seconds(short)} s too {'early' if early else 'late'}"
     message = (
-        f"no data for {cut(parent)} -> {cut(worst.child)} at {format_stamp(at_ns)}; {_cover(first, last)} ({off}), "
+        f"no data for {bare(parent)} -> {bare(worst.child)} at {format_stamp(at_ns)}; {_cover(first, last)} ({off}), "
         f"{_way(target, source, path)}{_whole(moving, begin, end)}{_clocks(short)}"
     )
     return (TooEarly if early else TooLate)(
@@ -42,7 +42,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
 def left_out(track: MovingTrack, at_ns: int) -> str:
     """Return the sentence that says why an edge is left out of the tree at a time."""
     return (
-        f"{cut(track.parent)} -> {cut(track.child)} is left out: no data at {format_stamp(at_ns)}, "
+        f"{bare(track.parent)} -> {bare(track.child)} is left out: no data at {format_stamp(at_ns)}, "
         f"samples cover {format_stamp(track.first_ns)} .. {format_stamp(track.last_ns)} "
         f"({seconds(gap(track, at_ns))} s off)"
     )
@@ -67,7 +67,7 @@ def _cover(first: int, last: int) -> str:
 
 def _way(target: str, source: str, path: Sequence[Track]) -> str:
     """Write the way with arrows from source to target, cut in the middle when it is long."""
-    frames = list(map(cut, frames_on(target, source, path)))
+    frames = list(map(bare, frames_on(target, source, path)))
     if len(frames) > 12:
         frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
     return f"on the path {' <- '.join(frames)}"
@@ -89,7 +89,7 @@ def _whole(moving: Sequence[MovingTrack], begin: int, end: int) -> str:
         return f"; the whole path has data from {format_stamp(begin)} until {format_stamp(end)}"
     late = max(moving, key=lambda track: track.first_ns)
     early = min(moving, key=lambda track: track.last_ns)
-    ended, begun = (f"{cut(track.parent)} -> {cut(track.child)}" for track in (early, late))
+    ended, begun = (f"{bare(track.parent)} -> {bare(track.child)}" for track in (early, late))
     return f"; {ended} ends at {format_stamp(end)} before {begun} begins at {format_stamp(begin)}: they never overlap"
 
 

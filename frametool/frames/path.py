@@ -5,7 +5,7 @@ Knows names and parents only. Trees that stand still and trees that move both as
 
 from __future__ import annotations
 
-from frametool.errors import BadTopology, NotConnected, cut, quoted
+from frametool.errors import BadTopology, NotConnected, bare, shown
 from frametool.geometry import rigid
 
 TYPE_CHECKING = False
@@ -48,9 +48,10 @@ def edges_between(target: str, source: str, parent_of: Callable[[str], str | Non
     target_line = to_root(target, parent_of)
     source_line = to_root(source, parent_of)
     if target_line[-1] != source_line[-1]:
-        one, other, root, other_root = map(quoted, (target, source, target_line[-1], source_line[-1]))
         raise NotConnected(
-            f"{one} and {other} are not connected: {one} hangs from root {root}, {other} from root {other_root}",
+            f"{shown(target)} and {shown(source)} are not connected: "
+            f"{shown(target)} hangs from root {shown(target_line[-1])}, "
+            f"{shown(source)} from root {shown(source_line[-1])}",
             target=target, source=source, target_root=target_line[-1], source_root=source_line[-1],
         )  # fmt: skip
     while target_line and source_line and target_line[-1] == source_line[-1]:
@@ -93,4 +94,4 @@ def cycle_message(frames: list[str]) -> str:
     if len(frames) > MOST_SHOWN:
         left_out = f"({len(frames) - MOST_SHOWN} more)"
         frames = [*frames[: MOST_SHOWN // 2], left_out, *frames[-MOST_SHOWN // 2 :]]
-    return f"frames form a cycle: {' <- '.join(map(cut, reversed(frames)))}"
+    return f"frames form a cycle: {' <- '.join(map(bare, reversed(frames)))}"

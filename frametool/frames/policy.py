@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from frametool.errors import BadTopology, UnknownFrame, ValueInvalid, quoted
+from frametool.errors import BadTopology, UnknownFrame, ValueInvalid, shown
 from frametool.frames.path import edges_between
 from frametool.frames.stamps import format_stamp
 
@@ -23,7 +23,7 @@ def policy_named(name: str) -> BufferPolicy:
     from frametool.frames.tf2 import TF2
 
     if name not in TF2:
-        raise ValueInvalid(f"unknown policy {quoted(name)}; expected frametool, {', '.join(TF2)}")
+        raise ValueInvalid(f"unknown policy {shown(name)}; expected frametool, {', '.join(TF2)}")
     return TF2[name]
 
 
@@ -52,27 +52,27 @@ class BufferPolicy:
         Raises ValueInvalid, BadTopology.
         """
         if not parent or not child:
-            raise ValueInvalid(f"an edge needs two frames, found parent {quoted(parent)} and child {quoted(child)}")
+            raise ValueInvalid(f"an edge needs two frames, found parent {shown(parent)} and child {shown(child)}")
         if parent == child:
-            raise BadTopology(f"frame {quoted(child)} is its own parent", rule="self")
+            raise BadTopology(f"frame {shown(child)} is its own parent", rule="self")
         if not all(map(isfinite, components)):
-            shown = " ".join(map(repr, components))
-            raise ValueInvalid(f"the pose of {quoted(child)} in {quoted(parent)} is not finite: {shown}")
+            numbers = " ".join(map(repr, components))
+            raise ValueInvalid(f"the pose of {shown(child)} in {shown(parent)} is not finite: {numbers}")
         return parent, child, components
 
     def settle_kind(self, track: Track, *, standing: bool) -> bool:
         """Return whether a further sample counts as standing."""
         if track.standing != standing:
-            raise BadTopology(f"frame {quoted(track.child)} both stands still and moves", rule="static-and-moving")
+            raise BadTopology(f"frame {shown(track.child)} both stands still and moves", rule="static-and-moving")
         return standing
 
     def stand(self, track: StandingTrack, parent: str, components: Rigid) -> None:
         """Take a further value of a standing frame: only the same."""
         if parent != track.parent:
-            message = f"frame {quoted(track.child)} has two parents: {quoted(track.parent)} and {quoted(parent)}"
+            message = f"frame {shown(track.child)} has two parents: {shown(track.parent)} and {shown(parent)}"
             raise BadTopology(message, rule="two-parents")
         if components != track.components:
-            message = f"frame {quoted(track.child)} has two different poses in {quoted(parent)}"
+            message = f"frame {shown(track.child)} has two different poses in {shown(parent)}"
             raise BadTopology(message, rule="two-poses")
 
     def refuse_old(self, track: MovingTrack, stamp_ns: int, keep_ns: int, authority: str) -> None:  # noqa: ARG002
@@ -80,7 +80,7 @@ class BufferPolicy:
         newest = track.last_ns
         if newest - keep_ns > stamp_ns:
             raise ValueInvalid(
-                f"a sample of {quoted(track.child)} at {format_stamp(stamp_ns)} is older than the buffer keeps: "
+                f"a sample of {shown(track.child)} at {format_stamp(stamp_ns)} is older than the buffer keeps: "
                 f"{format_stamp(keep_ns)} s before its newest at {format_stamp(newest)}",
             )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from operator import index
 
-from frametool.errors import ValueInvalid, quoted
+from frametool.errors import ValueInvalid, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def whole_stamp(stamp_ns: Any) -> int:
     try:
         stamp = index(stamp_ns)
     except TypeError:
-        raise ValueInvalid(f"a stamp is integer nanoseconds, found {quoted(stamp_ns)}") from None
+        raise ValueInvalid(f"a stamp is integer nanoseconds, found {shown(stamp_ns)}") from None
     if not -FURTHEST_NS < stamp < FURTHEST_NS:
         raise ValueInvalid(f"stamp {stamp} ns is beyond the year 2116; are these nanoseconds?")
     return stamp
@@ -46,14 +46,14 @@ def parse_stamp(text: str) -> int:
         return int(match[1])
     match = re.fullmatch(_SECONDS, text)
     if match is None or not (match[2] or match[3]) or len(text) > 60:
-        raise NotATime(f"{quoted(text)} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
+        raise NotATime(f"{shown(text)} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
     sign, whole, fraction, exponent = match[1], match[2], match[3] or "", int(match[4] or 0)
     shift = 9 - len(fraction) + exponent
     digits = int(whole + fraction)
     if shift < 0:
         digits, lost = divmod(digits, int(10**-shift))
         if lost:
-            raise ValueInvalid(f"{quoted(text)} is finer than a nanosecond; round it")
+            raise ValueInvalid(f"{shown(text)} is finer than a nanosecond; round it")
         shift = 0
     stamp_ns = digits * int(10**shift)
     return -stamp_ns if sign == "-" else stamp_ns

@@ -231,7 +231,9 @@ TF2: dict[str, BufferPolicy] = {"ros1": Ros1(), "ros2": Ros2()}
 def _loop(buffer: Frames) -> LookupFailed:
     """Report what tf2 takes for a loop, with all frames."""
     known = (f"Frame {track.child} exists with parent {track.parent}." for track in buffer.tracks())
-    return LookupFailed("\n".join(("The tf tree is invalid because it contains a loop.", *known, "")))
+    error = LookupFailed("\n".join(("The tf tree is invalid because it contains a loop.", *known, "")))
+    error.many_lines = True
+    return error
 
 
 def _blamed(buffer: Frames, target: str, source: str, at_ns: int) -> MovingTrack | None:

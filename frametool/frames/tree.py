@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import BadTopology, quoted
+from frametool.errors import BadTopology, shown
 from frametool.frames.lookups import Frames
 from frametool.frames.path import cycle_message, to_root
 from frametool.frames.policy import FRAMETOOL
@@ -45,7 +45,7 @@ class FrameTree(Frames):
             self.policy.stand(known, parent, components)
             return
         if parent == child:
-            raise BadTopology(f"frame {quoted(child)} is its own parent", rule="self")
+            raise BadTopology(f"frame {shown(child)} is its own parent", rule="self")
         if child in self._frames and self._root_of(parent) == child:
             raise BadTopology(cycle_message([*to_root(parent, self.parent), parent]), rule="cycle")
         self._frames[parent] = None

@@ -65,7 +65,7 @@ def doubled_sincos(y: Array) -> Two[Array]:
     The rounding of sin y is added to its square, so that the cosine of a right angle vanishes to half an eps.
     """
     squared = y * y
-    bend = _polynomial(squared, trig.SINE)
+    bend = trig.polynomial(squared, trig.SINE)
     bend *= squared
     bend *= y
     sine = y + bend
@@ -89,23 +89,13 @@ def doubled_sincos(y: Array) -> Two[Array]:
 def doubled_arctan(tangent: Array) -> Array:
     """Return 2 atan(t), |t| <= 1, at most 1 eps off; of 1 it is pi/2 to the bit."""
     squared = tangent * tangent
-    rest = _polynomial(squared, trig.ARC_ABOVE)
-    rest /= _polynomial(squared, trig.ARC_BELOW)
+    rest = trig.polynomial(squared, trig.ARC_ABOVE)
+    rest /= trig.polynomial(squared, trig.ARC_BELOW)
     rest *= squared
     rest *= tangent
     rest = tangent - rest
     rest *= 2.0
     return rest
-
-
-def _polynomial(x: Array, coefficients: tuple[float, ...]) -> Array:
-    """Evaluate a polynomial by Horner's rule in one array, lowest coefficient first."""
-    value = x * coefficients[-1]
-    for coefficient in coefficients[-2:0:-1]:
-        value += coefficient
-        value *= x
-    value += coefficients[0]
-    return value
 
 
 def reduced_exactly(x: Array) -> Two[Array]:
@@ -157,7 +147,7 @@ def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *a
                 target[place] = result
 
 
-def guarded(kernel: Kernel, complain: Callable[[], None]) -> Kernel:
+def guarded(kernel: Kernel, complain: Callable[[], object]) -> Kernel:
     """Watch a kernel's results for what is not finite.
 
     `complain` then looks at the input itself, raises if that is to blame, and else lets pass.

@@ -9,8 +9,13 @@ from __future__ import annotations
 
 from math import sqrt
 
-from frametool.errors import ValueInvalid, did_you_mean
+from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.rotation import Rotation
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 HALF, ROOT = 0.5, sqrt(0.5)
 
@@ -43,8 +48,26 @@ def named_rotation(text: str) -> Rotation:
     return axes_change(target, source) if joint else axes_change("flu", text)
 
 
+def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float = 1e-6) -> list[str]:
+    """Return the Euler conventions in which three angles are this rotation, within `tolerance`; all in radians.
+
+    Raises:
+        ValueInvalid: there is none; with the nearest.
+    """
+    first, second, third = angles
+    off = {}
+    for axes in sorted(euler.AXES):
+        made = euler.to_quaternion(first, second, third, axes, floats)
+        off[axes] = quaternion.distance(*made, *rotation.components, floats)
+    near = min(off, key=off.__getitem__)
+    if off[near] > tolerance:
+        found = f"{near} is off by {off[near]:g}"
+        raise ValueInvalid(f"no Euler convention gives these angles within {tolerance:g} rad; {found}")
+    return [axes for axes, angle in off.items() if angle <= tolerance]
+
+
 def _named(name: str) -> Rotation:
     if name not in AXES:
         near = did_you_mean(name, AXES) or ";"
-        raise ValueInvalid(f"unknown axes {name!r}{near} axes: {', '.join(AXES)}")
+        raise ValueInvalid(f"unknown axes {shown(name)}{near} axes: {', '.join(AXES)}")
     return AXES[name][0]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
-from frametool.geometry.validation import all_finite, at_first, complain_of, first_row, single, weights
+from frametool.geometry.validation import all_finite, at_first, first_row, single, weights
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -42,27 +42,18 @@ def _recheck(kernel: Kernel, count: int, given: Components, name: str, check: Ca
             raise ValueInvalid(f"{at_first(name, bad)}: {error}") from None
 
 
-def run(kernel: Kernel, count: int, given: Components) -> Components:
-    """Run an arithmetic kernel on trusted components."""
+def run(kernel: Kernel, count: int, given: Components, *, functions: bool = True) -> Components:
+    """Run a kernel on trusted components; one of arithmetic alone takes no namespace of functions."""
     if single(given):
-        return kernel(*given)
+        return kernel(*given, floats) if functions else kernel(*given)
     from frametool.geometry import arrays
 
-    return arrays.run(kernel, count, given)
-
-
-def run_with_xp(kernel: Kernel, count: int, given: Components) -> Components:
-    """Run a kernel that needs functions on trusted components."""
-    if single(given):
-        return kernel(*given, floats)
-    from frametool.geometry import arrays
-
-    return arrays.run(kernel, count, given, arrays)
+    return arrays.run(kernel, count, given, arrays) if functions else arrays.run(kernel, count, given)
 
 
 def number(kernel: Callable[..., Any], given: Components) -> Any:
     """Run a kernel that returns one number."""
-    return run_with_xp(lambda *parts: (kernel(*parts),), 1, given)[0]
+    return run(lambda *parts: (kernel(*parts),), 1, given)[0]
 
 
 def rows(kernel: Kernel, count: int, given: Components, *args: object) -> Array:
@@ -85,7 +76,7 @@ def moved(kernel: Kernel, mover: Components, given: Components, name: str, *, fl
     parts = (*mover, *given)
     if flatten and single(mover):
         kernel, parts = _matrix_kernel(flatten(*mover)), given
-    return arrays.rows(arrays.guarded(kernel, complain_of(given, name)), len(given), parts)
+    return arrays.rows(arrays.guarded(kernel, lambda: all_finite(given, name)), len(given), parts)
 
 
 def _matrix_kernel(entries: Components) -> Kernel:
@@ -113,24 +104,24 @@ def chosen(components: Components, index: Any) -> Components:
 
 def second_moment(components: Components, mass: Array) -> list[list[float]]:
     """Return sum(w q q^T), 4 by 4."""
-    heavy = [mass * part for part in components]
-    upper = {(i, j): total(heavy[i], components[j]) for i in range(4) for j in range(i, 4)}
+    from frametool.geometry import arrays
+
+    upper = {(i, j): 0.0 for i in range(4) for j in range(i, 4)}
+    for _, (weight, *parts) in arrays.cut((mass, *components), 0):
+        heavy = [weight * part for part in parts]
+        for i, j in upper:
+            upper[i, j] += total(heavy[i] * parts[j])
     return [[upper[min(i, j), max(i, j)] for j in range(4)] for i in range(4)]
 
 
-def total(part: Array, factor: Array | float) -> float:
-    """Return the sum of products, block by block and each by halves: numpy's own order depends on the machine."""
-    from frametool.geometry import arrays
-
-    whole = 0.0
-    for _, (first, second) in arrays.cut((part, factor), 0):
-        products = first * second
-        while products.size > 1:
-            half = products.size // 2
-            products[:half] += products[-half:]
-            products = products[: products.size - half]
-        whole += float(products[0])
-    return whole
+def total(values: Array) -> float:
+    """Return a sum, adding halves onto each other in place: numpy's own order depends on the machine."""
+    sums = values.reshape(-1)
+    while sums.size > 1:
+        half = sums.size // 2
+        sums[:half] += sums[-half:]
+        sums = sums[: sums.size - half]
+    return float(sums[0])
 
 
 def masses(heavy: Numbers | None, shape: tuple[int, ...]) -> Array:

@@ -6,11 +6,11 @@ from math import inf, isfinite
 
 from frametool.errors import ValueInvalid, warn
 from frametool.geometry import floats
-from frametool.geometry.quaternion import EPS, FARTHEST, SILENT, TOLERATED, length
+from frametool.geometry.quaternion import EPS, FARTHEST, SILENT, TOLERATED, largest_of, length
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from frametool.geometry.types import Condition, Four, Functions, N, Nine
 
@@ -52,7 +52,7 @@ def defect(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N
         a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0,
         a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i,
     ]  # fmt: skip
-    return _largest([abs(entry) for entry in gram], xp)
+    return largest_of([abs(entry) for entry in gram], xp)
 
 
 def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
@@ -67,7 +67,7 @@ def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[
     moving: Condition | None = None
     for _ in range(60):
         after = _newton(*x)
-        step = _largest([abs(new - old) for new, old in zip(after, x, strict=True)], xp)
+        step = largest_of([abs(new - old) for new, old in zip(after, x, strict=True)], xp)
         if moving is None:
             x, moving = after, step >= 1e-9
         else:
@@ -138,7 +138,7 @@ def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
 
 def _scaled(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
     """Scale a matrix by the power of two of its largest entry: its rotation stays, its determinant is in range."""
-    shift = -xp.frexp(_largest([abs(part) for part in (a, b, c, d, e, f, g, h, i)], xp))[1]
+    shift = -xp.frexp(largest_of([abs(part) for part in (a, b, c, d, e, f, g, h, i)], xp))[1]
     return nine(xp.ldexp(part, shift) for part in (a, b, c, d, e, f, g, h, i))
 
 
@@ -153,14 +153,6 @@ def nine(values: Iterable[N]) -> Nine[N]:
     """Return nine values as the tuple they are."""
     a, b, c, d, e, f, g, h, i = values
     return a, b, c, d, e, f, g, h, i
-
-
-def _largest(values: Sequence[N], xp: Functions[N]) -> N:
-    """Return element by element the largest of some numbers."""
-    found = values[0]
-    for value in values[1:]:
-        found = xp.maximum(found, value)
-    return found
 
 
 def _shown(entries: tuple[float, ...]) -> str:

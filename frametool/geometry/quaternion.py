@@ -31,20 +31,10 @@ def squared_norm(x: N, y: N, z: N, w: N) -> N:
     return x * x + y * y + z * z + w * w
 
 
-def product(ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N) -> Four[N]:
-    """Multiply two quaternions of any norm: the rotation b followed by the rotation a (Hamilton 1843)."""
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
-
-
 def compose(ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N) -> Four[N]:
     """Multiply two unit quaternions and take the rounding off the norm: multiples of 90 degrees stay exact.
 
-    `product` and `settled` written as one: the call every lookup makes at every edge.
+    The Hamilton product (1843) and `settled` written as one: the call every lookup makes at every edge.
     """
     x = aw * bx + ax * bw + ay * bz - az * by
     y = aw * by - ax * bz + ay * bw + az * bx
@@ -83,15 +73,18 @@ def normalized(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
 
     Scaling by the power of two of the largest component is exact, so the squares neither overflow nor vanish.
     """
-    shift = -xp.frexp(_largest(x, y, z, w, xp))[1]
+    shift = -xp.frexp(largest_of((abs(x), abs(y), abs(z), abs(w)), xp))[1]
     x, y, z, w = xp.ldexp(x, shift), xp.ldexp(y, shift), xp.ldexp(z, shift), xp.ldexp(w, shift)
     norm = xp.sqrt(x * x + y * y + z * z + w * w)
     return x / norm, y / norm, z / norm, w / norm
 
 
-def _largest(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
-    """Return the largest magnitude of four numbers."""
-    return xp.maximum(xp.maximum(abs(x), abs(y)), xp.maximum(abs(z), abs(w)))
+def largest_of(values: Sequence[N], xp: Functions[N]) -> N:
+    """Return element by element the largest of some numbers."""
+    found = values[0]
+    for value in values[1:]:
+        found = xp.maximum(found, value)
+    return found
 
 
 def canonical(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
@@ -196,7 +189,7 @@ def deviation(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
     off = abs(squared - 1.0)
     if xp.largest(off) <= SILENT:
         return off
-    size = _largest(x, y, z, w, xp)
+    size = largest_of((abs(x), abs(y), abs(z), abs(w)), xp)
     off = xp.where(off <= SILENT, off, xp.minimum(abs(xp.sqrt(squared) - 1.0), FARTHEST))
     return xp.where((size > 0.0) & (size < inf), off, inf)
 
@@ -323,7 +316,7 @@ def magnitude(x: N, y: N, z: N, xp: Functions[N]) -> N:
 
 def _scaled(x: N, y: N, z: N, xp: Functions[N]) -> tuple[N, N, N, Any]:
     """Divide a vector by the power of two of its largest component, which is exact; return the exponent, too."""
-    exponent = xp.frexp(xp.maximum(xp.maximum(abs(x), abs(y)), abs(z)))[1]
+    exponent = xp.frexp(largest_of((abs(x), abs(y), abs(z)), xp))[1]
     return xp.ldexp(x, -exponent), xp.ldexp(y, -exponent), xp.ldexp(z, -exponent), exponent
 
 

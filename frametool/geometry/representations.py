@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf, isfinite
 
-from frametool.errors import ValueInvalid, alternatives, did_you_mean
+from frametool.errors import ValueInvalid, alternatives, did_you_mean, shown
 from frametool.geometry import axis_angle, euler, matrix, mrp, quaternion, rotvec, six_d
 
 TYPE_CHECKING = False
@@ -367,12 +367,19 @@ def notation(spec: str) -> Notation:
         bare, degrees = name[:-4], name.endswith("_deg")
     row = REPRESENTATIONS.get(bare)
     if row is None:
-        raise ValueInvalid(f"unknown representation {bare!r}{alternatives(bare, REPRESENTATIONS, 'representations')}")
+        known = alternatives(bare, REPRESENTATIONS, "representations")
+        raise ValueInvalid(f"unknown representation {shown(bare)}{known}")
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
     if colon and row.axes != NAMED_AXES:
         raise ValueInvalid(f"{bare} has no axes to name; only euler has: euler:{axes or 'rzyx'}")
     return Notation(spec, row, checked_axes(axes) if colon else None, degrees=degrees)
+
+
+def notations(spec: str) -> tuple[Notation, ...]:
+    """Read the name of a notation, or `euler:all` for the 24 conventions there are; raises as `notation` does."""
+    name, _, axes = spec.partition(":")
+    return tuple(notation(f"{name}:{each}") for each in sorted(euler.AXES)) if axes == "all" else (notation(spec),)
 
 
 def checked_axes(axes: str) -> str:
@@ -381,7 +388,7 @@ def checked_axes(axes: str) -> str:
         return axes
     near = _both_readings(axes.lower()) or did_you_mean(axes.lower(), euler.AXES) or ";"
     raise ValueInvalid(
-        f"unknown Euler axes {axes!r}{near} s (static axes) or r (rotating axes) and three letters: "
+        f"unknown Euler axes {shown(axes)}{near} s (static axes) or r (rotating axes) and three letters: "
         f"{', '.join(sorted(euler.AXES))}"
     )
 
@@ -397,5 +404,6 @@ def axes_name(order: str, frame: str) -> str:
     """Return the tf name of Euler axes told as order and frame: `zyx`, `intrinsic` is `rzyx`."""
     prefix = {"intrinsic": "r", "extrinsic": "s"}.get(frame)
     if prefix is None:
-        raise ValueInvalid(f"unknown Euler frame {frame!r}; write intrinsic (rotating axes) or extrinsic (static axes)")
+        choices = "intrinsic (rotating axes) or extrinsic (static axes)"
+        raise ValueInvalid(f"unknown Euler frame {shown(frame)}; write {choices}")
     return checked_axes(prefix + order.lower())

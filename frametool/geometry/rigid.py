@@ -10,7 +10,7 @@ from math import isfinite
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rotvec
 from frametool.geometry.quaternion import cross, either, length
-from frametool.geometry.trig import half_sincos, incline
+from frametool.geometry.trig import half_sincos, incline, polynomial
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def exp(vx: N, vy: N, vz: N, wx: N, wy: N, wz: N, xp: Functions[N]) -> Seven[N]:
     low = angle < SERIES_EXP
     ratio = half_sine / angle
     low_square, high = xp.where(low, angle, 0.0), xp.where(low, SERIES_EXP, angle)
-    series = _polynomial(low_square * low_square, SINE_REST)
+    series = polynomial(low_square * low_square, SINE_REST)
     second = xp.where(low, series, (high - 2.0 * half_sine * half_cosine) / (high * high * high))
     cx, cy, cz = cross(wx, wy, wz, vx, vy, vz)
     dx, dy, dz = cross(wx, wy, wz, cx, cy, cz)
@@ -149,18 +149,8 @@ def log(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Six[N]
     half = incline(sine, cosine, xp)
     squared = 4.0 * half * half
     low = 2.0 * half < SERIES_LOG
-    series = _polynomial(xp.where(low, squared, 0.0), COTANGENT_REST)
+    series = polynomial(xp.where(low, squared, 0.0), COTANGENT_REST)
     factor = xp.where(low, series, (1.0 - half * cosine / xp.where(low, 1.0, sine)) / xp.where(low, 1.0, squared))
     cx, cy, cz = cross(wx, wy, wz, tx, ty, tz)
     dx, dy, dz = cross(wx, wy, wz, cx, cy, cz)
     return tx + (factor * dx - 0.5 * cx), ty + (factor * dy - 0.5 * cy), tz + (factor * dz - 0.5 * cz), wx, wy, wz
-
-
-def _polynomial(x: N, coefficients: tuple[float, ...]) -> N:
-    """Evaluate a polynomial by Horner's rule, lowest coefficient first."""
-    value = x * coefficients[-1]
-    for coefficient in coefficients[-2:0:-1]:
-        value += coefficient
-        value *= x
-    value += coefficients[0]
-    return value

@@ -195,7 +195,7 @@ class Rotation(Batched):
             product = _new(Rotation)
             product._components = quaternion.compose(*ours, *theirs)
             return product
-        return self._of_columns(dispatch.run(quaternion.compose, 4, (*ours, *theirs)))
+        return self._of_columns(dispatch.run(quaternion.compose, 4, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Rotation:
         """Return the rotation back."""
@@ -203,7 +203,7 @@ class Rotation(Batched):
 
     def canonical(self) -> Rotation:
         """Return the same rotation, its quaternion with the canonical sign."""
-        return self._of_columns(dispatch.run_with_xp(quaternion.from_quaternion, 4, self._components))
+        return self._of_columns(dispatch.run(quaternion.from_quaternion, 4, self._components))
 
     def apply(self, vectors: Numbers) -> Array:
         """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
@@ -228,7 +228,7 @@ class Rotation(Batched):
         fraction: a number, or an array that broadcasts with the rotations.
         """
         parts = (*self._components, *require(other, "other").components, validation.scalars(fraction, "fraction"))
-        return self._of_columns(dispatch.run_with_xp(quaternion.slerp, 4, parts))
+        return self._of_columns(dispatch.run(quaternion.slerp, 4, parts))
 
     def mean(self, weights: Numbers | None = None) -> Rotation:
         """Return the chordal mean of all elements: the rotation with the least sum of squared matrix differences.

@@ -108,11 +108,6 @@ class Transform(Batched):
         """The rotation."""
         return Rotation.of(*self._components[3:])
 
-    @property
-    def translation(self) -> Array:
-        """The translations, shape (..., 3), metres."""
-        return self.xyz
-
     def as_matrix(self) -> Array:
         """Return homogeneous matrices of shape (..., 4, 4)."""
         return dispatch.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
@@ -130,15 +125,17 @@ class Transform(Batched):
             product = _new(Transform)
             product._components = rigid.compose(*ours, *theirs)
             return product
-        return self._of_columns(dispatch.run(rigid.compose, 7, (*ours, *theirs)))
+        return self._of_columns(dispatch.run(rigid.compose, 7, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Transform:
         """Return b_from_a of a_from_b."""
-        return self._of_columns(dispatch.run(rigid.inverse, 7, self._components))
+        return self._of_columns(dispatch.run(rigid.inverse, 7, self._components, functions=False))
 
     def relative(self, other: Transform) -> Transform:
         """Return the pose of the other seen from this one: self.inverse() @ other, near poses keeping their digits."""
-        return self._of_columns(dispatch.run(rigid.relative, 7, (*self._components, *_components_of(other))))
+        return self._of_columns(
+            dispatch.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
+        )
 
     def apply(self, points: Numbers) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
@@ -165,11 +162,11 @@ class Transform(Batched):
         fraction: a number, or an array that broadcasts with the transforms.
         """
         parts = (*self._components, *_components_of(other), validation.scalars(fraction, "fraction"))
-        return self._of_columns(dispatch.run_with_xp(rigid.interpolate, 7, parts))
+        return self._of_columns(dispatch.run(rigid.interpolate, 7, parts))
 
     def distance(self, other: Transform) -> tuple[Any, Any]:
         """Return the metres and the radians between two."""
-        metres, radians = dispatch.run_with_xp(rigid.distance, 2, (*self._components, *_components_of(other)))
+        metres, radians = dispatch.run(rigid.distance, 2, (*self._components, *_components_of(other)))
         return metres, radians
 
     def is_close(self, other: Transform, *, angle: float = NEAR, distance: float = NEAR_BY) -> Any:
@@ -187,9 +184,9 @@ class Transform(Batched):
         if not self.shape:
             return self
         mass = dispatch.masses(weights, self.shape)
-        whole = dispatch.total(mass, 1.0)
-        x, y, z = (dispatch.total(part, mass) / whole for part in self._components[:3])
-        return Transform.of(x, y, z, *self.rotation.mean(weights).components)
+        x, y, z = (dispatch.total(part * mass) for part in self._components[:3])
+        whole = dispatch.total(mass.copy())
+        return Transform.of(x / whole, y / whole, z / whole, *self.rotation.mean(weights).components)
 
     def __repr__(self) -> str:
         """Show one transform's numbers, or the shape of many."""

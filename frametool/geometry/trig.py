@@ -109,3 +109,13 @@ def bearing(y: N, x: N, radius: N, xp: Functions[N]) -> N:
     angle *= side
     angle += (0.5 - 0.5 * side) * xp.copysign(pi, y)
     return angle
+
+
+def polynomial(x: N, coefficients: tuple[float, ...]) -> N:
+    """Evaluate a polynomial by Horner's rule, arrays in one of their own; lowest coefficient first."""
+    value = x * coefficients[-1]
+    for coefficient in coefficients[-2:0:-1]:
+        value += coefficient
+        value *= x
+    value += coefficients[0]
+    return value

@@ -13,7 +13,6 @@ from frametool.geometry.quaternion import SILENT
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from typing import Any
 
     from frametool.geometry.types import Array, Components, Numbers
@@ -91,15 +90,6 @@ def finite(values: tuple[float, ...], name: str) -> tuple[float, ...]:
     if all(map(isfinite, values)):
         return values
     raise ValueInvalid(f"{name}: {' '.join(f'{value:g}' for value in values)} is not finite; give finite numbers")
-
-
-def complain_of(columns: Components, name: str) -> Callable[[], None]:
-    """Make the look for the first row that is not finite, for kernels that ran into one."""
-
-    def complain() -> None:
-        all_finite(columns, name)
-
-    return complain
 
 
 def all_finite(columns: Components, name: str) -> Components:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 METRES = 3
 DEGREES = 2
 MOST_PLAIN = 1e9
+NOISE = 1e-9  # what rounding leaves of a zero, metres or degrees
 
 
 def edge_label(transform: Transform, style: Style) -> tuple[str, str]:
@@ -41,6 +42,8 @@ def _short(values: Iterable[float], decimals: int) -> str:
 
 def _rounded(value: float, decimals: int) -> str:
     """Round a number for reading; what would vanish or grow endless gets an exponent."""
+    if abs(value) < NOISE:
+        value = 0.0
     if value and not 0.5 * 10.0**-decimals <= abs(value) < MOST_PLAIN:
         return f"{value:.1e}"
     text = f"{value + 0.0:.{decimals}f}"

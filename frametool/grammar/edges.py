@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from frametool.errors import shown
 from frametool.grammar.readers import slash_note
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from frametool.errors import FormatError
     from frametool.geometry.types import Rigid
@@ -26,6 +27,7 @@ class Edge(NamedTuple):
     line: on which it was written, 0 if that says nothing
     received_ns: when the recorder got it, if that is known
     path: in a document, the way to it from the top of the text
+    topic: by which it came, if that is known
     """
 
     parent: str | None
@@ -35,6 +37,7 @@ class Edge(NamedTuple):
     line: int = 0
     received_ns: int | None = None
     path: Path = ()
+    topic: str = ""
 
 
 def stop(error: FormatError) -> None:
@@ -101,7 +104,7 @@ class Tally:
         if self.noise:
             line, text = self.noise[0]
             count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
-            yield Remark(line, f"{count} printed between messages skipped: {text!r}", "noise")
+            yield Remark(line, f"{count} printed between messages skipped: {shown(text)}", "noise")
         if self.others:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
             yield Remark(1, f"messages without transforms were left out: {kinds}", "odd")
@@ -110,16 +113,53 @@ class Tally:
         yield from self.notes.values()
 
 
+class Topics:
+    """The topics of a recording: how many transforms came by each, which are read, and which frames come by two."""
+
+    def __init__(self, chosen: Iterable[str] = ()) -> None:
+        """Read the topics chosen, with or without a leading `/`; all of them if none is."""
+        self.chosen = frozenset(topic.strip("/") for topic in chosen)
+        self.counts: dict[str, int] = {}
+        self._first: dict[str, str] = {}  # child -> the topic it came by first
+        self._told: set[tuple[str, str]] = set()
+
+    def takes(self, topic: str) -> bool:
+        """Count a transform; return whether its topic is read."""
+        self.counts[topic] = self.counts.get(topic, 0) + 1
+        return not self.chosen or topic.strip("/") in self.chosen
+
+    def conflict(self, topic: str, child: str) -> str:
+        """Return what is wrong if a frame comes from two namespaces, as of two robots; told once of each frame."""
+        first = self._first.setdefault(child, topic)
+        if first == topic or _source_of(first) == _source_of(topic) or (child, topic) in self._told:
+            return ""
+        self._told.add((child, topic))
+        return f"frame {child!r} comes by {first} and by {topic}; choose with --topic {first} or --topic {topic}"
+
+    def missing(self) -> str:
+        """Return what is wrong if none of the topics chosen is there; what names no topics is read in any case."""
+        if not self.chosen or not self.counts or any(topic.strip("/") in self.chosen for topic in self.counts):
+            return ""
+        return f"no transforms on {', '.join(sorted(self.chosen))}; topics: {', '.join(sorted(self.counts))}"
+
+
+def _source_of(topic: str) -> str:
+    """Return what publishes on a topic: `tf` and `tf_static` of one namespace belong together."""
+    return topic.removesuffix("_static") if topic.endswith("/tf_static") or topic == "tf_static" else topic
+
+
 class Options(NamedTuple):
     """How a file of frames is read.
 
     tally: takes what is worth telling at the end
+    topics: which are read
     report: takes the errors, and reading goes on behind them
     raw: messages are taken as tf2 receives them, unchecked
     normalize: any non-zero quaternion and any matrix near a rotation is taken
     """
 
     tally: Tally
+    topics: Topics
     report: Report = stop
     raw: bool = False
     normalize: bool = False

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, did_you_mean
+from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry import rigid
 from frametool.geometry.representations import REPRESENTATIONS
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
@@ -155,6 +155,6 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
     known = POSE_KEYS.union(also)
     unknown = [key for key in mapping if key not in known]
     if unknown:
-        named = "; ".join(f"unknown key {key!r}{did_you_mean(key, known).replace('; ', ', ')}" for key in unknown)
+        named = "; ".join(f"unknown key {shown(key)}{did_you_mean(key, known).replace('; ', ', ')}" for key in unknown)
         choices = ", ".join(REPRESENTATIONS)
         raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.geometry import floats, rigid
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -74,4 +74,4 @@ def interpolated(a: Pose, b: Pose, fraction: float) -> Pose:
 
 def _refuse_two_parents(a: Pose, b: Pose) -> None:
     if a.parent is not None and b.parent is not None and a.parent != b.parent:
-        raise ValueInvalid(f"A is given in {a.parent!r} and B in {b.parent!r}; give both in one frame")
+        raise ValueInvalid(f"A is given in {shown(a.parent)} and B in {shown(b.parent)}; give both in one frame")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class Reading:
 
 def slash_note(name: str) -> str:
     """Say that a name lost its leading `/`."""
-    return f"frame {name!r}: the leading / is no part of a name and was left out"
+    return f"frame {shown(name)}: the leading / is no part of a name and was left out"
 
 
 def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
@@ -142,7 +142,7 @@ def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> li
     if type(value) is not dict:
         raise Misfit(f"expected [{', '.join(names)}], found {kind(value)}")
     if unknown := [key for key in value if key not in names]:
-        raise Misfit(f"unknown key {unknown[0]!r}; expected {', '.join(names)}", (unknown[0],), key=True)
+        raise Misfit(f"unknown key {shown(unknown[0])}; expected {', '.join(names)}", (unknown[0],), key=True)
     if (missing := [name for name in names if name not in value]) and not partial:
         raise Misfit(f"missing {', '.join(missing)}; expected {', '.join(names)}")
     return [value.get(name, "0") for name in names]

@@ -21,9 +21,13 @@ INFINITE = float("inf")
 
 
 class Style:
-    """How results are written: format, notations, unit of bare angles, digits, sign of quaternions."""
+    """How results are written: format, notations, unit of bare angles, digits, sign of quaternions.
 
-    __slots__ = ("degrees", "form", "keep_sign", "notations", "precision")
+    precision: digits after the point; None for the shortest text that reads back
+    full: that text for people too, who are else shown some decimals of an overview
+    """
+
+    __slots__ = ("degrees", "form", "full", "keep_sign", "notations", "precision")
 
     def __init__(
         self,
@@ -32,6 +36,7 @@ class Style:
         *,
         degrees: bool = False,
         precision: int | None = None,
+        full: bool = False,
         keep_sign: bool = False,
     ) -> None:
         """Keep what the options of a command say."""
@@ -39,13 +44,21 @@ class Style:
         self.notations = notations
         self.degrees = degrees
         self.precision = precision
+        self.full = full
         self.keep_sign = keep_sign
 
     def in_form(self, form: str) -> Style:
         """Return the same style in another form."""
         return Style(
-            form, self.notations, degrees=self.degrees, precision=self.precision, keep_sign=self.keep_sign
-        )
+            form, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
+            keep_sign=self.keep_sign,
+        )  # fmt: skip
+
+    def in_notations(self, notations: tuple[Notation, ...]) -> Style:
+        """Return the same style with other notations."""
+        style = self.in_form(self.form)
+        style.notations = notations
+        return style
 
     def number(self, value: float) -> str:
         """Write a finite number: shortest text that reads back to the same bits, or fixed decimals."""

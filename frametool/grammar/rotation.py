@@ -5,19 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, overheard
+from frametool.errors import ValueInvalid, overheard, shown
 from frametool.geometry import floats, quaternion
-from frametool.geometry.representations import (
-    LIST,
-    MAP,
-    NAMED,
-    NAMED_AXES,
-    REPRESENTATIONS,
-    ROWS,
-    Notation,
-    axes_name,
-    notation,
-)  # fmt: skip
+from frametool.geometry.representations import LIST, MAP, NAMED, NAMED_AXES, REPRESENTATIONS, ROWS, Notation, axes_name
+from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_texts, within
 from frametool.text.numbers import NotFinite, parse_angle, parse_number
 
@@ -39,7 +30,7 @@ def _rotation_keys() -> dict[str, Notation]:
     keys = {}
     for name, row in REPRESENTATIONS.items():
         for spelled in (name, f"{name}_deg", f"{name}_rad") if row.angles else (name,):
-            keys[spelled] = notation(spelled)
+            keys[spelled] = parse_notation(spelled)
     return keys | {alias: keys[name] for alias, name in ALIASES.items()}
 
 
@@ -81,13 +72,13 @@ def shape_of(key: str, value: Any) -> Spelled:
     Of several under one key it takes the first; its numbers then stand nowhere, so that nobody replaces them alone.
     """
     if key == AXES_KEY:
-        return notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
+        return parse_notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
     if _is_several(key, value):
         bound, texts, places = shape_of(key, value[0])
         return bound, texts, [("", *place) for place in places]
-    form = ROTATION_KEYS[key]
-    shape = form.representation.shape
-    return _take_parts(form, value, shape) if isinstance(shape, dict) else SHAPES[shape](form, value)
+    notation = ROTATION_KEYS[key]
+    shape = notation.representation.shape
+    return _take_parts(notation, value, shape) if isinstance(shape, dict) else SHAPES[shape](notation, value)
 
 
 def _read_axes(value: Any) -> Quaternion:
@@ -101,35 +92,35 @@ def _read_axes(value: Any) -> Quaternion:
 
 
 def read_spelled(
-    form: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
 ) -> tuple[Vector | None, Quaternion]:
     """Read one text a component: a rotation, or as many as a notation has for the whole pose."""
-    whole = form.representation.whole
+    whole = notation.representation.whole
     if whole is None or len(texts) != len(whole.columns):
-        return None, rotation_of(form, texts, places, reading)
-    numbers, degrees = read_components(form, texts, places, reading)
+        return None, rotation_of(notation, texts, places, reading)
+    numbers, degrees = read_components(notation, texts, places, reading)
     end = len(numbers) - len(whole.tail)
     if tuple(numbers[end:]) != whole.tail:
         found = " ".join(f"{number:g}" for number in numbers[end:])
         tail = " ".join(f"{number:g}" for number in whole.tail)
         raise NotARotation(f"the last row of a 4x4 pose is {tail}, found {found}", rule="denormalized")
     position, rotation = whole.split(numbers)
-    return position, _checked(form, rotation, reading, degrees=degrees)
+    return position, _checked(notation, rotation, reading, degrees=degrees)
 
 
-def rotation_of(form: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
+def rotation_of(notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
     """Turn one text a component into x, y, z, w, in the unit that applies, checked to be a rotation."""
-    numbers, degrees = read_components(form, texts, places, reading)
-    if not form.representation.can_fail:
-        return form.to_quaternion(tuple(numbers), floats, degrees=degrees)
-    return _checked(form, numbers, reading, degrees=degrees)
+    numbers, degrees = read_components(notation, texts, places, reading)
+    if not notation.representation.can_fail:
+        return notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
+    return _checked(notation, numbers, reading, degrees=degrees)
 
 
-def _checked(form: Notation, numbers: Sequence[float], reading: Reading, *, degrees: bool = False) -> Quaternion:
+def _checked(notation: Notation, numbers: Sequence[float], reading: Reading, *, degrees: bool = False) -> Quaternion:
     """Return the quaternion of numbers that make a rotation; what is odd about them is noted."""
     try:
         rotation, odd = overheard(
-            form.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
+            notation.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
         )
     except ValueInvalid as error:
         raise NotARotation(str(error), rule=error.rule) from None
@@ -139,27 +130,27 @@ def _checked(form: Notation, numbers: Sequence[float], reading: Reading, *, degr
 
 
 def read_components(
-    form: Notation,
+    notation: Notation,
     texts: Sequence[Any],
     places: Sequence[Path],
     reading: Reading,
 ) -> tuple[list[float], bool]:
     """Read the components of a rotation; returns them with the unit of the angles among them (True: degrees)."""
-    degrees = reading.degrees if form.degrees is None else form.degrees
+    degrees = reading.degrees if notation.degrees is None else notation.degrees
     try:
         numbers = list(map(parse_number, texts))
     except (ValueInvalid, TypeError):
-        return _read_one_by_one(form, texts, places, degrees=degrees)
-    if form.degrees is None and not degrees and form.representation.angles:
-        _note_degrees(form, numbers, places, reading)
+        return _read_one_by_one(notation, texts, places, degrees=degrees)
+    if notation.degrees is None and not degrees and notation.representation.angles:
+        _note_degrees(notation, numbers, places, reading)
     return numbers, degrees
 
 
 def _read_one_by_one(
-    form: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool
 ) -> tuple[list[float], bool]:
     """Read components among which an angle says its own unit, or one is no number: then say where."""
-    angles = form.representation.angles
+    angles = notation.representation.angles
     numbers, units = [], []
     for index, text in enumerate(texts):
         try:
@@ -167,7 +158,7 @@ def _read_one_by_one(
                 raise Misfit(f"expected a number, found {kind(text)}")
             number, unit = parse_angle(text) if index in angles else (parse_number(text), None)
             if index in angles:
-                units.append(_unit_for(unit, text, form))
+                units.append(_unit_for(unit, text, notation))
         except ValueInvalid as error:
             misfit = NotARotation if isinstance(error, NotFinite) else Misfit
             raise misfit(str(error), places[index], rule=error.rule) from None
@@ -175,12 +166,12 @@ def _read_one_by_one(
     return numbers, _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
 
 
-def _unit_for(unit: str | None, text: str, form: Notation) -> str | None:
+def _unit_for(unit: str | None, text: str, notation: Notation) -> str | None:
     """Refuse an angle whose own unit contradicts its key's."""
-    if unit == "deg" and form.degrees is False and "pi" not in text:
-        raise ValueInvalid(f"{text!r} is in degrees, but {form.spec} says radians")
-    if form.degrees and unit is not None and (unit == "rad" or "pi" in text):
-        raise ValueInvalid(f"{text!r} is in radians, but {form.spec} says degrees")
+    if unit == "deg" and notation.degrees is False and "pi" not in text:
+        raise ValueInvalid(f"{shown(text)} is in degrees, but {notation.spec} says radians")
+    if notation.degrees and unit is not None and (unit == "rad" or "pi" in text):
+        raise ValueInvalid(f"{shown(text)} is in radians, but {notation.spec} says degrees")
     return unit
 
 
@@ -195,102 +186,102 @@ def _one_unit(numbers: list[float], angles: Sequence[int], units: Sequence[str |
     return False
 
 
-def _note_degrees(form: Notation, numbers: Sequence[float], places: Sequence[Path], reading: Reading) -> None:
+def _note_degrees(notation: Notation, numbers: Sequence[float], places: Sequence[Path], reading: Reading) -> None:
     """Wonder about bare angles beyond a full turn."""
-    index = max(form.representation.angles, key=lambda index: abs(numbers[index]))
+    index = max(notation.representation.angles, key=lambda index: abs(numbers[index]))
     if abs(numbers[index]) > TURN:
-        name = form.representation.name
+        name = notation.representation.name
         message = f"{name} {numbers[index]:g} is more than a full turn in radians; degrees? write {name}_deg"
-        reading.note(message, form.spec, *places[index], rule="degrees")
+        reading.note(message, notation.spec, *places[index], rule="degrees")
 
 
-def _list_or_map(form: Notation, value: Any) -> Spelled:
+def _list_or_map(notation: Notation, value: Any) -> Spelled:
     """Take a list in column order, or a mapping by column names where every angle counts as 0 if missing."""
-    row = form.representation
+    row = notation.representation
     is_whole = row.whole is not None and type(value) is list and len(value) == len(row.whole.columns)
     columns = row.whole.columns if row.whole and is_whole else row.columns
     texts = read_texts(value, columns, partial=bool(row.angles))
-    return form, texts, INDICES if type(value) is list else [(name,) for name in columns]
+    return notation, texts, INDICES if type(value) is list else [(name,) for name in columns]
 
 
-def _take_named(form: Notation, value: Any) -> Spelled:
+def _take_named(notation: Notation, value: Any) -> Spelled:
     """Take a mapping by short names; a list would not say its order."""
-    names = form.names
+    names = notation.names
     if type(value) is list:
         numbers = ", ".join(map(str, value))
         others = [
             f"{name}: [..]" for name, row in REPRESENTATIONS.items()
-            if row.shape == LIST and set(row.columns) == set(form.representation.columns)
+            if row.shape == LIST and set(row.columns) == set(notation.representation.columns)
         ]  # fmt: skip
         named = ", ".join(f"{name}:" for name in names)
         raise Misfit(
-            f"{form.representation.name} [{numbers}] has no order; write {', '.join(others)} or {{{named}}}"
+            f"{notation.representation.name} [{numbers}] has no order; write {', '.join(others)} or {{{named}}}"
         )
-    return form, read_texts(value, names), [(name,) for name in names]
+    return notation, read_texts(value, names), [(name,) for name in names]
 
 
-def _take_parts(form: Notation, value: Any, parts: dict[str, int]) -> Spelled:
+def _take_parts(notation: Notation, value: Any, parts: dict[str, int]) -> Spelled:
     """Take a mapping whose keys hold so many numbers each, beside `axes` where Euler axes are named."""
-    named = form.representation.axes == NAMED_AXES
+    named = notation.representation.axes == NAMED_AXES
     if type(value) is not dict:
-        shown = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: a" for key, count in parts.items())
-        example = "axes: rzyx, " * named + shown
+        keys = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: a" for key, count in parts.items())
+        example = "axes: rzyx, " * named + keys
         raise Misfit(f"expected {{{example}}}, found {kind(value)}")
     expected = " and ".join([*["axes"] * named, *parts])
     if named:
         expected += f", or order, frame and {' and '.join(parts)}"
     known = {*parts, *(("axes", "order", "frame") if named else ())}
     if unknown := [key for key in value if key not in known]:
-        hint = " (90deg has its unit)" if form.representation.angles and not named else ""
-        raise Misfit(f"unknown key {unknown[0]!r}; expected {expected}{hint}", (unknown[0],), key=True)
+        hint = " (90deg has its unit)" if notation.representation.angles and not named else ""
+        raise Misfit(f"unknown key {shown(unknown[0])}; expected {expected}{hint}", (unknown[0],), key=True)
     try:
-        bound = _with_axes(form, value) if named else form
+        bound = _with_axes(notation, value) if named else notation
         held = [(key, value[key], count) for key, count in parts.items()]
     except KeyError as missing:
         raise Misfit(f"missing {missing.args[0]}; expected {expected}") from None
     texts: list[Any] = []
     places: list[Path] = []
     for key, each, count in held:
-        names = form.representation.names[len(texts) : len(texts) + count]
+        names = notation.representation.names[len(texts) : len(texts) + count]
         texts += within((key,), read_texts, each, names) if count > 1 else [each]
         steps = range(count) if type(each) is list else names
         places += [(key, step) for step in steps] if count > 1 else [(key,)]
     return bound, texts, places
 
 
-def _with_axes(form: Notation, value: dict[str, Any]) -> Notation:
+def _with_axes(notation: Notation, value: dict[str, Any]) -> Notation:
     """Bind the Euler axes that a mapping names: `axes`, or `order` and `frame`; raises KeyError for what is missing."""
     axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
     if type(axes) is not str:
         raise Misfit(f"expected axes like rzyx, found {kind(axes)}", ("axes",))
-    return notation(f"{form.spec}:{axes}")
+    return parse_notation(f"{notation.spec}:{axes}")
 
 
-def _take_rows(form: Notation, value: Any) -> Spelled:
+def _take_rows(notation: Notation, value: Any) -> Spelled:
     """Take the rows of a rotation or of a whole pose, or all their numbers in one list."""
-    row = form.representation
+    row = notation.representation
     counts = {len(each): math.isqrt(len(each)) for each in (row.columns, *([row.whole.columns] if row.whole else []))}
     expected = " or ".join(f"{size} rows of {size}{' numbers' * (not at)}" for at, size in enumerate(counts.values()))
     if type(value) is not list:
         raise Misfit(f"expected {expected}, found {kind(value)}")
     if len(value) in counts and not any(type(each) is list for each in value):
-        return form, value, INDICES
+        return notation, value, INDICES
     size = len(value)
     if size not in counts.values() or any(type(each) is not list or len(each) != size for each in value):
         lengths = ", ".join(str(len(each)) if type(each) is list else "no list" for each in value)
         raise Misfit(f"expected {expected}, found {size} rows of lengths {lengths}")
     places = [(at, column) for at in range(size) for column in range(size)]
-    return form, [text for each in value for text in each], places
+    return notation, [text for each in value for text in each], places
 
 
 SHAPES = {LIST: _list_or_map, MAP: _list_or_map, NAMED: _take_named, ROWS: _take_rows}
 
 
-def spelled(form: Notation, numbers: Sequence[float]) -> Any:
+def spelled(notation: Notation, numbers: Sequence[float]) -> Any:
     """Write the numbers of a rotation, or of a whole pose, in the shape that `shape_of` takes apart."""
-    row = form.representation
+    row = notation.representation
     if isinstance(row.shape, dict):
-        entry: dict[str, Any] = {"axes": form.axes} if row.axes == NAMED_AXES else {}
+        entry: dict[str, Any] = {"axes": notation.axes} if row.axes == NAMED_AXES else {}
         first = 0
         for key, count in row.shape.items():
             entry[key] = list(numbers[first : first + count]) if count > 1 else numbers[first]
@@ -299,4 +290,4 @@ def spelled(form: Notation, numbers: Sequence[float]) -> Any:
     if row.shape == ROWS:
         size = math.isqrt(len(numbers))
         return [list(numbers[first : first + size]) for first in range(0, len(numbers), size)]
-    return list(numbers) if row.shape == LIST else dict(zip(form.names, numbers, strict=True))
+    return list(numbers) if row.shape == LIST else dict(zip(notation.names, numbers, strict=True))

@@ -26,6 +26,8 @@ RULES = {
     "identity": ("warning", "an entry with neither position nor rotation"),
     "slash": ("warning", "a frame name that begins with /"),
     "noise": ("note", "lines that a tool printed between messages"),
+    "topics": ("note", "the topics that transforms came by, with their numbers"),
+    "two-topics": ("error", "a frame that comes by the topics of two robots"),
     "odd": ("warning", "anything else worth a look while reading"),
     "self": ("error", "a frame that is its own parent"),
     "cycle": ("error", "frames that form a cycle"),

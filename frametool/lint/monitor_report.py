@@ -26,6 +26,8 @@ def monitor(files: Sequence[Recording], *ends: str, normalize: bool = False) -> 
             if edge.parent is not None:
                 log = logs.get(edge.child) or logs.setdefault(edge.child, EdgeLog(edge.child))
                 log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)
+                if edge.topic:
+                    log.topics[edge.topic] = log.topics.get(edge.topic, 0) + 1
     if not logs:
         raise FormatError("no transforms in it", source=", ".join(file.name for file in files))
     if not ends:
@@ -55,6 +57,7 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
         "backward": log.backward,
         "parents": ", ".join(log.parents),
         "parent_changes": log.changes,
+        "topics": ", ".join(f"{topic} ({count})" for topic, count in log.topics.items()),
         "overlap": None,
     }
 
@@ -80,6 +83,7 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
         "backward": sum(entry["backward"] for entry in entries),
         "parents": " <- ".join(frames_on(target, source, logs)),
         "parent_changes": sum(log.changes for log in logs),
+        "topics": "",
         "overlap": None if interval is None else interval[0] <= interval[1],
     }
 

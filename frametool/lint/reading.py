@@ -59,6 +59,9 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
     for edge in recording.edges(report, tell=False, normalize=normalize):
         w_first = looks_w_first(edge.components)
         yield Statement(edge.parent or "", *edge[1:4], recording.name, edge.line, 1 if edge.line else 0, w_first)
+    if counts := recording.topics.counts:
+        listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
+        find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
     for told in recording.tally.told():
         find(Finding(told.rule, told.message, recording.name, told.line, 1))
 

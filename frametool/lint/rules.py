@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import cut, quoted
+from frametool.errors import shown
 from frametool.frames.edge_log import EdgeLog
 from frametool.frames.path import cycle_message
 from frametool.frames.stamps import BILLION, format_stamp
@@ -96,13 +96,13 @@ def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
     children: dict[str, Child] = {}
     for number, seen in enumerate(everything):
         if seen.parent == seen.child:
-            yield seen.finding("self", f"frame {quoted(seen.child)} is its own parent")
+            yield seen.finding("self", f"frame {shown(seen.child)} is its own parent")
             continue
         child = children.get(seen.child)
         if child is None:
             child = children[seen.child] = Child(seen, number)
         if seen.looks_w_first and (child.first is seen or not child.first.looks_w_first):
-            message = f"frame {quoted(seen.child)} is turned by exactly 180 degrees about x; did you mean w first?"
+            message = f"frame {shown(seen.child)} is turned by exactly 180 degrees about x; did you mean w first?"
             yield seen.finding("w-first", message)
         child.add(seen, number)
     for child in children.values():
@@ -113,10 +113,10 @@ def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
 
 def _child(child: Child) -> Iterator[Finding]:
     """Apply the rules about one frame."""
-    name = quoted(child.first.child)
+    name = child.first.child
     if child.stands is not None and child.moves:
         moving = next(each for each in (child.first, child.newest) if each.stamp_ns is not None)
-        yield moving.finding("static-and-moving", f"frame {name} moves, but stands still in {_at(child.stands)}")
+        yield moving.finding("static-and-moving", f"frame {shown(name)} moves, but stands still in {_at(child.stands)}")
     elif not child.moves:
         yield from _standing(child, name)
     else:
@@ -127,10 +127,10 @@ def _standing(child: Child, name: str) -> Iterator[Finding]:
     """Apply the rules about a frame that has one pose."""
     first = child.first
     if other := child.other_parent:
-        parents = f"{quoted(first.parent)} ({_at(first)}) and {quoted(other.parent)} ({_at(other)})"
-        yield other.finding("two-parents", f"frame {name} has two parents: {parents}")
+        parents = f"{shown(first.parent)} ({_at(first)}) and {shown(other.parent)} ({_at(other)})"
+        yield other.finding("two-parents", f"frame {shown(name)} has two parents: {parents}")
     elif other := child.other_pose:
-        message = f"frame {name} has two different poses in {quoted(first.parent)}: {_at(first)} and {_at(other)}"
+        message = f"frame {shown(name)} has two different poses in {shown(first.parent)}: {_at(first)} and {_at(other)}"
         yield other.finding("two-poses", message)
 
 
@@ -139,33 +139,34 @@ def _moving(child: Child, name: str) -> Iterator[Finding]:
     if child.changes:
         yield _reparented(child, name)
     if child.again:
-        yield child.again[0].finding("repeated", f"frame {name}: the same sample again{_more(child.again)}")
+        yield child.again[0].finding("repeated", f"frame {shown(name)}: the same sample again{_more(child.again)}")
     if child.clashes:
         first = child.clashes[0]
         stamp = format_stamp(first.stamp_ns or 0)
         line = child.stamps[first.stamp_ns or 0][1]
         places = f"lines {line} and {first.line}"
-        message = f"frame {name} has two poses at {stamp}: {places}{_more(child.clashes)}"
+        message = f"frame {shown(name)} has two poses at {stamp}: {places}{_more(child.clashes)}"
         yield first.finding("repeated-stamp", message)
     if child.backward:
         first = child.backward[0]
-        message = f"frame {name}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
+        message = f"frame {shown(name)}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
         yield first.finding("backward", message + _more(child.backward))
-    yield from _steps(child)
+    yield from _steps(child, name)
 
 
 def _reparented(child: Child, name: str) -> Finding:
     """Report a changing parent: of a frame that was picked up, or of publishers that disagree."""
-    parents = " -> ".join(quoted(each.parent) for each in (child.first, *child.changes[:3]))
+    parents = " -> ".join(shown(each.parent) for each in (child.first, *child.changes[:3]))
     if len(child.changes) < FLICKER:
-        return child.changes[0].finding("reparented", f"frame {name} changes its parent: {parents}")
-    message = f"frame {name} changes its parent {len(child.changes)} times: {parents} ..; two publishers disagree"
+        return child.changes[0].finding("reparented", f"frame {shown(name)} changes its parent: {parents}")
+    times = f"{len(child.changes)} times: {parents} .."
+    message = f"frame {shown(name)} changes its parent {times}; two publishers disagree"
     return child.changes[0].finding("flicker", message)
 
 
-def _steps(child: Child) -> Iterator[Finding]:
+def _steps(child: Child, name: str) -> Iterator[Finding]:
     """Apply the rules about pauses and distances between samples."""
-    edge = f"{cut(child.newest.parent)} -> {cut(child.first.child)}"
+    edge = f"{child.newest.parent} -> {name}"
     if gaps := child.log.gaps():
         pause = gaps[0].pause_ns / BILLION
         message = f"{edge}: no data for {pause:g} s before {format_stamp(gaps[0].stamp_ns)}"
@@ -212,7 +213,7 @@ def _roots(children: dict[str, Child]) -> Iterator[Finding]:
     if len(roots) > 1:
         names = sorted(roots)
         seen = roots[names[1]]
-        shown = ", ".join(map(quoted, names[:10]))
+        shown = ", ".join(map(repr, names[:10]))
         yield seen.finding("several-roots", f"{len(roots)} roots: {shown}{' ..' if len(names) > 10 else ''}")
 
 

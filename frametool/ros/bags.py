@@ -7,18 +7,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid
+from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
+from frametool.grammar.readers import Note
 from frametool.ros.echo_blocks import unit_components
+from frametool.ros.message_parts import STAMPS, stamp_problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from frametool.documents.input_file import InputFile
-    from frametool.grammar.edges import Options
+    from frametool.grammar.edges import Options, Tally
 
+LOST = "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
+NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
 TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
 
 
@@ -44,7 +49,10 @@ def _edges(path: str, options: Options) -> Iterator[Edge]:
 
     if path == "-":
         raise FileProblem("stdin: a bag cannot be read from a pipe; name its file")
+    if Path(path).is_file() and not Path(path).stat().st_size:
+        raise FormatError("nothing in it: an empty file is no bag", source=path)
     try:
+        _check_whole(path, options.tally)
         with AnyReader([Path(path)]) as reader:
             yield from _transforms(reader, path, options)
     except FrametoolError:
@@ -54,17 +62,75 @@ def _edges(path: str, options: Options) -> Iterator[Edge]:
         raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None
 
 
+def _check_whole(path: str, tally: Tally) -> None:
+    """Check what the library does not: the pages of sqlite3; tell if an MCAP file has no counts to compare with."""
+    from pathlib import Path
+
+    for file in sorted(Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]:
+        if file.suffix == ".db3":
+            _check_database(file)
+        elif file.suffix == ".mcap" and _tail(file)[:8] == bytes(8):
+            tally.note(Note("odd", NO_SUMMARY.format(file.name), ()), 1)
+
+
+def _tail(file: Path) -> bytes:
+    """Return the last 28 bytes: of MCAP, where the summary begins, and what follows."""
+    with file.open("rb") as stream:
+        stream.seek(-28, 2)
+        return stream.read()
+
+
+def _check_database(file: Path) -> None:
+    """Let sqlite3 check its pages: rows on a broken one would be missing without a word."""
+    from sqlite3 import connect
+
+    database = connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)
+    try:
+        ((said,),) = database.execute("PRAGMA quick_check(1)").fetchall()
+        ((lost,),) = database.execute(LOST).fetchall() if said == "ok" else [[0]]
+    finally:
+        database.close()
+    if said != "ok" or lost:
+        said = f"{lost} messages belong to no topic" if lost else " ".join(said.split())[:100]
+        raise FormatError(f"the bag is damaged: {said}", source=str(file))
+
+
 def _transforms(reader: Any, path: str, options: Options) -> Iterator[Edge]:
-    """Walk the messages of every topic with transforms."""
+    """Walk the messages of every topic with transforms; there must be as many as the bag says."""
     topics = [connection for connection in reader.connections if connection.msgtype in TYPES]
+    for other in reader.connections:
+        if other not in topics and other.topic.rpartition("/")[2] in ("tf", "tf_static"):
+            raise FormatError(f"{other.topic} holds {other.msgtype} and no transforms; is it damaged?", source=path)
     if not topics:
         known = ", ".join(sorted({connection.topic for connection in reader.connections}))
-        raise FormatError(f"no transforms in the bag; its topics: {known or 'none'}", source=path)
+        said = f"no transforms in the bag; its topics: {known}" if known else "no messages in the bag"
+        raise FormatError(said, source=path)
+    number = 0
     for number, (topic, received_ns, data) in enumerate(reader.messages(connections=topics), 1):
-        still = topic.topic.endswith("tf_static")
+        name = topic.topic
+        still = name.endswith("tf_static")
         for transform in reader.deserialize(data, topic.msgtype).transforms:
+            if not options.topics.takes(name):
+                continue
             edge = _edge(transform, number, path, options)
-            yield edge._replace(stamp_ns=None if still else edge.stamp_ns, received_ns=received_ns)
+            if problem := options.topics.conflict(name, edge.child):
+                options.report(FormatError(problem, source=path, rule="two-topics"))
+            yield edge._replace(stamp_ns=None if still else edge.stamp_ns, received_ns=received_ns, topic=name)
+    expected = _expected(reader, topics)
+    if number != expected:
+        names = ", ".join(sorted({topic.topic for topic in topics}))
+        raise FormatError(f"the bag is damaged: {number} of {expected} messages on {names} are there", source=path)
+    if not number:
+        raise FormatError(f"no messages on {', '.join(topic.topic for topic in topics)}", source=path)
+
+
+def _expected(reader: Any, topics: list[Any]) -> int:
+    """Return how many messages the bag says are there on some topics; a ROS 1 bag says it chunk by chunk."""
+    chunks = [chunk.connection_counts for each in reader.readers for chunk in getattr(each, "chunk_infos", ())]
+    if not chunks:
+        return sum(topic.msgcount for topic in topics)
+    others = {connection.id for connection in reader.connections} - {topic.id for topic in topics}
+    return sum(count for counts in chunks for number, count in counts.items() if number not in others)
 
 
 def _edge(message: Any, number: int, path: str, options: Options) -> Edge:
@@ -76,8 +142,11 @@ def _edge(message: Any, number: int, path: str, options: Options) -> Edge:
     components = unit_components(tally, number, *numbers, normalize=options.normalize)
     if components is None or not parent or not child:
         problem = _complaint(parent, child, numbers, normalize=options.normalize)
-        raise FormatError(f"message {number}: {parent!r} -> {child!r}: {problem}", source=path, rule=problem.rule)
+        edge = f"{shown(parent)} -> {shown(child)}"
+        raise FormatError(f"message {number}: {edge}: {problem}", source=path, rule=problem.rule)
     stamp = message.header.stamp
+    if misfit := stamp_problem(stamp.sec, stamp.nanosec, STAMPS[0]):
+        raise FormatError(f"message {number}: {parent!r} -> {child!r}: {misfit}", source=path)
     return Edge(parent, child, components, stamp.sec * BILLION + stamp.nanosec, number)
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Tally
 
 INFINITE = float("inf")
+LATEST = 1 << 32  # seconds that no message can hold
 NUMBER = "([-+0-9.eE]+)"
 WHOLE = " *([0-9]{1,20})"
 NAME = r"""([A-Za-z0-9_/][\w/.+-]*|"[^"\\\n]+"|'[^'\n]+')"""
@@ -119,9 +120,10 @@ def _edge(texts: tuple[str, ...], tally: Tally, line: int) -> Edge | None:
         components = unit_components(tally, line, *map(float, texts[4:]))
     except ValueError:
         return None
-    if not parent or not child or components is None:
+    seconds, nanoseconds = int(texts[0]), int(texts[1])
+    if not parent or not child or components is None or nanoseconds >= BILLION or seconds >= LATEST:
         return None
-    return Edge(parent, child, components, int(texts[0]) * BILLION + int(texts[1]), line)
+    return Edge(parent, child, components, seconds * BILLION + nanoseconds, line)
 
 
 def unit_components(

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.json_writer import dump as json_dump
 from frametool.documents.yaml_writer import dump, quoted
-from frametool.frames.stamps import BILLION
+from frametool.errors import ValueInvalid
+from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, rotation_numbers
-from frametool.ros.message_parts import STAMPS
+from frametool.ros.message_parts import STAMPS, stamp_problem
 from frametool.ros.messages import MESSAGE_KEYS
 
 if TYPE_CHECKING:
@@ -93,9 +94,11 @@ def header(frame: str | None, stamp_ns: int | None, style: Style) -> dict[str, A
 
 def stamp(stamp_ns: int, form: str) -> dict[str, int]:
     """Return nanoseconds as a message has them; the second part is never negative."""
-    seconds, nanoseconds = STAMPS[form == "ros1"]
+    names = STAMPS[form == "ros1"]
     whole, rest = divmod(stamp_ns, BILLION)
-    return {seconds: whole, nanoseconds: rest}
+    if problem := stamp_problem(whole, rest, names):
+        raise ValueInvalid(f"stamp {format_stamp(stamp_ns)} has no place in {form}: {problem}")
+    return dict(zip(names, (whole, rest), strict=True))
 
 
 def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from frametool.errors import shown
 from frametool.frames.stamps import BILLION
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation import read_rotation
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path, Quaternion, Reading, Vector
 
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
+SECONDS = {"sec": range(-(1 << 31), 1 << 32), "secs": range(1 << 32)}  # int32 of ROS 2, uint32 of the others
 PARTS = "a TransformStamped has header, child_frame_id, transform"
 _INTEGER = r"(?a) *[-+]?\d{1,25}"
 _LEFT_OUT = "<(array|sequence) type: .*>"
@@ -22,7 +24,7 @@ def only(mapping: dict[str, Any], known: tuple[str, ...]) -> None:
     """Refuse keys that are not known."""
     for key in mapping:
         if key not in known:
-            raise Misfit(f"unknown key {key!r}; expected {', '.join(known)}", (key,), key=True)
+            raise Misfit(f"unknown key {shown(key)}; expected {', '.join(known)}", (key,), key=True)
 
 
 def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
@@ -46,21 +48,37 @@ def frame_of(
     return reading.bare(name, *here)
 
 
-def header_stamp(header: dict[str, Any]) -> int | None:
+def header_stamp(header: dict[str, Any], *, raw: bool = False) -> int | None:
     """Read the stamp of a header as nanoseconds; None where there is none."""
     if "stamp" not in header:
         return None
-    stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"])
+    stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"], raw=raw)
     return stamp_ns
 
 
-def read_stamp(value: Any) -> int:
-    """Read {sec, nanosec}, {secs, nsecs} or {sec, nsec} as nanoseconds."""
+def read_stamp(value: Any, *, raw: bool = False) -> int:
+    """Read {sec, nanosec}, {secs, nsecs} or {sec, nsec} as nanoseconds.
+
+    raw: add up whatever stands there, as tf2 does.
+    """
     stamp = as_mapping(value, "stamp as {sec, nanosec}")
-    for seconds, nanoseconds in STAMPS:
-        if set(stamp) == {seconds, nanoseconds}:
-            return _whole(stamp, seconds) * BILLION + _whole(stamp, nanoseconds)
+    for names in STAMPS:
+        if set(stamp) == set(names):
+            seconds, nanoseconds = (_whole(stamp, name) for name in names)
+            if not raw and (problem := stamp_problem(seconds, nanoseconds, names)):
+                raise problem
+            return seconds * BILLION + nanoseconds
     raise Misfit("expected stamp as {sec, nanosec} or {secs, nsecs}")
+
+
+def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Misfit | None:
+    """Return what is wrong with a stamp that no message can hold."""
+    allowed = SECONDS[names[0]]
+    if seconds not in allowed:
+        return Misfit(f"{names[0]} {seconds} is beyond {allowed[0]} .. {allowed[-1]}", (names[0],))
+    if not 0 <= nanoseconds < BILLION:
+        return Misfit(f"{names[1]} {nanoseconds} is beyond 0 .. 999999999", (names[1],))
+    return None
 
 
 def _whole(stamp: dict[str, Any], key: str) -> int:
@@ -73,7 +91,7 @@ def _whole(stamp: dict[str, Any], key: str) -> int:
 def whole_list(value: Any, what: str) -> list[Any]:
     """Take a value for a list that was printed whole; the tools cut long ones unless told otherwise."""
     if type(value) is str and re.fullmatch(_LEFT_OUT, value):
-        raise Misfit(f"the numbers are not there, only {value!r}: record without --no-arr (--noarr)")
+        raise Misfit(f"the numbers are not there, only {shown(value)}: record without --no-arr (--noarr)")
     if type(value) is not list:
         raise Misfit(f"expected {what}, found {kind(value)}")
     if "..." in value:

@@ -60,15 +60,20 @@ def _message_edges(message: Message | FormatError, options: Options) -> Iterator
         options.report(message.error(misfit))
         return
     numbers = _header_lines(message, len(found))
-    still = messages.topic_of(message.value).endswith("tf_static")
+    topic = messages.topic_of(message.value)
+    still = topic.endswith("tf_static")
     for (transform, path), line in zip(found, numbers, strict=True):
+        if topic and not options.topics.takes(topic):
+            continue
         reading = Reading(message.source, normalize=options.normalize)
         try:
             parent, child, components, stamp_ns = _read(transform, reading, options, line)
         except Misfit as misfit:
             options.report(message.error(misfit.below(*path)))
             continue
-        yield Edge(parent, child, components, None if still else stamp_ns, line, message.received_ns)
+        if topic and (problem := options.topics.conflict(topic, child)):
+            options.report(FormatError(problem, source=message.source.name, line=line, column=1, rule="two-topics"))
+        yield Edge(parent, child, components, None if still else stamp_ns, line, message.received_ns, topic=topic)
 
 
 def _read(

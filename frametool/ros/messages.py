@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from frametool.errors import shown
 from frametool.grammar.readers import Misfit, as_mapping, within
 from frametool.grammar.rotation import read_rotation
 from frametool.ros import foxglove
@@ -55,7 +56,7 @@ def messages(value: dict[str, Any], path: Path) -> Iterator[tuple[dict[str, Any]
         if key in BESIDE_LIST:
             continue
         if key not in LISTS:
-            raise Misfit(f"unknown key {key!r} beside transforms", here, key=True)
+            raise Misfit(f"unknown key {shown(key)} beside transforms", here, key=True)
         listed = within(here, whole_list, entries or [], f"{key} as a list of TransformStamped")
         for index, entry in enumerate(listed):
             yield within((*here, index), as_mapping, entry, "a TransformStamped"), (*here, index)

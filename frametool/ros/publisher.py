@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from frametool.documents.chunks import lines
 from frametool.documents.source import Source
-from frametool.errors import FormatError, ValueInvalid
+from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
 from frametool.grammar.pose import Pose
@@ -75,6 +75,9 @@ def _line(pose: Pose, style: Style) -> str:
 
     if not pose.name or not pose.parent:
         raise ValueInvalid(f"{CALL} needs the names of both frames; give name: and parent:")
+    for name in (pose.parent, pose.name):
+        if not name.isprintable() or (style.form == "static1" and any(map(str.isspace, name))):
+            raise ValueInvalid(f"frame {name!r} has no place in {style.form}: it could not be read back")
     angles = bool(style.notations) and style.notations[0].representation.name == "rpy"
     numbers = rotation_numbers(pose, notation("rpy_rad" if angles else "quaternion"), style)
     position = [style.number(value) for value in pose.components[:3]]
@@ -131,7 +134,7 @@ def _flags(words: Sequence[str]) -> dict[str, str]:
     for word in rest:
         name, equals, value = word.removeprefix("--").partition("=")
         if not word.startswith("--") or name not in FLAGS:
-            raise ValueInvalid(f"unknown argument {word!r}; the flags are --{', --'.join(FLAGS)}")
+            raise ValueInvalid(f"unknown argument {shown(word)}; the flags are --{', --'.join(FLAGS)}")
         found[name] = value if equals else next(rest, "")
         if not found[name]:
             raise ValueInvalid(f"not enough arguments for --{name}")
@@ -174,5 +177,5 @@ def _pose(
     if not parent or not child:
         raise ValueInvalid(f"an empty frame name; {CALL} takes {_FORMS}")
     if parent == child:
-        raise ValueInvalid(f"frame {child!r} is its own parent", rule="self")
+        raise ValueInvalid(f"frame {shown(child)} is its own parent", rule="self")
     return Pose((x, y, z), turned, child, parent)

@@ -31,7 +31,8 @@ def read_transform(message: dict[str, Any]) -> tuple[str, str, Rigid, int | None
     x, y, z, w = within(("transform",), _numbers, transform, "rotation", "xyzw")
     names = header.get("frame_id"), message.get("child_frame_id")
     parent, child = (name if type(name) is str else "" for name in names)
-    return parent, child, (tx, ty, tz, x, y, z, w), header_stamp(header) if header.get("stamp") is not None else None
+    stamp_ns = None if header.get("stamp") is None else header_stamp(header, raw=True)
+    return parent, child, (tx, ty, tz, x, y, z, w), stamp_ns
 
 
 def _numbers(transform: dict[str, Any], key: str, axes: str) -> list[float]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from frametool.errors import shown
 from frametool.frames.stamps import BILLION
 from frametool.grammar.readers import Misfit
 
@@ -83,7 +84,7 @@ def _nested(names: Sequence[str], cells: Sequence[str]) -> dict[str, Any]:
 def _stamp1(cell: str) -> dict[str, str]:
     """Split integer nanoseconds."""
     if not (cell.isascii() and cell.isdigit()):
-        raise Misfit(f"stamp must be whole nanoseconds, found {cell!r}")
+        raise Misfit(f"stamp must be whole nanoseconds, found {shown(cell)}")
     seconds, nanoseconds = divmod(int(cell), BILLION)
     return {"secs": str(seconds), "nsecs": str(nanoseconds)}
 

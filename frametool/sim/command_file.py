@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import Source, error_at
-from frametool.errors import FormatError, alternatives
+from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.readers import Misfit, read_numbers, within
@@ -200,7 +200,7 @@ def _columns(header: CommandText) -> list[str]:
         if column and columns.index(column) < index:
             raise header.error(f"two columns for {column}", (index,))
         if not column and name not in RECORDED:
-            raise header.error(f"unknown column {name!r}{alternatives(name, COLUMNS, 'columns')}", (index,))
+            raise header.error(f"unknown column {shown(name)}{alternatives(name, COLUMNS, 'columns')}", (index,))
     return columns
 
 
@@ -223,7 +223,7 @@ def _entry(value: Any) -> tuple[int | None, Twist]:
         return t, Twist(linear, angular)
     if type(value) is str and _WORD(value):
         if value.lower() not in KEYS:
-            raise Misfit(f"unknown key {value!r}{alternatives(value, KEYS, 'keys')}")
+            raise Misfit(f"unknown key {shown(value)}{alternatives(value, KEYS, 'keys')}")
         return None, KEYS[value.lower()]
     entry = known_keys(value, ENTRY_KEYS, f"a command {COMMAND}")
     if "linear" not in entry and "angular" not in entry:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import Twist
 
@@ -33,7 +33,7 @@ class FollowController:
             ValueInvalid: unknown law, impossible rate, negative limit, a gain that is not finite.
         """
         if law not in LAWS:
-            raise ValueInvalid(f"no law {law!r}; laws: {', '.join(LAWS)}")
+            raise ValueInvalid(f"no law {shown(law)}; laws: {', '.join(LAWS)}")
         own_rate, own_linear, own_angular = LAWS[law]
         self.rate = _checked("rate", own_rate if rate is None else rate, SLOWEST, FASTEST)
         self.gain_linear = _checked("gain_linear", own_linear if gain_linear is None else gain_linear)

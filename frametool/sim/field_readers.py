@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, alternatives
+from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.readers import Misfit, as_mapping, kind, within
 from frametool.sim.scene import LONGEST, LONGEST_NS
-from frametool.text.numbers import parse_angle, parse_number, shown
+from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -44,7 +44,7 @@ def one_of(names: Collection[str]) -> Callable[[Any], str]:
 
     def parse(text: str) -> str:
         if text not in names:
-            raise ValueInvalid(f"unknown {text!r}{alternatives(text, names, 'choices')}")
+            raise ValueInvalid(f"unknown {shown(text)}{alternatives(text, names, 'choices')}")
         return text
 
     return text_reader(parse, f"one of {', '.join(names)}")
@@ -54,7 +54,8 @@ def known_keys(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
     """Take a value for a mapping with some of these keys."""
     mapping = as_mapping(value, what)
     if unknown := [key for key in mapping if key not in keys]:
-        raise Misfit(f"unknown key {unknown[0]!r}{alternatives(unknown[0], keys, 'keys')}", (unknown[0],), key=True)
+        known = alternatives(unknown[0], keys, "keys")
+        raise Misfit(f"unknown key {shown(unknown[0])}{known}", (unknown[0],), key=True)
     return mapping
 
 
@@ -89,7 +90,7 @@ def _endless(text: str) -> int | None:
 
 def _boolean(text: str) -> bool:
     if text not in ("true", "false"):
-        raise ValueInvalid(f"expected true or false, found {text!r}")
+        raise ValueInvalid(f"expected true or false, found {shown(text)}")
     return text == "true"
 
 

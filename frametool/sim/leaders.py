@@ -10,7 +10,7 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION
 from frametool.sim.controllers import FollowController
 from frametool.sim.turtle import PI, SIZE, TICK_NS, TurtlePose, Twist, wrapped
@@ -222,7 +222,7 @@ def built_in(name: str, seed: int = 0) -> MakeLeader:
     Raises ValueInvalid for a name that is not in LEADERS.
     """
     if name not in LEADERS:
-        raise ValueInvalid(f"no leader {name!r}; leaders: {', '.join(LEADERS)}")
+        raise ValueInvalid(f"no leader {shown(name)}; leaders: {', '.join(LEADERS)}")
     return lambda: LEADERS[name](seed)
 
 

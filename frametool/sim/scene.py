@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION, FURTHEST_NS
 from frametool.sim.controllers import FollowController
 from frametool.sim.leaders import built_in
@@ -89,7 +89,7 @@ def tutorial(
     Raises ValueInvalid.
     """
     if target not in TARGETS:
-        raise ValueInvalid(f"no target {target!r}; targets: {', '.join(TARGETS)}")
+        raise ValueInvalid(f"no target {shown(target)}; targets: {', '.join(TARGETS)}")
     if followers < 0:
         raise ValueInvalid(f"followers must be 0 or more, found {followers}")
     controller = FollowController(law) if isinstance(law, str) else law

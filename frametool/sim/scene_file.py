@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import Source, read_text
-from frametool.errors import alternatives
+from frametool.errors import alternatives, shown
 from frametool.grammar.readers import Misfit, as_mapping, kind, within
 from frametool.sim import field_readers as fields
 from frametool.sim.command_file import read_entries, read_script
@@ -89,7 +89,7 @@ class _SceneReader:
     def _turtle(self, name: str, value: Any) -> SceneTurtle:
         entry = known_keys(value, TURTLE_KEYS, "a turtle {spawn: [x, y, theta], leader: .. or follow: ..}")
         if name == "world" or not name:
-            raise Misfit(f"a turtle cannot be called {name!r}", key=True)
+            raise Misfit(f"a turtle cannot be called {shown(name)}", key=True)
         spawn = field(entry, "spawn", _place, [repr(CENTRE), repr(CENTRE), "0"])
         if "follow" in entry and "leader" in entry:
             raise Misfit("a turtle has a leader script or follows another, not both", ("leader",), key=True)
@@ -106,7 +106,7 @@ class _SceneReader:
         if leader == name:
             raise Misfit(f"{name} cannot follow itself")
         if leader not in self.names and not (self.nameless and leader.startswith("turtle")):
-            raise Misfit(f"no turtle {leader!r} to follow{alternatives(leader, self.names, 'turtles')}")
+            raise Misfit(f"no turtle {shown(leader)} to follow{alternatives(leader, self.names, 'turtles')}")
 
     def _leader(self, value: Any) -> MakeLeader:
         """Read a leader: a built-in name, a file beside the scene, or the commands themselves."""
@@ -118,7 +118,7 @@ class _SceneReader:
             return built_in(value, self.seed or 0)
         path = os.path.join(os.path.dirname(self.source.name), value)
         if not os.path.exists(path):
-            raise Misfit(f"no file {path} and no leader {value!r}{alternatives(value, LEADERS, 'leaders')}")
+            raise Misfit(f"no file {path} and no leader {shown(value)}{alternatives(value, LEADERS, 'leaders')}")
         return scripted(read_script(Source(path, read_text(path))))
 
     def _calls(self, value: Any) -> list[ServiceCall]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid, listing, printable
+from frametool.errors import ValueInvalid, listing, printable, shown
 from frametool.sim.turtle import CENTRE, Turtle, check_single, single
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class World:
     def __init__(self, variant: str = "ros1", *, holonomic: bool = False) -> None:
         """Create an empty world; `reset` gives it turtle1, as the node does when it starts."""
         if variant not in VARIANTS:
-            raise ValueInvalid(f"no turtlesim {variant!r}; there are {', '.join(VARIANTS)}")
+            raise ValueInvalid(f"no turtlesim {shown(variant)}; there are {', '.join(VARIANTS)}")
         self.variant = variant
         self.holonomic = holonomic or variant == "ros1"
         self.clears = 0  # how often the drawing was cleared
@@ -144,10 +144,10 @@ def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float
     Raises ValueInvalid for a service or argument that does not exist, or one that is missing or no finite float32.
     """
     if service not in SERVICES:
-        raise ValueInvalid(f"no service {service!r}; services: {', '.join(SERVICES)}")
+        raise ValueInvalid(f"no service {shown(service)}; services: {', '.join(SERVICES)}")
     expected = SERVICES[service]
     if unknown := [name for name in arguments if name not in expected]:
-        raise ValueInvalid(f"{service} has no {unknown[0]!r}; expected {', '.join(expected) or 'nothing'}")
+        raise ValueInvalid(f"{service} has no {shown(unknown[0])}; expected {', '.join(expected) or 'nothing'}")
     given = {name: arguments.get(name, default) for name, default in expected.items()}
     if missing := [name for name, value in given.items() if value is None]:
         raise ValueInvalid(f"{service} needs {', '.join(missing)}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,11 +10,11 @@ from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, rigid
 from frametool.geometry.batch_validation import read_rotations
 from frametool.stream.faults import NULL, STOP, Fault
-from frametool.stream.row_layout import FLAT, IDENTITY, POSE, TURN, pose_of
+from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, POSE, TURN, pose_of
 from frametool.stream.row_transforms import NOWHERE, by_frame, by_time
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
 from frametool.stream.text_parts import Const, In, Instead, Out
-from frametool.text.numbers import explain_angle, explain_number, parse_angle
+from frametool.text.numbers import read_number_or_angle
 from frametool.text.parse import parse_floats
 
 if TYPE_CHECKING:
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     from frametool.text.spans import Spans
 
 
-LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
 
 
 class Plan(NamedTuple):
@@ -111,7 +109,7 @@ class Run:
             row, column = divmod(place, numbers.shape[1])
             text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
             try:
-                numbers[row, column] = _read_angle(text, self._unit_of(column))
+                numbers[row, column] = read_number_or_angle(text, self._unit_of(column))
             except ValueInvalid as error:
                 self._blame(row, self.plan.names[column], str(error))
         return numbers
@@ -262,19 +260,6 @@ def _without_result(piece: Piece, null: bytes) -> Piece:
     if isinstance(piece, Out):
         return Const(piece.between.join([null] * (piece.last - piece.first)))
     return In(piece.part) if isinstance(piece, Instead) else piece
-
-
-def _read_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001
-    """Read an angle that says its unit; raise ValueInvalid with the reason why a text is no number."""
-    if degrees is None:
-        raise ValueInvalid(explain_number(text))
-    try:
-        value, unit = parse_angle(text)
-    except ValueInvalid:
-        raise ValueInvalid(explain_angle(text)) from None
-    if unit is None or (unit == "deg") == degrees:
-        return value
-    return math.degrees(value) if degrees else math.radians(value)
 
 
 def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]:

@@ -10,14 +10,17 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, did_you_mean
-from frametool.geometry.representations import NAMED, REPRESENTATIONS, notation
+from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, shown
+from frametool.geometry.representations import NAMED, REPRESENTATIONS
+from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.faults import Misused
+from frametool.stream.row_layout import POINT, POSE, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.geometry.representations import Notation, Representation
+    from frametool.stream.request import Request
     from frametool.stream.row_layout import Unit
 
     Spot = tuple[int, str]  # a column's place, and the unit that its name says
@@ -185,7 +188,7 @@ def has_names_of_ours(names: Iterable[str]) -> bool:
 
 def find_positions(header: Header) -> list[Columns]:
     """Return every three columns that can be a position."""
-    named = {(match.prefix, match.suffix) for match in _named_maps(header) if match.prefix or match.suffix}
+    named = {(match.prefix, match.suffix) for match in _named_maps(header)}
     turns: dict[int, set[int]] = {}
     for at, match in enumerate(match for row in REPRESENTATIONS.values() for match in header.match(row.columns)):
         for place in match.places:
@@ -208,7 +211,7 @@ def _position(header: Header, match: Match) -> Columns:
     if 0.0 in units:
         place, unit = next(spot for spot in match.spots if spot and spot[1] not in LENGTHS)
         known = ", ".join(filter(None, LENGTHS))
-        wrong = f"column {header.names[place]!r}: unknown unit {unit!r} of a length; known are {known}"
+        wrong = f"column {shown(header.names[place])}: unknown unit {shown(unit)} of a length; known are {known}"
         return columns._replace(unit=1.0, wrong=wrong)
     x, y, z = units
     return columns._replace(unit=x if x == y == z else (x, y, z))
@@ -222,7 +225,7 @@ def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> lis
     found += [
         _rotation(header, match, row, given)
         for row in rows if row.shape == NAMED
-        for match in _named_maps(header) if given is not None or match.prefix or match.suffix
+        for match in _named_maps(header, bare=given is not None)
     ]  # fmt: skip
     return _without_strays(found) or [each for row in rows for each in _standing_alone(row, header, given)]
 
@@ -236,11 +239,12 @@ def _searched(given: Notation | None) -> list[Representation]:
     return [row for at, row in enumerate(rows) if set(row.columns) not in [set(each.columns) for each in rows[:at]]]
 
 
-def _named_maps(header: Header) -> Iterator[Match]:
-    """Yield the columns called as the keys of a map: x y z w of a quaternion."""
+def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Match]:
+    """Yield the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
     for row in REPRESENTATIONS.values():
-        if row.shape == NAMED:
-            yield from header.match(row.names)
+        for match in header.match(row.names) if row.shape == NAMED else ():
+            if bare or match.prefix or match.suffix or len(header.names) == len(row.names):
+                yield match
 
 
 def _without_strays(found: list[Columns]) -> list[Columns]:
@@ -284,14 +288,15 @@ def _rotation(header: Header, match: Match, row: Representation, given: Notation
         angle = at in row.angles
         if unit not in NO_UNIT and not (angle and unit in ANGLES):
             kind = "of an angle; known are deg, rad" if angle else "of a number that has none"
-            columns = columns._replace(wrong=f"column {header.names[match.place(at)]!r}: unknown unit {unit!r} {kind}")
+            name = shown(header.names[match.place(at)])
+            columns = columns._replace(wrong=f"column {name}: unknown unit {shown(unit)} {kind}")
         said.append(ANGLES.get(unit) if angle else None)
     units = {said[at] for at in row.angles if match.spots[at]}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
     axes = f":{given.axes}" if given is not None and given.axes else ""
-    form = given if given is not None and row.angles and not suffix else notation(f"{row.name}{suffix}{axes}")
+    notation = given if given is not None and row.angles and not suffix else parse_notation(f"{row.name}{suffix}{axes}")
     absent = tuple(at for at, spot in enumerate(match.spots) if spot is None)
-    return columns._replace(notation=form, degrees=tuple(said), absent=absent)
+    return columns._replace(notation=notation, degrees=tuple(said), absent=absent)
 
 
 def find_poses(names: Sequence[str], given: Notation | None, count: int, source: str) -> list[PoseColumns]:
@@ -305,18 +310,40 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
         return poses
     wanted = "one pose" if count == 1 else "two poses"
     candidates = "; ".join(each.shown for each in (*positions, *rotations)[:MOST_SHOWN])
-    found = candidates or f"none among {_listed(names)}"
+    found = candidates or f"none among {listed(names)}"
     raise _refusal(f"columns of {wanted} are wanted, found {found}; choose with --columns", source)
+
+
+def plain_pose(names: Sequence[str]) -> PoseColumns:
+    """Find the one point or pose among names without affixes, if there is one.
+
+    Raises ValueInvalid for several rotations or positions, and for a rotation that is there by half.
+    """
+    header = Header(names)
+    bare = ("", "")
+    header.found = {word: {bare: spots[bare]} if bare in spots else {} for word, spots in header.found.items()}
+    positions, rotations = find_positions(header), find_rotations(header, None)
+    if len(rotations) > 1 or len(positions) > 1:
+        what = "rotation" if len(rotations) > 1 else "position"
+        shown = " and ".join(each.shown for each in (rotations if len(rotations) > 1 else positions))
+        raise ValueInvalid(f"expected one {what}, found {shown}")
+    rotation = rotations[0] if rotations else None
+    if rotation is None and (half := _half_rotation(header, None)):
+        raise ValueInvalid(half.replace("columns", "keys").replace("choose with --columns", "leave it out"))
+    position = positions[0] if positions and not (rotation and rotation.whole) else None
+    if position is None and rotation and not rotation.whole:
+        position = _half_position(header, rotation)
+    return PoseColumns(position, rotation)
 
 
 def _refusal(reason: str, source: str) -> FormatError:
     return FormatError(reason, source=source, line=1)
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """List the columns there are, the first of very many."""
     more = f", .. ({len(names)} columns)" if len(names) > MOST_LISTED else ""
-    return ", ".join(names[:MOST_LISTED]) + more
+    return ", ".join(map(bare, names[:MOST_LISTED])) + more
 
 
 def _only_pose(
@@ -324,14 +351,16 @@ def _only_pose(
 ) -> PoseColumns:
     """Put the one position and the one rotation together; raise FormatError where a rotation is there by half."""
     rotation = rotations[0] if rotations else None
-    position = positions[0] if positions and not (rotation and rotation.whole) else None
+    taken = set(rotation.places) if rotation else set()
+    whole = rotation is not None and rotation.whole
+    position = positions[0] if positions and not whole and taken.isdisjoint(positions[0].places) else None
     if rotation is None and (half := _half_rotation(header, given)):
         raise _refusal(half, source)
-    if position is None and rotation and not rotation.whole:
+    if position is None and rotation and not whole:
         position = _half_position(header, rotation)
     if position is rotation is None:
         raise _refusal(
-            f"no columns of a point or pose among: {_listed(header.names)}; name them with --columns", source
+            f"no columns of a point or pose among: {listed(header.names)}; name them with --columns", source
         )
     return PoseColumns(position, rotation)
 
@@ -341,6 +370,9 @@ def _half_rotation(header: Header, given: Notation | None) -> str:
     for row in REPRESENTATIONS.values() if given is None else ():
         if not row.searched and (match := next(header.match(row.columns), None)):
             return f"columns {header.columns(match).shown} may be {row.name}; then add --from {row.spelling}"
+    if given is None and (match := next(_named_maps(header, bare=True), None)):
+        shown = header.columns(match).shown
+        return f"{shown} may be a quaternion or a point and a number; add --from xyzw, or --columns with the three"
     for row in _searched(given):
         for match in header.match_partly(row.columns):
             if len(match.places) > 1 or (row.alone and header.is_plain(match)):
@@ -410,15 +442,41 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
     return position.suffix == rotation.suffix, same
 
 
+def row_shape(pose: PoseColumns, request: Request) -> Shape:
+    """Say what the numbers of a pose's columns mean."""
+    position, rotation = pose
+    unit = position.unit if position else None
+    if rotation is None or rotation.notation is None:
+        moved = request.operation.moves and request.kind != POSE
+        return Shape((request.kind or POINT) if moved else POSE, unit)
+    if request.kind not in ("", POSE) and request.operation.moves:
+        raise Misused(
+            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.kind}; "
+            "name the three with --columns"
+        )
+    form = rotation.notation
+    angles = form.representation.angles
+    said = [request.in_degrees(form) if each is None else each for each in rotation.degrees]
+    degrees = any(said[at] for at in angles if at not in rotation.absent)
+    radians_at = tuple(at for at in angles if degrees and not said[at])
+    first = 0 if unit is None else len(XYZ)
+    absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
+    if rotation.whole:
+        return Shape(POSE, None, form, degrees, whole=True)
+    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent)
+
+
 def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notation | None) -> PoseColumns:
     """Take columns by name or by position from 1 (`2-8`): x y z, a rotation's, or first the one and then the other.
 
     Raises Misused for names that are not there, or a count that says nothing.
     """
-    numbers = {name: place for place, name in reversed(list(enumerate(names or ())))}
+    numbers: dict[str, int] = {}
+    for place, name in enumerate(names or ()):
+        numbers.setdefault(name, place)
     places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
     header = Header(names or [f"column {place + 1}" for place in range(width)])
-    if twice := sorted({header.names[place] for place in places if places.count(place) > 1}):
+    if twice := sorted(header.names[place] for place, count in Counter(places).items() if count > 1):
         raise Misused(f"--columns: {', '.join(twice)} stands twice")
     count, rotation = _chosen_rotation(header, places, given)
     if count == len(places):
@@ -486,4 +544,4 @@ def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
             return list(range(low - 1, high))
         raise Misused(f"--columns: {word} is not within 1-{width}")
     near = did_you_mean(word, numbers)
-    raise Misused(f"--columns: no column {word!r}{near}; columns: {_listed(list(numbers) or [f'1-{width}'])}")
+    raise Misused(f"--columns: no column {shown(word)}{near}; columns: {listed(list(numbers) or [f'1-{width}'])}")

@@ -11,19 +11,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import did_you_mean
-from frametool.geometry.representations import REPRESENTATIONS
+from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
-from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, rotation_of, shape_of
+from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
 from frametool.ros.message_parts import read_stamp, whole_list
+from frametool.stream.header import Columns, PoseColumns, plain_pose, row_shape
 from frametool.stream.row_layout import COVARIANCE, POINT, POSE, TWIST, VECTOR, WRENCH, Shape
+from frametool.text.numbers import NotFinite, read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.grammar.readers import Path
-    from frametool.stream.header import Columns
     from frametool.stream.request import Request
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
@@ -33,6 +34,7 @@ PARENT_KEYS = ("parent", "frame", "frame_id", "parent_frame_id")  # the frame a 
 NAME_KEYS = ("name", "child_frame_id")  # what a pose is the pose of
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
 XYZ = ("x", "y", "z")
+QUATERNION = (*XYZ, "w")
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 
 
@@ -49,7 +51,7 @@ class Record(NamedTuple):
     path: of the mapping or list that holds the numbers
     numbers: the path of each; None for a number that is not written and counts as 0
     values: the numbers, in the order of `shape`
-    key: the key of the position, "" for bare x, y, z
+    key: the key of the position; "" where each of its numbers is a member of the record, whose keys are `members`
     rotation: the key of the rotation; others: further keys that say the same rotation
     flat: keys that hold one number of the rotation each; `rotation` is then the first of them
     stamp: the paths of seconds and nanoseconds in its header
@@ -62,6 +64,7 @@ class Record(NamedTuple):
     key: str = ""
     rotation: str = ""
     others: tuple[str, ...] = ()
+    members: tuple[str, ...] = ()
     flat: tuple[str, ...] = ()
     name: Name = Name()
     parent: Name = Name()
@@ -105,7 +108,7 @@ def _nothing_in(document: Any) -> Misfit:
 
 def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
     """Build the error for keys that are nearly known."""
-    named = "; ".join(f"unknown key {key!r}{hint.replace('; ', ', ')}" for key, hint in near)
+    named = "; ".join(f"unknown key {shown(key)}{hint.replace('; ', ', ')}" for key, hint in near)
     choices = ", ".join(REPRESENTATIONS)
     return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (near[0][0],), key=True)
 
@@ -154,7 +157,19 @@ def _search_inside(
 
 def _holds_numbers(value: dict[str, Any]) -> bool:
     """Tell whether a mapping itself is a record rather than a message around one."""
-    return _is_holder(value) or set(XYZ) <= set(value) or _parts_of(value) is not None
+    if _is_holder(value) or set(XYZ) <= set(value) or _parts_of(value) is not None:
+        return True
+    if any(type(value.get(key)) in (dict, list) for key in INNER):
+        return False
+    try:
+        return plain_pose(_scalars(value)) != PoseColumns(None, None)
+    except ValueInvalid:
+        return True  # half a rotation, or two: reading it says so
+
+
+def _scalars(value: dict[str, Any]) -> list[str]:
+    """Name the members that may be numbers."""
+    return [key for key, each in value.items() if type(each) not in (dict, list)]
 
 
 def _is_holder(value: dict[str, Any]) -> bool:
@@ -217,20 +232,20 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         return _two_vectors(value, parts, path, request)
     positions = [key for key in value if key in POINT_KEYS and _holds(key, value[key])]
     rotations = [key for key, each in value.items() if _is_rotation(key, each)]
-    flat = _flat_rotation(value, rotations) if request.kind in ("", POSE) else None
-    if len(positions) > 1 and not _is_pose(positions, rotations or flat):
+    flat = _flat_pose(value, rotations)
+    if len(positions) > 1 and not _is_pose(positions, rotations or flat.rotation):
         raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
-    _refuse_typos(value, rotations=bool(rotations or flat), position=bool(positions))
+    _refuse_typos(value, rotations=bool(rotations or flat.rotation), position=bool(positions or flat.position))
     key = positions[0] if positions else ""
-    record = Record(path, Shape(_kind(key, rotations or flat or (), request), None), key=key)
+    record = Record(path, Shape(_kind(key, rotations or flat.rotation, request), None), key=key)
     if positions:
-        record = _with_position(record, value[key], (key,), POINT_KEYS[key], partial="header" not in value)
-    elif set(XYZ) <= set(value):
-        _refuse_bare_quaternion(value)
-        record = _with_position(record, {name: value[name] for name in XYZ}, (), 1.0, partial=False)
+        record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
+        flat = flat._replace(position=Columns((), (), unit=record.shape.unit))
+    elif flat.position:
+        record = _with_members(record, value, flat.position)
     reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else request.degrees
-    if flat is not None:
-        record = _with_flat_rotation(value, flat, record, reading, request)
+    if flat.rotation:
+        record = _with_flat_rotation(record, value, flat, reading, request)
     elif rotations:
         within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
@@ -280,56 +295,87 @@ def _refuse_disagreement(
     if len(rotations) > 1 or len(positions) > 1:
         from frametool.grammar.pose import read_pose
 
-        read_pose({key: value[key] for key in value if key in (*positions, *rotations)}, reading)
+        keys = (*rotations, *(positions if len(positions) > 1 else ()))
+        read_pose({key: value[key] for key in value if key in keys}, reading)
 
 
-def _flat_rotation(value: dict[str, Any], rotations: list[str]) -> Columns | None:
-    """Find a rotation among the keys by the names that columns have: qx qy qz qw, roll_deg pitch_deg yaw_deg, ..
+def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns:
+    """Find a position and a rotation among the keys by the names that columns have: x y z, qx qy qz qw, yaw_deg, ..
 
-    Raises Misfit if there are two, or one beside a key that holds a whole rotation.
+    Raises Misfit for half a rotation, for two of them, and for a unit that is not known.
     """
-    from frametool.stream.header import find_rotations
-
-    names = [key for key, each in value.items() if type(each) not in (dict, list)]
-    every = find_rotations(names, None)
-    found = [each for each in every if not (each.prefix or each.suffix or each.whole or each.absent)]
-    if odd := [each for each in found if each.wrong or each.is_mixed]:
-        raise Misfit(odd[0].wrong or f"angles of several units: {odd[0].shown}; write all in one", (odd[0].names[0],))
-    if found and len(found) + len(rotations) > 1:
-        shown = " and ".join([*(each.shown for each in found), *rotations])
-        raise Misfit(f"expected one rotation, found {shown}", (found[0].names[0],), key=True)
-    return found[0] if found else None
-
-
-def _refuse_bare_quaternion(value: dict[str, Any]) -> None:
-    """Stop at x, y, z beside w."""
-    if "w" in value:
+    names = _scalars(value)
+    if not rotations and set(names) == set(QUATERNION) and len(names) == len(value):
+        alone = Columns((0, 1, 2, 3), QUATERNION, notation=notation("quaternion"), degrees=(None,) * 4)
+        return PoseColumns(None, alone)
+    try:
+        found = plain_pose(names)
+    except ValueInvalid as error:
+        raise Misfit(str(error), key=True) from None
+    if wrong := next((each.wrong for each in found if each is not None and each.wrong), ""):
+        raise Misfit(wrong.replace("column ", "key ", 1), key=True)
+    if found.rotation and rotations:
+        shown = " and ".join([found.rotation.shown, *rotations])
+        raise Misfit(f"expected one rotation, found {shown}", (found.rotation.names[0],), key=True)
+    if found.position and not found.rotation and not rotations and "w" in value:
         message = "x, y, z beside w may be a quaternion or a point; write {quaternion: {..}} or {point: [..], w: ..}"
         raise Misfit(message, ("w",), key=True)
+    return found
+
+
+def _with_members(record: Record, value: dict[str, Any], columns: Columns) -> Record:
+    """Add a position whose numbers are members of the record itself."""
+    values = tuple(_number(value, name, None) for name in columns.names)
+    paths = tuple((*record.path, name) for name in columns.names)
+    shape = record.shape._replace(unit=columns.unit, absent=columns.absent)
+    return record._replace(shape=shape, numbers=paths, values=values, members=columns.names)
 
 
 def _with_flat_rotation(
-    value: dict[str, Any], columns: Columns, record: Record, reading: Reading, request: Request
+    record: Record, value: dict[str, Any], flat: PoseColumns, reading: Reading, request: Request
 ) -> Record:
     """Add a rotation whose numbers are members of the record itself."""
-    form, names, texts = columns.notation, columns.names, [value[name] for name in columns.names]
-    if form is None or request.poses != 1:
+    if flat.rotation is None or request.poses != 1:
         raise Misfit("a record holds one pose; two in a row are for tables")
-    places = [(name,) for name in names]
-    try:
-        rotation_of(form, texts, places, reading)
-    except NotARotation as misfit:
-        raise misfit if misfit.path else misfit.below(names[0]) from None
-    values, degrees = read_components(form, texts, places, Reading(reading.source, degrees=reading.degrees))
-    numbers = (*record.numbers, *((*record.path, name) for name in names))
-    shape = record.shape._replace(kind=POSE, notation=form, degrees=degrees)
-    first = next(key for key in value if key in names)
+    names = flat.rotation.names
+    reading_here = request._replace(degrees=reading.degrees, kind=POSE)
+    shape = row_shape(flat, reading_here)
+    numbers, own = [], 0 if shape.whole else len(record.values)
+    for at, name in enumerate(names):
+        numbers.append(_number(value, name, shape.in_degrees(own + at)))
+    values = (*(() if shape.whole else record.values), *numbers)
+    _check(shape, values, names[0], reading)
+    paths = (*(() if shape.whole else record.numbers), *((*record.path, name) for name in names))
     return record._replace(
-        shape=shape, numbers=numbers, values=(*record.values, *values), rotation=first, flat=tuple(names)
+        shape=shape, numbers=paths, values=values, rotation=next(key for key in value if key in names), flat=names
     )
 
 
-def _kind(key: str, rotations: Sequence[object], request: Request) -> str:
+def _number(value: dict[str, Any], key: str, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
+    """Read a member that is a number or an angle."""
+    if type(value[key]) is not str:
+        raise Misfit(f"expected a number, found {kind(value[key])}", (key,))
+    try:
+        return read_number_or_angle(value[key], degrees)
+    except ValueInvalid as error:
+        raise (NotARotation if isinstance(error, NotFinite) else Misfit)(str(error), (key,)) from None
+
+
+def _check(shape: Shape, values: Sequence[float], key: str, reading: Reading) -> None:
+    """Refuse numbers that are no rotation; note what is odd about them."""
+    from frametool.stream.scalar import checked_rotation, doubtful_angle
+
+    try:
+        _, odd = checked_rotation(shape, values, normalize=reading.normalize)
+    except ValueInvalid as error:
+        raise NotARotation(str(error), (key,)) from None
+    for rule, message in odd:
+        reading.note(message, key, rule=rule)
+    if doubt := doubtful_angle(shape, values):
+        reading.note(f"{doubt} is more than a full turn in radians; degrees? name the keys _deg", key, rule="degrees")
+
+
+def _kind(key: str, rotations: object, request: Request) -> str:
     """Decide what a mapping is: with a rotation a pose, else a point or a vector, or what --as says."""
     if request.kind in PARTS:
         raise Misfit(f"a {request.kind} has {' and '.join(PARTS[request.kind])}, two vectors {{x:, y:, z:}}")
@@ -340,11 +386,12 @@ def _kind(key: str, rotations: Sequence[object], request: Request) -> str:
     return request.kind or (VECTOR if key == "vector" else POINT)
 
 
-def _with_position(record: Record, value: Any, below: Path, metre: float, *, partial: bool) -> Record:
+def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -> Record:
     """Add the position: a list, or a map in which, if it may be partial, what is missing is 0."""
-    x, y, z = within(below, read_numbers, value, XYZ, partial=partial)
+    below = (*record.path, record.key)
+    x, y, z = within((record.key,), read_numbers, value, XYZ, partial=partial)
     steps = INDICES[:3] if type(value) is list else tuple((name,) for name in XYZ)
-    paths = tuple((*record.path, *below, *step) if type(value) is list or step[0] in value else None for step in steps)
+    paths = tuple((*below, *step) if type(value) is list or step[0] in value else None for step in steps)
     return record._replace(shape=record.shape._replace(unit=round(1.0 / metre, 6)), numbers=paths, values=(x, y, z))
 
 
@@ -421,7 +468,7 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
             raise Misfit(f"{key} must be a frame's name, found nothing; {hint}", (*path, key))
         if text and found.text and text != found.text:
             where = ".".join(map(str, found.paths[0][-2:]))
-            raise Misfit(f"{key} says {text!r} and {where} says {found.text!r}; keep one", (*path, key))
+            raise Misfit(f"{key} says {shown(text)} and {where} says {shown(found.text)}; keep one", (*path, key))
         found = Name(found.text or text or None, (*found.paths, (*path, key)))
     return found
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part
     from frametool.stream.template import Template
-    from frametool.text.lines import Source
+    from frametool.text.lines import ByteStream
 
 FEW = 16  # records at the end of which a stream that is already complete needs no numpy
 SMALL = 1 << 14  # bytes
@@ -29,7 +29,7 @@ _ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^])", re.MULTILINE)  # no key that ROS 
 
 
 def run_records(
-    stream: Source, form: str, request: Request, *, source: str, jobs: int = 1, size: int = 0
+    stream: ByteStream, form: str, request: Request, *, source: str, jobs: int = 1, size: int = 0
 ) -> Generator[Outcome]:
     """Yield the outcomes of a stream of records."""
     splitter = Splitter(form)
@@ -41,7 +41,7 @@ def run_records(
 
 
 def _outcomes(
-    stream: Source, splitter: Splitter, form: str, request: Request, *, source: str, jobs: int, size: int
+    stream: ByteStream, splitter: Splitter, form: str, request: Request, *, source: str, jobs: int, size: int
 ) -> Generator[Outcome]:
     options = {"size": size} if size else {}
     blocks = read_blocks(stream, whole=splitter.whole, **options)
@@ -68,7 +68,7 @@ def _again(first: bytes, second: bytes | None, blocks: Iterator[bytes]) -> Itera
     yield from blocks
 
 
-def _has_ended(stream: Source) -> bool:
+def _has_ended(stream: ByteStream) -> bool:
     """Tell whether a stream has nothing more to come, or will have within a moment."""
     import select
 

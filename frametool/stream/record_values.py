@@ -12,7 +12,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.json_writer import Verbatim
 from frametool.documents.nodes import parse_nodes
 from frametool.documents.source import Source, decode
-from frametool.errors import FormatError, FrametoolError, ValueInvalid, warn
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.tree_reader import tell
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.stream.faults import BadRows
     from frametool.stream.record import Record
-    from frametool.text.lines import Source as ByteStream
+    from frametool.text.lines import ByteStream
 
     Value = Result | dict[str, Any]
 
@@ -72,7 +72,9 @@ def read_poses(source: Source, *, degrees: bool = False, normalize: bool = False
 def pose_of(record: Record, request: Request) -> Pose:
     """Return a record as a named pose; position or rotation is None where it has none."""
     shape = record.shape
-    rotation = checked_rotation(shape, record.values, request)[0] if shape.notation is not None else None
+    rotation = None
+    if shape.notation is not None:
+        rotation, _ = checked_rotation(shape, record.values, normalize=request.normalize)
     placed_at = shape.whole or shape.unit is not None
     pose = Pose(shape.position(record.values) if placed_at else None, rotation, record.name.text, record.parent.text)
     return inverted(pose) if record.inverse else pose
@@ -119,7 +121,7 @@ def _answer(record: Record, request: Request, source: Source) -> Answer:
         parent, name = record.parent.text, record.name.text
         if request.rename is not None:
             if lost := lost_name(record, request):
-                warn(f"{source.name}: frame {lost!r} is left out: the frames of the result are not known")
+                warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
             parent, name = request.rename(parent, name)
         parts, _ = moved(record, _edge(record, request, source), record.values, request)
     except ValueInvalid as error:
@@ -177,7 +179,7 @@ def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Re
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     """Return what a record and the mappings around it say beside the pose, its frames and its stamp."""
     used = {record.key, record.rotation, *record.others, *record.flat, *NOT_PLAIN}
-    used |= set(XYZ) if not record.key and record.shape.unit is not None else set()
+    used |= set(record.members)
     names = {path for each in (record.name, record.parent) for path in each.paths}
     rest: dict[str, Any] = {}
     for depth in range(len(unit), len(record.path) + 1):

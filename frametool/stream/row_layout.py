@@ -23,6 +23,7 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 TURN = 6.283185307179586
 TO_DEGREES = 180.0 / 3.141592653589793
 FLAT = 1e-9  # radians, metres: what a number without a column may be
+LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
 Unit: TypeAlias = float | tuple[float, float, float]  # how many make a metre, where they differ of x, y, z each
 
 
@@ -72,11 +73,16 @@ class Shape(NamedTuple):
         return rotation + (self.unit is not None) * 3
 
     @property
+    def position_size(self) -> int:
+        """Count the numbers of the position in a row."""
+        return 0 if self.whole or self.unit is None else 3 - sum(place < 3 for place in self.absent)
+
+    @property
     def rotation_at(self) -> tuple[int, ...]:
         """Return where in a row the rotation's numbers stand."""
         if self.joined:
             return tuple(self.joined.split(range(self.own_size))[1])
-        return tuple(range((self.unit is not None) * 3 - sum(place < 3 for place in self.absent), self.own_size))
+        return tuple(range(self.position_size, self.own_size))
 
     def in_degrees(self, place: int) -> bool | None:
         """Tell whether a row's number is an angle in degrees; None if it is no angle."""
@@ -167,8 +173,8 @@ class Target(NamedTuple):
         x, y, z, w = parts[3:7]
         unit = quaternion.unit(x, y, z, w, xp)
         written = [
-            form.from_quaternion(*unit, xp, degrees=degrees, keep_sign=self.keep_sign)
-            for form, degrees in self.notations
+            notation.from_quaternion(*unit, xp, degrees=degrees, keep_sign=self.keep_sign)
+            for notation, degrees in self.notations
         ]
         if self.whole and (whole := self.notations[0][0].representation.whole):
             return list(whole.join(parts[:3], written[0]))
@@ -182,7 +188,7 @@ class Target(NamedTuple):
         """Name the numbers of all notations as columns; of a whole pose all of them."""
         if self.whole and (whole := self.notations[0][0].representation.whole):
             return list(whole.columns)
-        return [name for form, degrees in self.notations for name in form.columns_in(degrees=degrees)]
+        return [name for notation, degrees in self.notations for name in notation.columns_in(degrees=degrees)]
 
     @property
     def size(self) -> int:
@@ -192,9 +198,9 @@ class Target(NamedTuple):
     def angle_columns(self) -> list[tuple[int, float]]:
         """Return which of the numbers are angles, each with the size of a full turn."""
         found, first = [], 0 if self.unit is None else 3
-        for form, degrees in self.notations:
-            found += [(first + index, 360.0 if degrees else TURN) for index in form.representation.angles]
-            first += len(form.representation.columns)
+        for notation, degrees in self.notations:
+            found += [(first + index, 360.0 if degrees else TURN) for index in notation.representation.angles]
+            first += len(notation.representation.columns)
         start = 0 if self.unit is None else 3
         return [
             (place - sum(each < place for each in self.absent), TURN if place - start in self.radians_at else period)
@@ -204,7 +210,7 @@ class Target(NamedTuple):
 
     def locked(self, parts: Components) -> Any:
         """Tell whether Euler angles among the notations are not unique; None where there are none."""
-        axes = next((axes for form, _ in self.notations if (axes := form.euler_axes)), None)
+        axes = next((axes for notation, _ in self.notations if (axes := notation.euler_axes)), None)
         if axes is None or len(parts) < 7:
             return None
         x, y, z, w = parts[3:7]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import warn
+from frametool.errors import shown, warn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,7 +28,13 @@ class RowNote(NamedTuple):
     @classmethod
     def of_lost_name(cls, line: int, name: str) -> RowNote:
         """Tell that a frame is not named any more."""
-        return cls(line, "unnamed", f"frame {name!r} is left out: the frames of the result are not known")
+        return cls(line, "unnamed", f"frame {shown(name)} is left out: the frames of the result are not known")
+
+    @classmethod
+    def of_latest(cls, line: int, column: str) -> RowNote:
+        """Tell that a column of stamps is not looked at."""
+        remedy = f"give --time-column {column}, or --at TIME"
+        return cls(line, "latest", f"column {column!r} is not looked at, rows move at the latest time; {remedy}")
 
     @classmethod
     def of_rounding(cls, line: int) -> RowNote:

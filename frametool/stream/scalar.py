@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, overheard
 from frametool.geometry import floats, rigid
-from frametool.stream.row_layout import IDENTITY, POSE, TURN, pose_of
+from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, POSE, TURN, pose_of
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.stream.text_parts import Const, IfLocked, In, Out
 
@@ -40,6 +40,9 @@ def result_of(template: Template, request: Request) -> Rendered:
         values = template.values[first : first + shape.size]
         parts, odd = moved(entry.record, edge, values, request)
         numbers += entry.target.written(parts, floats)
+        for name, number in entry.target.left_out(parts, floats):
+            if abs(number) > FLAT:
+                raise ValueInvalid(LEAVES_PLANE.format(name, number))
         locked = locked or bool(entry.target.locked(parts))
         mended = mended or odd
         doubt = doubt or doubtful_angle(shape, values)
@@ -77,29 +80,28 @@ def moved(
     if shape.kind != POSE:
         start = shape.position(own) if shape.unit is not None else tuple(own)
         return request.operation.move(shape, (*start, *values[shape.own_size :]), edge), False
-    rotation, mended = checked_rotation(shape, own, request)
+    rotation, odd = checked_rotation(shape, own, normalize=request.normalize)
     pose: Rigid = pose_of(shape.position(own), rotation)
     result = request.operation.pose([rigid.inverse(*pose) if record.inverse else pose], edge, floats)
     beside = request.operation.covariance(shape, tuple(values[shape.own_size :]), edge)
-    return (*result, *beside), mended
+    return (*result, *beside), bool(odd)
 
 
-def checked_rotation(shape: Shape, values: Sequence[float], request: Request) -> tuple[Quaternion, bool]:
-    """Return the quaternion of a record's numbers, and whether it had to be normalised beyond silence."""
+def checked_rotation(
+    shape: Shape, values: Sequence[float], *, normalize: bool
+) -> tuple[Quaternion, list[tuple[str, str]]]:
+    """Return the quaternion of a record's numbers, and what is odd about them as (rule, sentence).
+
+    Raises ValueInvalid for what is no rotation.
+    """
     if shape.notation is None:
-        return IDENTITY, False
+        return IDENTITY, []
     tail = shape.joined.tail if shape.joined else ()
     if tail and tuple(values[-len(tail) :]) != tail:
         wanted, found = (" ".join(f"{value:g}" for value in row) for row in (tail, values[-len(tail) :]))
         raise ValueInvalid(f"the last row of a 4x4 pose is {wanted}, found {found}")
-    rotation, odd = overheard(
-        shape.notation.checked_quaternion,
-        shape.rotation(values),
-        floats,
-        degrees=shape.degrees,
-        normalize=request.normalize,
-    )
-    return rotation, bool(odd)
+    check = shape.notation.checked_quaternion
+    return overheard(check, shape.rotation(values), floats, degrees=shape.degrees, normalize=normalize)
 
 
 def doubtful_angle(shape: Shape, values: Sequence[float]) -> str:

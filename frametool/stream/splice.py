@@ -13,7 +13,7 @@ from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
-from frametool.stream.record import PARENT_KEYS, POINT_KEYS, STALE, XYZ
+from frametool.stream.record import PARENT_KEYS, POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Target
 from frametool.stream.text_parts import Const, IfLocked, Out
 
@@ -47,22 +47,20 @@ def target_of(record: Record, request: Request) -> Target:
         return Target(None, (), plain=True)
     if shape.kind != POSE:
         return Target(shape.unit, ())
-    forms = request.notations or ((shape.notation,) if shape.notation else ())
     product = not (operation.keeps_position or operation.only_inverts)
-    if not forms and product:
-        forms = (notation("quaternion"),)
     placed = shape.whole or shape.unit is not None or product
-    keys = [form.representation.name for form in forms]
-    together = sorted(forms, key=lambda form: keys.index(form.representation.name))  # two conventions share a key
-    told = [(form, request.in_degrees(form) if request.notations else shape.degrees) for form in together]
-    whole = (
-        placed
-        and len(forms) == 1
-        and forms[0].representation.whole is not None
-        and (shape.whole or bool(request.notations))
-    )
+    if shape.notation and not request.notations:  # as it was read
+        unit = None if shape.whole or not placed else shape.unit or 1.0
+        first = 3 * (unit is not None and shape.unit is None)  # a position comes in front
+        absent = tuple(first + at for at in shape.absent)
+        read = ((shape.notation, shape.degrees),)
+        return Target(unit, read, request.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
+    forms = request.notations or ((notation("quaternion"),) if product else ())
+    names = [form.representation.name for form in forms]
+    together = sorted(forms, key=lambda form: names.index(form.representation.name))  # two conventions share a key
+    whole = placed and len(forms) == 1 and forms[0].representation.whole is not None
     unit = (shape.unit or 1.0) if placed and not whole else None
-    return Target(unit, tuple(told), request.keep_sign, whole)
+    return Target(unit, tuple((form, request.in_degrees(form)) for form in together), request.keep_sign, whole)
 
 
 def null_edits(node: Node) -> list[Edit]:
@@ -102,7 +100,7 @@ class Splicer:
     def run(self) -> list[Edit]:
         """Return the edits, in no order."""
         shape = self.record.shape
-        if type(self.node.value) is not dict:
+        if type(self.node.value) is not dict or not self.node.value:
             return self._numbers(range(len(self.slots)), 0) if self._same_rotation() else self._rewritten()
         self._names()
         if shape.covariance:
@@ -121,7 +119,8 @@ class Splicer:
         """Tell whether the rotation is written as it was read, number by number."""
         shape, target = self.record.shape, self.target
         same = [(shape.notation, shape.degrees)] == list(target.notations) if shape.notation else not target.notations
-        return same and shape.whole == target.whole and not self.record.inverse
+        is_alone = self.record.flat == QUATERNION and target.unit is not None  # x y z w stand for nothing beside xyz
+        return same and shape.whole == target.whole and not (self.record.inverse or is_alone)
 
     def _numbers(self, slots: Sequence[int], first: int) -> list[Edit]:
         """Put numbers of the result where the slots are."""
@@ -145,12 +144,15 @@ class Splicer:
         if key in (POINT, VECTOR) and self.record.shape.kind in (POINT, VECTOR) and key != self.record.shape.kind:
             node = self.node.value[key][0]
             self.edits.append(Edit(node.start, node.end, (Const(self._text(self.record.shape.kind).encode()),)))
+        members = (key,) if key else self.record.members
+        there = self.record.shape.position_size
         if target.unit is None:
-            self.dropped.update((key,) if key else XYZ)
-        elif None in self.slots[:3]:
-            self._replace(self.node.value[key], self._member({key: list(SAMPLE[:3])}, 0))
+            self.dropped.update(members)
+        elif None in self.slots[:there] or (there < 3 and not target.absent):
+            self._replace(self.node.value[members[0]], self._member({key or "xyz": list(SAMPLE[:3])}, 0))
+            self.dropped.update(members[1:])
         elif not self._position_stays():
-            self._numbers(range(3), 0)
+            self._numbers(range(there), 0)
 
     def _position_stays(self) -> bool:
         """Tell whether only the notation of the rotation changes: then the position keeps its text."""
@@ -159,8 +161,9 @@ class Splicer:
 
     def _rotation(self) -> None:
         """Write the rotation where it stands, or its members anew."""
-        first = 0 if self.target.unit is None else 3
-        slots = range(0 if self.record.shape.unit is None else 3, len(self.slots))
+        shape, target = self.record.shape, self.target
+        first = 0 if target.unit is None else 3 - sum(place < 3 for place in target.absent)
+        slots = range(shape.position_size, shape.own_size)
         rotation = self.record.rotation
         members = self._members(first)
         if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
@@ -169,10 +172,7 @@ class Splicer:
         elif rotation:
             self._replace(self.node.value[rotation], members.pop(0) if members else ())
             self.dropped.update({"angles", *self.record.flat} - {rotation})
-        count = (
-            first + sum(len(form.representation.columns) for form, _ in self.target.notations) + self.target.whole * 7
-        )
-        members += self._extras(count)
+        members += self._extras(target.size)
         after = self.node.value[rotation or self.record.key][1] if (rotation or self.record.key) else self._last_value()
         for member in members:
             self._insert_after(after, member)
@@ -180,7 +180,8 @@ class Splicer:
     def _members(self, first: int) -> list[tuple[Piece, ...]]:
         """Return one member for each key of a notation, and the flag of a lock."""
         notations = self.target.notations
-        style = Style("json", tuple(form for form, _ in notations), degrees=any(degrees for _, degrees in notations))
+        degrees = any(degrees for form, degrees in notations if form.degrees is None)  # what bare angles are
+        style = Style("json", tuple(form for form, _ in notations), degrees=degrees)
         position = SAMPLE[:3] if self.target.whole else None
         members = []
         for key, value in Result(Pose(position, SAMPLE)).mapping(style).items():

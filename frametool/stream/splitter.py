@@ -103,7 +103,9 @@ class Splitter:
         if not _SEVERAL.search(body):
             return [_with_separator(text, begin, begin + len(body))]
         found = _scanned(body, 0, array=False, final=True, match=None).parts
-        return [_with_separator(text, begin + each.start, begin + each.end, each.problem) for each in found]
+        parts = [_with_separator(text, begin + each.start, begin + each.end, each.problem) for each in found]
+        kept = text.rfind(body[-1:], start, end) + 1  # the end of the line goes with none of several
+        return [part._replace(after=min(part.after, kept)) for part in parts] if len(parts) > 1 else parts
 
     def _values(self, text: bytes, *, final: bool, match: Callable[[int], int | None] | None = None) -> Parts:
         """Scan JSON values one after the other, in an array with commas between them."""
@@ -131,8 +133,10 @@ def _layout_of(text: bytes, *, final: bool) -> str:
     end = body.find(b"\n")
     if not body or (end < 0 and not final):
         return ""
-    line = (body if end < 0 else body[:end]).decode("latin-1")
-    _, problem = _value(line.rstrip(" \t\r,"), 0)
+    line = body if end < 0 else body[:end]
+    _, problem = _value(line.decode("latin-1").rstrip(" \t\r,"), 0)
+    if body.startswith(b"[") and b"{" in (body if problem is None else line):
+        return ARRAY  # its first item is no record: lists of numbers hold no objects
     return VALUES if problem is None else LINES
 
 
@@ -212,9 +216,14 @@ def _behind(data: bytes, at: int) -> Iterator[Part]:
 
 
 def _end_of_broken(data: bytes, start: int, wrong: int, *, array: bool) -> int:
-    """Return where a value that goes wrong ends: before the next line or object that begins, or at the end."""
+    """Return where a value that goes wrong ends: before the next line or object that begins, or at the end.
+
+    A line that begins as the value's own first line does is the next value, even if it could be a part of this one.
+    """
     line = data.rfind(b"\n", start, wrong + 1)
-    following = _NEXT.search(data, wrong if line < 0 else line)
+    indent = re.escape(data[data.rfind(b"\n", 0, start) + 1 : start])
+    following = re.compile(rb"\n" + indent + rb"(?=[{\[])").search(data, start, wrong + 1)
+    following = following or _NEXT.search(data, wrong if line < 0 else line)
     end = len(data) if following is None else following.start() + data.startswith(b"}", following.start())
     body = data[start:end].rstrip(b" \t\r\n,")
     if array and following is None and body.endswith(b"]") and body.count(b"]") > body.count(b"["):

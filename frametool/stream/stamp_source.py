@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, did_you_mean
+from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.frames.stamps import BILLION, parse_stamp
 from frametool.grammar.readers import Misfit, kind
 
@@ -55,7 +55,7 @@ def read_header_stamp(seconds: str, nanoseconds: str) -> int:
     """Read the two numbers of a header's stamp as nanoseconds; raises ValueInvalid."""
     whole, below = (text.strip(" \t\"'") for text in (seconds, nanoseconds))
     if not (whole.lstrip("+-").isdecimal() and below.isdecimal()):
-        raise ValueInvalid(f"a stamp is two whole numbers, found {whole!r} and {below!r}")
+        raise ValueInvalid(f"a stamp is two whole numbers, found {shown(whole)} and {shown(below)}")
     return int(whole) * BILLION + int(below)
 
 
@@ -64,11 +64,11 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
     bare = text.strip(" \t\"'")
     if in_ns and not bare.endswith("ns"):
         if not bare.lstrip("+-").isdecimal():
-            raise ValueInvalid(f"{bare!r} is not a time in integer nanoseconds")
+            raise ValueInvalid(f"{shown(bare)} is not a time in integer nanoseconds")
         bare += "ns"
     stamp_ns = parse_stamp(bare)
     if abs(stamp_ns) > LARGEST:
-        raise ValueInvalid(f"{text.strip()!r} is beyond 64 bits of nanoseconds")
+        raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds")
     return stamp_ns
 
 
@@ -84,7 +84,7 @@ def stamp_path(document: Any, holder: Path, name: str) -> Path:
                     raise Misfit(f"expected a time like 12.5, found {kind(found[0])}", (*holder[:depth], *keys))
                 return (*holder[:depth], *keys)
     known = [key for each in around if type(each) is dict for key in each]
-    raise Misfit(f"no key {name!r}{did_you_mean(name, known)}", holder)
+    raise Misfit(f"no key {shown(name)}{did_you_mean(name, known)}", holder)
 
 
 def _below(value: Any, keys: Sequence[str]) -> tuple[Any] | None:

@@ -6,9 +6,12 @@ id,x,y,z,tag                            1305031102.1758 1.34 0.62 1.65 0.657 0.6
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, warn
+import numpy as np
+
+from frametool.errors import FormatError, shown, warn
 from frametool.stream.header import has_names_of_ours
 from frametool.stream.output_columns import NAMED
 from frametool.stream.rows import Block, Broken
@@ -16,14 +19,16 @@ from frametool.text.cells import split_blank, split_delimited, torn_record, with
 from frametool.text.spans import MARGIN, Spans
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.stream.output_columns import Layout
     from frametool.stream.table_names import Naming
+    from frametool.text.array_types import Ints
     from frametool.text.cells import Cells
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENT = b"#"
+NEWLINE = 10
 UNCLOSED = "a quote is opened here and not closed"
 
 
@@ -123,7 +128,7 @@ def _names(cells: Sequence[bytes], source: str) -> tuple[str, ...]:
     """Return the names of columns; a quote within one opens nothing, which is said."""
     for cell in cells:
         if b'"' in cell and not cell.strip().startswith(b'"'):
-            warn(f"{source}:1: the quote in the name {_unquoted(cell)!r} opens nothing and is taken as it stands")
+            warn(f"{source}:1: the quote in the name {shown(_unquoted(cell))} opens nothing and is taken as it stands")
     return tuple(map(_unquoted, cells))
 
 
@@ -160,8 +165,11 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Block:
-    """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
+def table_block(table: Table, layout: Layout, text: bytes, naming: Naming, *, nulls: bool) -> Block:
+    """Find the rows of a block, their numbers, their names, and the stretches of text that pass.
+
+    nulls: rows without numbers are written too.
+    """
     cells = table.split(text)
     columns = _as_slice(layout.places)
     numbers = Spans(cells.data, cells.starts[:, columns], cells.ends[:, columns])
@@ -174,15 +182,17 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Bl
     ]
     stamps = [] if layout.time is None else [(without_quotes(cells.column(layout.time)),)]
     odd, broken = [], []
+    lines_before = _line_counter(cells)
     if len(cells.rows) < len(cells.counts):
         for line in cells.odd_lines().tolist():
             raw = cells.line(line)
             if cells.counts[line] == 0:
                 odd.append((line, raw))
             else:
-                broken.append(_broken(table, layout, cells, line, raw))
+                null_row = _null_row(table, layout, raw) if nulls else b""
+                broken.append(Broken(line, lines_before(line), "", _ragged(table, int(cells.counts[line])), null_row))
     return Block(
-        numbers, parts, cells.rows, lambda row: cells.lines_before(int(cells.rows[row])), odd, broken, names.frames,
+        numbers, parts, cells.rows, lambda row: lines_before(int(cells.rows[row])), odd, broken, names.frames,
         stamps, names.bad, names.lost,
     )  # fmt: skip
 
@@ -210,12 +220,23 @@ def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans
     return Spans(cells.data, starts, ends)
 
 
-def _broken(table: Table, layout: Layout, cells: Cells, line: int, raw: bytes) -> Broken:
-    """Describe a row with too few or too many cells."""
-    count = int(cells.counts[line])
+def _line_counter(cells: Cells) -> Callable[[int], int]:
+    """Return what counts the line ends before a line: more than its index if cells hold line ends."""
+
+    @cache
+    def newlines() -> Ints:
+        return np.flatnonzero(cells.data == NEWLINE)
+
+    return lambda line: int(np.searchsorted(newlines(), cells.line_starts[line]))
+
+
+def _ragged(table: Table, count: int) -> str:
+    """Say that a row has too few or too many cells."""
     named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
-    reason = f"expected {table.width} cells{named}, found {count}"
+    return f"expected {table.width} cells{named}, found {count}"
+
+
+def _null_row(table: Table, layout: Layout, raw: bytes) -> bytes:
     body = raw.rstrip(b"\r\n")
-    given = _cells(raw, table.delimiter)
-    null_row = layout.null_row(given) + raw[len(body) :]
-    return Broken(line, cells.lines_before(line), "", reason, null_row)
+    cells = _cells(raw, table.delimiter) if b'"' in raw or not table.delimiter else body.split(table.delimiter)
+    return layout.null_row(cells) + raw[len(body) :]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, alternatives
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.errors import FormatError, alternatives, shown
+from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.blocks import Plan
 from frametool.stream.faults import Misused
-from frametool.stream.header import XYZ, PoseColumns, find_poses, named_pose
+from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape
 from frametool.stream.output_columns import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
-from frametool.stream.row_layout import POINT, POSE, Shape, Target
+from frametool.stream.row_layout import POSE, Shape, Target
 from frametool.stream.table_names import rename_of
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
         raise FormatError(wrong, source=source, line=1)
-    shapes = tuple(_shape(pose, request) for pose in poses)
+    shapes = tuple(row_shape(pose, request) for pose in poses)
     target = _target(shapes, request)
     places = tuple(place for pose in poses for columns in pose if columns for place in columns.places)
     frames = _frame_columns(table, request, source)
@@ -92,7 +93,7 @@ def _without_position(pose: PoseColumns, request: Request, table: Table, source:
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.given is None else ""
         raise FormatError(
-            f"no columns of a rotation among: {', '.join(table.names or ('columns without names',))}{wanted}",
+            f"no columns of a rotation among: {listed(table.names or ('columns without names',))}{wanted}",
             source=source,
             line=1,
         )
@@ -106,30 +107,6 @@ def _is_whole(notations: Sequence[Notation]) -> bool:
     return len(notations) == 1 and notations[0].representation.whole is not None
 
 
-def _shape(pose: PoseColumns, request: Request) -> Shape:
-    """Say what the numbers of a pose's columns mean."""
-    position, rotation = pose
-    unit = position.unit if position else None
-    if rotation is None or rotation.notation is None:
-        moved = request.operation.moves and request.kind != POSE
-        return Shape((request.kind or POINT) if moved else POSE, unit)
-    if request.kind not in ("", POSE) and request.operation.moves:
-        raise Misused(
-            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.kind}; "
-            "name the three with --columns"
-        )
-    form = rotation.notation
-    angles = form.representation.angles
-    said = [request.in_degrees(form) if each is None else each for each in rotation.degrees]
-    degrees = any(said[at] for at in angles if at not in rotation.absent)
-    radians_at = tuple(at for at in angles if degrees and not said[at])
-    first = 0 if unit is None else len(XYZ)
-    absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
-    if rotation.whole:
-        return Shape(POSE, None, form, degrees, whole=True)
-    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent)
-
-
 def _target(shapes: Sequence[Shape], request: Request) -> Target:
     """Choose how results are written: as they were read unless told."""
     shape = shapes[0] if shapes else Shape(POSE)
@@ -139,16 +116,16 @@ def _target(shapes: Sequence[Shape], request: Request) -> Target:
     if request.notations or shape.notation is None:
         notations = request.notations
         if not notations and not _only_turns_around(request):
-            notations = (notation("quaternion"),)
-        forms = tuple((form, request.in_degrees(form)) for form in notations)
+            notations = (parse_notation("quaternion"),)
+        written = tuple((notation, request.in_degrees(notation)) for notation in notations)
         whole = placed and _is_whole(notations)
         unit = None if whole or not (placed or _shifts(request)) else shape.unit or 1.0
-        return Target(unit, forms, request.keep_sign, whole)
+        return Target(unit, written, request.keep_sign, whole)
     unit = None if shape.whole or not (placed or _shifts(request)) else shape.unit or 1.0
     first = len(XYZ) * (unit is not None and shape.unit is None)  # a position comes in front
     absent = tuple(first + at for at in shape.absent)
-    form = (shape.notation, shape.degrees)
-    return Target(unit, (form,), request.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
+    notation = (shape.notation, shape.degrees)
+    return Target(unit, (notation,), request.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
 
 
 def _only_turns_around(request: Request) -> bool:
@@ -196,9 +173,9 @@ def _first_called(names: Sequence[str], table: Table) -> int | None:
 def _place(name: str, names: Sequence[str], source: str) -> int:
     """Return the place of a column; raises Misused for one that is not there, or twice."""
     if name not in names:
-        raise Misused(f"no column {name!r}{alternatives(name, names, 'columns')}", source=source, line=1)
+        raise Misused(f"no column {shown(name)}{alternatives(name, names, 'columns')}", source=source, line=1)
     if names.count(name) > 1:
-        raise Misused(f"column {name!r} stands twice", source=source, line=1)
+        raise Misused(f"column {shown(name)} stands twice", source=source, line=1)
     return names.index(name)
 
 
@@ -255,7 +232,7 @@ def _in_place(pose: PoseColumns, shape: Shape, target: Target, request: Request)
 
 def _same(pose: PoseColumns, target: Target) -> bool:
     """Tell whether a rotation is written in the notation it was read in."""
-    return pose.rotation is not None and [form for form, _ in target.notations] == [pose.rotation.notation]
+    return pose.rotation is not None and [notation for notation, _ in target.notations] == [pose.rotation.notation]
 
 
 def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request) -> list[list[New]]:

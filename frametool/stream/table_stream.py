@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError
+from frametool.errors import FormatError, FrametoolError
 from frametool.stream.blocks import Run, State
-from frametool.stream.faults import Fault
+from frametool.stream.faults import NULL, Fault
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.table import UNCLOSED, open_table, table_block
@@ -22,14 +24,16 @@ if TYPE_CHECKING:
     from frametool.stream.blocks import Plan
     from frametool.stream.output_columns import Layout
     from frametool.stream.request import Request
+    from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
-    from frametool.text.lines import Source
+    from frametool.text.lines import ByteStream
 
-DELIMITERS = {"csv": b",", "tsv": b"\t", "columns": b"", "tum": b""}
+STAMPS = re.compile(r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
+DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b""}
 
 
 def run_table(
-    stream: Source,
+    stream: ByteStream,
     form: str,
     request: Request,
     *,
@@ -46,16 +50,17 @@ def run_table(
         raise FormatError("nothing in it", source=source)
     table, rest = open_table(first, delimiter, header=header, source=source)
     table = _as_tum(table, form, request)
-    if request.timed is not None and not request.timed.name:
-        request = request._replace(timed=None)  # rows have no header
+    unasked = None
+    if request.timed is not None and not request.timed.name:  # rows have no header
+        unasked, request = _stamps_unasked(table, request.timed), request._replace(timed=None)
     plan, layout = plan_table(table, request, source)
     taken = len(first) - len(rest)
     yield Outcome(table.opening(layout), lines=first.count(b"\n", 0, taken), size=taken)
-    work = TableWork(table, plan, layout, Naming(table, layout, request))
+    work = TableWork(table, plan, layout, Naming(table, layout, request), unasked)
     yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
 
 
-def _blocks(stream: Source, delimiter: bytes, size: int) -> Iterator[bytes]:
+def _blocks(stream: ByteStream, delimiter: bytes, size: int) -> Iterator[bytes]:
     """Return blocks of whole rows; cells in quotes may hold line ends."""
     size = size or BLOCK_BYTES
     if not delimiter:
@@ -80,15 +85,22 @@ def _as_tum(table: Table, form: str, request: Request) -> Table:
     return table._replace(names=TUM, width=len(TUM))
 
 
+def _stamps_unasked(table: Table, timed: Timed) -> Timed | None:
+    """Find a column of stamps that no option names."""
+    name = next(filter(STAMPS.fullmatch, table.names or ()), None)
+    return None if name is None else timed._replace(name=name)
+
+
 class TableWork:
     """Turn one block of a table after the other into its outcome; keeps what one block leaves for the next."""
 
-    def __init__(self, table: Table, plan: Plan, layout: Layout, naming: Naming) -> None:
-        """Begin before the first row."""
+    def __init__(self, table: Table, plan: Plan, layout: Layout, naming: Naming, unasked: Timed | None) -> None:
+        """Take the plan of a table; `unasked` are the stamps that rows have and nobody asked for."""
         self.table = table
         self.plan = plan
         self.layout = layout
         self.naming = naming
+        self.unasked = unasked
         self.state = State()
 
     def __call__(self, text: bytes) -> Outcome:
@@ -101,11 +113,14 @@ class TableWork:
         return done._replace(faults=[*done.faults, fault])
 
     def _done(self, text: bytes) -> Outcome:
-        block = table_block(self.table, self.layout, text, self.naming)
+        block = table_block(self.table, self.layout, text, self.naming, nulls=self.plan.on_error == NULL)
         run = Run(self.plan, block, self.state)
         faults = run.faults()
         notes = [RowNote.of_degrees(block.line_of(row), angle) for row, angle in run.doubted[:1]]
         notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.lost]
+        if self.unasked is not None and len(block.places) and _moves(self.unasked, set(block.frames) or {None}):
+            notes.append(RowNote.of_latest(block.line_of(0), self.unasked.name))
+            self.unasked = None
         notes += [RowNote.of_rounding(block.line_of(row)) for row in sorted(run.mended)[:1]]
         rows = len(block.places) + len(block.broken)
         return Outcome(
@@ -117,3 +132,12 @@ class TableWork:
             sorted(notes),
             len(text),
         )
+
+
+def _moves(timed: Timed, frames: set[str | None]) -> bool:
+    """Tell whether the way from one of some frames depends on the time; rows of unknown frames say so themselves."""
+    for frame in frames:
+        with suppress(FrametoolError):
+            if timed.moves(frame):
+                return True
+    return False

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     Process = Callable[[bytes], Outcome]
 
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_WAITING = 2  # blocks a worker may have ahead: memory stays flat
 
 
@@ -34,7 +35,7 @@ class WorkerDied(FrametoolError):
     exit_code = 5
 
 
-class Answer(NamedTuple):
+class Reply(NamedTuple):
     """What a worker sends back for a block: its outcome, or what was raised instead, and the warnings."""
 
     outcome: Outcome | None
@@ -104,7 +105,11 @@ class Worker:
         context = get_context("fork")
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(process, theirs, [*others, self.connection]), daemon=True)
-        self.process.start()
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # no handler of the parent's may run in the worker
+        try:
+            self.process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         theirs.close()
 
     def send(self, block: bytes) -> None:
@@ -114,10 +119,10 @@ class Worker:
         except OSError:
             raise self._died() from None
 
-    def receive(self) -> Answer:
+    def receive(self) -> Reply:
         """Wait for the answer to the oldest block."""
         try:
-            answer: Answer = self.connection.recv()
+            answer: Reply = self.connection.recv()
         except (EOFError, OSError):
             raise self._died() from None
         return answer
@@ -136,11 +141,12 @@ class Worker:
 
 
 def _work(process: Process, connection: Connection, others: list[Connection]) -> None:
-    """Answer blocks until the parent is gone, which also ends a block that is being worked on."""
+    """Reply blocks until the parent is gone, which also ends a block that is being worked on."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent hears it too, and ends its workers
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    for number in ENDING[1:]:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
     for other in others:
         other.close()
     blocks: SimpleQueue[bytes] = SimpleQueue()
@@ -160,10 +166,10 @@ def _work(process: Process, connection: Connection, others: list[Connection]) ->
         os._exit(1)  # the parent is gone, or there is no memory: it notices, and nobody else has to be told
 
 
-def _answer(process: Process, block: bytes) -> Answer:
+def _answer(process: Process, block: bytes) -> Reply:
     warned: list[tuple[str, str, type[FrametoolWarning]]] = []
     try:
         with heard_by(lambda *warning: warned.append(warning)):
-            return Answer(process(block), None, warned)
+            return Reply(process(block), None, warned)
     except Exception as error:  # noqa: BLE001 - raised again by the parent
-        return Answer(None, error, warned)
+        return Reply(None, error, warned)

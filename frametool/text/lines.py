@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Protocol
 
-    class Source(Protocol):
+    class ByteStream(Protocol):
         """A binary stream that gives what has arrived."""
 
         def read1(self, size: int, /) -> bytes:
@@ -36,7 +36,7 @@ def whole_lines(text: bytes) -> int:
 
 
 def read_blocks(
-    stream: Source,
+    stream: ByteStream,
     *,
     size: int = BLOCK_BYTES,
     longest: int = LONGEST_RECORD,
@@ -52,7 +52,7 @@ def read_blocks(
     ready = _readiness(stream)
     begun: list[bytes] = []  # the beginning of a record
     pieces: list[bytes] = []  # what follows it
-    held = 0
+    held, line = 0, 1
     while piece := _read_piece(stream, min(size, longest - held), ready):
         pieces.append(piece)
         held += len(piece)
@@ -60,20 +60,21 @@ def read_blocks(
             text = b"".join(pieces)
             end = whole(text)
             if end > 0:
-                yield b"".join((*begun, text[:end]))
+                block = b"".join((*begun, text[:end]))
+                yield block
+                line += block.count(b"\n")
                 begun, held = [], len(text) - end
             elif end < 0:
                 begun.append(text[:-end])
             pieces = [text[abs(end) :]]
         if held >= longest:
-            raise FormatError(
-                f"a record is longer than {longest} bytes: this is no text in lines, or a quote is not closed"
-            )
+            what = f"the record that begins in line {line} is longer than {longest} bytes"
+            raise FormatError(f"{what}: this is no text in lines, or a quote is not closed")
     if rest := b"".join((*begun, *pieces)):
         yield rest
 
 
-def _read_piece(stream: Source, size: int, ready: Callable[[int], bool]) -> bytes:
+def _read_piece(stream: ByteStream, size: int, ready: Callable[[int], bool]) -> bytes:
     """Read what has arrived, and what arrives right after it if that is much."""
     piece = stream.read1(size)
     if not piece or len(piece) >= size:
@@ -90,7 +91,7 @@ def _read_piece(stream: Source, size: int, ready: Callable[[int], bool]) -> byte
     return b"".join(pieces)
 
 
-def _readiness(stream: Source) -> Callable[[int], bool]:
+def _readiness(stream: ByteStream) -> Callable[[int], bool]:
     """Return a function that tells whether more comes within so many milliseconds; False if it cannot tell."""
     import select
 

@@ -6,9 +6,10 @@ octal, hexadecimal, underscores) is refused with the reason.  An angle may also 
 
 from __future__ import annotations
 
+import math
 import re
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ _MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
 _BARE_STAR = r"[-+]? ?\*"
 _UNITS = {"deg": "deg", "°": "deg", "rad": "rad"}
 _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
-LONGEST_SHOWN = 60
 
 
 class NotFinite(ValueInvalid):
@@ -69,6 +69,19 @@ def parse_angle(text: str) -> Angle:
     raise _refusal(text, explain_angle(text))
 
 
+def read_number_or_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
+    """Read a cell: a plain number, or an angle, which may say its own unit, in degrees or radians.
+
+    Raises ValueInvalid.
+    """
+    if degrees is None:
+        return parse_number(text)
+    value, unit = parse_angle(text)
+    if unit is None or (unit == "deg") == degrees:
+        return value
+    return math.degrees(value) if degrees else math.radians(value)
+
+
 def _refusal(text: str, message: str) -> ValueInvalid:
     """Make the error: what reads as a number and is none that can be used is told from what is no number."""
     return NotFinite(message) if _reason(text) == _NOT_FINITE else ValueInvalid(message)
@@ -83,14 +96,6 @@ def _degrees_of_pi(text: str, sign: str, factor: str | None, divisor: str | None
     if degrees == _INFINITE:
         raise NotFinite(f"{shown(text)} is not finite")
     return -degrees if sign == "-" else degrees
-
-
-def shown(text: str) -> str:
-    """Quote a text for a message: escaped, and cut to 60 characters, escapes included."""
-    kept = text[:LONGEST_SHOWN]
-    while len(repr(kept)) > LONGEST_SHOWN + 2:
-        kept = kept[:-1]
-    return repr(text) if kept == text else f"{kept!r}... ({len(text)} characters)"
 
 
 def explain_number(text: str) -> str:

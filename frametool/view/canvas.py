@@ -2,45 +2,62 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
 BRAILLE = 0x2800
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # by row, then column of a cell
 
 
 class Canvas:
-    """A square of so many cells, twice as many across as down; places run from 0 to 1, y up."""
+    """Some lines of cells; a terminal's cell is about twice as high as wide, so that dots are about square."""
 
-    def __init__(self, lines: int) -> None:
-        """Make an empty one; a terminal's cell is about twice as high as wide."""
+    def __init__(self, lines: int, columns: int | None = None) -> None:
+        """Create an empty one, a square where the columns are not given."""
         self.lines = lines
-        self.columns = 2 * lines
-        self._cells: dict[tuple[int, int], tuple[int, str]] = {}
+        self.columns = 2 * lines if columns is None else columns
+        self._cells: dict[tuple[int, int], tuple[int, str, int]] = {}
 
     def clear(self) -> None:
         """Wipe all dots."""
         self._cells.clear()
 
     def dot(self, x: float, y: float, colour: str) -> None:
-        """Set a dot; the cell takes its colour."""
-        across, down = self._dots(x, y)
+        """Set the dot of a place, 0 to 1 with y up; the cell takes its colour."""
+        self.mark(*self._dots(x, y), colour)
+
+    def mark(self, across: int, down: int, colour: str, rank: int = 0) -> None:
+        """Set a dot by its number from the left and the top; of several in a cell the highest rank colours it."""
+        if not (0 <= across < 2 * self.columns and 0 <= down < 4 * self.lines):
+            return
         cell = down // 4, across // 2
-        bits, _ = self._cells.get(cell, (0, colour))
-        self._cells[cell] = bits | DOTS[down % 4][across % 2], colour
+        bits, before, before_rank = self._cells.get(cell, (0, colour, rank))
+        kept = (colour, rank) if rank >= before_rank else (before, before_rank)
+        self._cells[cell] = bits | DOTS[down % 4][across % 2], *kept
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
         """Return line and column of a place."""
         across, down = self._dots(x, y)
         return down // 4, across // 2
 
+    def rank(self, line: int, column: int) -> int:
+        """Return the rank of a cell; -1 if it is empty."""
+        return self._cells.get((line, column), (0, "", -1))[2]
+
     def row(self, line: int) -> Iterator[tuple[str, str]]:
         """Yield the characters of a line, each with its colour."""
         for column in range(self.columns):
-            bits, colour = self._cells.get((line, column), (0, ""))
+            bits, colour, _ = self._cells.get((line, column), (0, "", 0))
             yield (chr(BRAILLE + bits) if bits else " "), colour
+
+    def runs(self, line: int, over: Mapping[tuple[int, int], tuple[str, str]]) -> list[tuple[str, str]]:
+        """Return a line as pieces of one colour; `over` holds what stands in cells instead of dots."""
+        cells = (over.get((line, column), cell) for column, cell in enumerate(self.row(line)))
+        return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(cells, key=itemgetter(1))]
 
     def _dots(self, x: float, y: float) -> tuple[int, int]:
         across = int(x * 2 * self.columns)

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.view.plot_svg import document
+from frametool.view.shapes import Picture, PictureBox, PictureWords
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.sim.sweep import SweepResult
+    from frametool.view.shapes import Shape
 
-SIDE = 400  # pixels of a map
-MARGIN = 70
-BAR = 15
+SIDE = 400.0  # pixels of a map
+MARGIN = 70.0
+BAR = 15.0
+SHADES = 50  # of the bar
 # viridis at five places, dark for little
 STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
 
 
-class Map(NamedTuple):
-    """One map: what it shows, and a row of values for each linear gain; nan is left empty."""
+class GainMap(NamedTuple):
+    """One map: what it shows, its values in a row for each linear gain, nan where there is none, and the gains."""
 
     title: str
     values: Sequence[Sequence[float]]
+    linear: Sequence[float]
+    angular: Sequence[float]
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -31,73 +35,54 @@ class Map(NamedTuple):
         return (min(known), max(known)) if known else (0.0, 0.0)
 
 
-def plot(gain_linear: Sequence[float], gain_angular: Sequence[float], many: SweepResult, suffix: str) -> str | bytes:
-    """Return the maps as a picture of the kind that a suffix names: .svg, .html, .png."""
-    maps = [Map("time to reach (s)", many.time_to_reach.tolist()), Map("overshoot (m)", many.overshoot.tolist())]
-    if suffix == ".png":
-        return _png(maps, gain_linear, gain_angular)
-    parts = [part for index, each in enumerate(maps) for part in _map(each, index, gain_linear, gain_angular)]
-    svg = document(2 * (SIDE + 2 * MARGIN), SIDE + 2 * MARGIN, parts)
-    return svg if suffix == ".svg" else f'<!DOCTYPE html>\n<meta charset="utf-8"><title>sweep</title>\n{svg}'
+def sweep_picture(gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult) -> Picture:
+    """Draw both maps side by side."""
+    columns = {"time to reach (s)": result.time_to_reach, "overshoot (m)": result.overshoot}
+    maps = [GainMap(title, values.tolist(), gain_linear, gain_angular) for title, values in columns.items()]
+    shapes = [shape for index, each in enumerate(maps) for shape in _map(each, MARGIN + index * (SIDE + 2.0 * MARGIN))]
+    return Picture(2.0 * (SIDE + 2.0 * MARGIN), SIDE + 2.0 * MARGIN, shapes)
 
 
-def _map(each: Map, index: int, gain_linear: Sequence[float], gain_angular: Sequence[float]) -> Iterator[str]:
+def _map(each: GainMap, left: float) -> Iterator[Shape]:
     """Draw one map: a rectangle for each pair, linear gains upwards, angular gains to the right."""
-    left, top = MARGIN + index * (SIDE + 2 * MARGIN), MARGIN
-    high, wide = SIDE / len(gain_linear), SIDE / len(gain_angular)
-    yield f'<text x="{left}" y="{top - 12}" font-size="14">{each.title}</text>\n'
-    for row, values in enumerate(each.values):
-        for column, value in enumerate(values):
-            corner = f'x="{left + column * wide:.2f}" y="{top + SIDE - (row + 1) * high:.2f}"'
-            label = f"linear {gain_linear[row]:g}, angular {gain_angular[column]:g}: {value:.4g}"
-            look = f'width="{wide:.2f}" height="{high:.2f}" fill="{_colour(value, each.bounds)}"'
-            yield f"<rect {corner} {look}><title>{label}</title></rect>\n"
-    yield from _axes(left, top, gain_linear, gain_angular)
-    yield from _bar(left + SIDE + 10, top, each.bounds)
+    high, wide = SIDE / len(each.linear), SIDE / len(each.angular)
+    yield PictureWords(left, MARGIN - 16.0, each.title, size=14.0)
+    for row, (linear, values) in enumerate(zip(each.linear, each.values, strict=True)):
+        for column, (angular, value) in enumerate(zip(each.angular, values, strict=True)):
+            label = f"linear {linear:g}, angular {angular:g}: {value:.4g}"
+            x, y = left + column * wide, MARGIN + SIDE - (row + 1) * high
+            yield PictureBox(x, y, wide, high, _colour(value, each.bounds), label)
+    yield from _gains(each, left)
+    yield from _bar(left + SIDE + 10.0, each.bounds)
 
 
-def _axes(left: float, top: float, gain_linear: Sequence[float], gain_angular: Sequence[float]) -> Iterator[str]:
+def _gains(each: GainMap, left: float) -> Iterator[Shape]:
     """Name the gains at the ends of both sides."""
-    below = top + SIDE + 16
-    yield f'<text x="{left}" y="{below}">{gain_angular[0]:g}</text>'
-    yield f'<text x="{left + SIDE}" y="{below}" text-anchor="end">{gain_angular[-1]:g}</text>'
-    yield f'<text x="{left + SIDE / 2}" y="{below}" text-anchor="middle">angular gain (1/s)</text>\n'
-    yield f'<text x="{left - 6}" y="{top + SIDE}" text-anchor="end">{gain_linear[0]:g}</text>'
-    yield f'<text x="{left - 6}" y="{top + 10}" text-anchor="end">{gain_linear[-1]:g}</text>'
-    turned = f"translate({left - 12} {top + SIDE / 2}) rotate(-90)"
-    yield f'<text transform="{turned}" text-anchor="middle">linear gain (1/s)</text>\n'
+    below, bottom = MARGIN + SIDE + 14.0, MARGIN + SIDE
+    yield PictureWords(left, below, f"{each.angular[0]:g}")
+    yield PictureWords(left + SIDE / 2.0, below, "angular gain (1/s)", anchor="middle")
+    yield PictureWords(left + SIDE, below, f"{each.angular[-1]:g}", anchor="end")
+    yield PictureWords(left - 6.0, bottom - 6.0, f"{each.linear[0]:g}", anchor="end")
+    yield PictureWords(left - 14.0, MARGIN + SIDE / 2.0, "linear gain (1/s)", anchor="middle", turn=-90.0)
+    yield PictureWords(left - 6.0, MARGIN + 6.0, f"{each.linear[-1]:g}", anchor="end")
 
 
-def _bar(left: float, top: float, bounds: tuple[float, float]) -> Iterator[str]:
+def _bar(left: float, bounds: tuple[float, float]) -> Iterator[Shape]:
     """Draw what the colours mean."""
     low, high = bounds
-    for step in range(50):
-        colour = _colour(step / 49, (0.0, 1.0))
-        corner = f'x="{left}" y="{top + SIDE * (49 - step) / 50:.1f}"'
-        yield f'<rect {corner} width="{BAR}" height="{SIDE / 50 + 0.5}" fill="{colour}"/>'
-    yield f'\n<text x="{left}" y="{top - 4}">{high:.3g}</text><text x="{left}" y="{top + SIDE + 14}">{low:.3g}</text>\n'
+    for shade in range(SHADES):
+        y = MARGIN + SIDE * (SHADES - 1 - shade) / SHADES
+        yield PictureBox(left, y, BAR, SIDE / SHADES + 0.5, _colour(shade / (SHADES - 1), (0.0, 1.0)))
+    yield PictureWords(left, MARGIN - 8.0, f"{high:.3g}")
+    yield PictureWords(left, MARGIN + SIDE + 14.0, f"{low:.3g}")
 
 
 def _colour(value: float, bounds: tuple[float, float]) -> str:
-    """Return the colour of a value between its bounds; none for nan."""
+    """Return the colour of a value between its bounds; that of the paper for nan."""
     if value != value:  # noqa: PLR0124 - nan
-        return "none"
+        return "paper"
     low, high = bounds
     place = (value - low) / (high - low) * (len(STOPS) - 1) if high > low else 0.0
     at = min(int(place), len(STOPS) - 2)
     mixed = (round(a + (b - a) * (place - at)) for a, b in zip(STOPS[at], STOPS[at + 1], strict=True))
     return f"#{''.join(f'{part:02x}' for part in mixed)}"
-
-
-def _png(maps: Sequence[Map], gain_linear: Sequence[float], gain_angular: Sequence[float]) -> bytes:
-    """Draw the maps with matplotlib."""
-    from frametool.view.plot_png import as_png, figure
-
-    drawn: Any = figure(11.0, 4.6)
-    sides = {"xlabel": "angular gain (1/s)", "ylabel": "linear gain (1/s)"}
-    ends = (gain_angular[0], gain_angular[-1], gain_linear[0], gain_linear[-1])
-    extent = ends if ends[0] != ends[1] and ends[2] != ends[3] else None
-    for index, each in enumerate(maps):
-        axes = drawn.add_subplot(1, 2, index + 1, title=each.title, **sides)
-        drawn.colorbar(axes.imshow(each.values, origin="lower", aspect="auto", extent=extent))
-    return as_png(drawn)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import groupby
-from operator import itemgetter
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -95,9 +93,8 @@ class Screen:
         }
         text = Text()
         for line in range(canvas.lines):
-            cells = [turtles.get((line, column), cell) for column, cell in enumerate(canvas.row(line))]
-            for colour, run in groupby(cells, key=itemgetter(1)):
-                text.append("".join(character for character, _ in run), f"{colour} {STYLE}".strip())
+            for run, colour in canvas.runs(line, turtles):
+                text.append(run, f"{colour} {STYLE}".strip())
             text.append("\n")
         text.append("".join(f"{_sentence(command)}\n" for command in self._last.values()))
         text.append("\n".join(self._talk), "dim")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from itertools import zip_longest
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import printable
@@ -20,7 +22,12 @@ if TYPE_CHECKING:
 OVERVIEW = [name + unit for name, row in REPRESENTATIONS.items() for unit in row.overview]
 
 
-class Line(NamedTuple):
+WIDTH = 80
+DECIMALS = 6  # of an overview
+ENDLESS = 1e9  # where that many decimals say nothing
+
+
+class NumberLine(NamedTuple):
     """One line of a description: what it is, its numbers with their names, their unit."""
 
     label: str
@@ -38,7 +45,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     rows = [
         (record.get("frame"), next(value for value in record.values() if isinstance(value, list))) for record in records
     ]
-    aligned = _aligned([[_number(value, style) for value in numbers] for _, numbers in rows])
+    aligned = _aligned([[style.number(value + 0.0) for value in numbers] for _, numbers in rows])
     lines = [
         f"{'  '.join(cells)}  {f'm in {frame}' if frame else 'm'}"
         for cells, (frame, _) in zip(aligned, rows, strict=True)
@@ -49,13 +56,13 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 def _describe(result: Result, style: Style) -> str:
     """Return the heading and the aligned lines of one pose."""
     pose = result.pose
-    lines: list[Line] = []
+    lines: list[NumberLine] = []
     if pose.position is not None:
-        lines.append(Line("translation", list(zip("xyz", pose.position, strict=True)), "m"))
+        lines.append(NumberLine("translation", list(zip("xyz", pose.position, strict=True)), "m"))
     if pose.rotation is not None:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)
-    lines += [Line(*extra) for extra in _extra_lines(result)]
+    lines += [NumberLine(*extra) for extra in _extra_lines(result)]
     return _heading(result) + _layout(lines, style)
 
 
@@ -72,17 +79,17 @@ def _heading(result: Result) -> str:
     return f"{source} seen from {target}{across}  (maps points in {name} to points in {parent})\n"
 
 
-def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Line]:
+def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[NumberLine]:
     """Yield the lines of one notation."""
     row, numbers = notation.representation, rotation_numbers(pose, notation, style)
     if row.shape == ROWS:
         for at, each in enumerate(rotation_entry(pose, notation, style)[1][: math.isqrt(len(numbers))]):
-            yield Line("" if at else notation.label, [("", value) for value in each], "")
+            yield NumberLine("" if at else notation.label, [("", value) for value in each], "")
         return
     unit = ("deg" if style.in_degrees(notation) else "rad") if row.angles else ""
+    yield NumberLine(notation.label, list(zip(notation.names, numbers, strict=True)), unit)
     if is_locked(pose, notation):
-        unit += "  (gimbal lock: not unique, third angle set to 0)"
-    yield Line(notation.label, list(zip(notation.names, numbers, strict=True)), unit)
+        yield NumberLine("", [], "gimbal lock: not unique, third angle set to 0")
 
 
 def _extra_lines(result: Result) -> Iterator[tuple[str, Sequence[tuple[str, float]], str]]:
@@ -93,21 +100,53 @@ def _extra_lines(result: Result) -> Iterator[tuple[str, Sequence[tuple[str, floa
             yield key.removesuffix("_deg"), [("", value)], units.get(key, "")
 
 
-def _layout(lines: Sequence[Line], style: Style) -> str:
-    """Align labels, names and numbers in columns."""
-    width = max(len(line.label) for line in lines)
-    named = max((len(name) for line in lines for name, _ in line.cells), default=0)
+def _layout(lines: Sequence[NumberLine], style: Style) -> str:
+    """Align names and numbers in columns; where that is too wide each part stands for itself, or each number."""
+    label = max(len(line.label) for line in lines)
+    width = get_terminal_size((WIDTH, 0)).columns
+    parts: list[list[NumberLine]] = []
+    for line in lines:
+        if line.label or not parts:
+            parts.append([])
+        parts[-1].append(line)
+    for split in (list(lines),), parts:
+        texts = [_columns(part, label, style) for part in split]
+        if max(len(text) for part in texts for text in part) <= width:
+            break
+    return "".join(
+        text
+        for part, rows in zip(split, texts, strict=True)
+        for text in (rows if max(map(len, rows)) <= width else _columns(_stacked(part), label, style))
+    )
+
+
+def _columns(lines: Sequence[NumberLine], label: int, style: Style) -> list[str]:
+    """Write lines with their names and numbers in columns."""
     numbers = _aligned([[_number(value, style) for _, value in line.cells] for line in lines])
-    text = ""
+    columns = zip_longest(*(line.cells for line in lines), fillvalue=("", 0.0))
+    names = [max(len(name) for name, _ in column) for column in columns]
+    texts = []
     for line, cells in zip(lines, numbers, strict=True):
-        columns = [f"{name:>{named}} {cell}" for (name, _), cell in zip(line.cells, cells, strict=True)]
-        text += f"  {line.label:<{width}} {' '.join(columns)}  {line.unit}".rstrip() + "\n"
-    return text
+        named = [
+            f"{name:>{names[at]}} {cells[at]}" if names[at] else cells[at] for at, (name, _) in enumerate(line.cells)
+        ]
+        texts.append("  ".join([f"  {line.label:<{label}}", " ".join(named), line.unit]).rstrip() + "\n")
+    return texts
+
+
+def _stacked(lines: Sequence[NumberLine]) -> list[NumberLine]:
+    """Put each number on a line of its own."""
+    return [
+        NumberLine(line.label * (not at), [cell], line.unit) for line in lines for at, cell in enumerate(line.cells)
+    ]
 
 
 def _number(value: float, style: Style) -> str:
-    """Write a number for a person: no minus before zero."""
-    return style.number(value + 0.0)
+    """Write a number for a person: some decimals in an overview, all digits of what was asked for, no minus zero."""
+    text = style.number(value + 0.0)
+    if style.precision is None and not style.full and len(style.notations) != 1:
+        text = f"{value:.{DECIMALS}f}" if abs(value) < ENDLESS else f"{value:.{DECIMALS}e}"
+    return text.removeprefix("-") if not float(text) else text
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[list[str]]:

@@ -33,9 +33,10 @@ COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "jumps": ("jumps", str),
     "backward": ("back", str),
     "parent_changes": ("reparented", str),
+    "topics": ("topics", str),
 }
 RARE = ("parent_changes",)  # left out where all are 0
-LEFT = ("parent", "child")
+LEFT = ("parent", "child", "topics")
 
 
 def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noqa: ARG001 - the numbers here are for reading

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable
@@ -37,13 +36,11 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 def print_tree(tree: Frames, style: Style, color: str = "auto") -> None:
     """Draw a tree on the terminal, in colour where it has any, or as `color` says: always or never."""
-    from rich.console import Console
     from rich.text import Text
 
-    console = Console(
-        file=sys.stdout, highlight=False, soft_wrap=True, no_color=True if color == "never" else None,
-        force_terminal=True if color == "always" else None, color_system="auto" if color == "auto" else "standard",
-    )  # fmt: skip
+    from frametool.view.terminal_console import coloured_console
+
+    console = coloured_console(color)
     for line, pad in _padded(tree, style):
         name = "bold green" if not line.label else "bold"
         console.print(Text.assemble((line.branch, "dim"), (line.frame, name), pad, ("  ".join(line.label), "cyan")))

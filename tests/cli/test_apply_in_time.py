@@ -177,3 +177,24 @@ def test_a_column_that_is_not_there_is_told_with_those_that_are(move: Run) -> No
 def test_a_fixed_transform_has_no_times(run: Run) -> None:
     outcome = run("apply", "--transform", "{xyz: [1, 2, 3]}", "--time-column", "stamp", stdin="stamp,x,y,z\n1,0,0,0\n")
     assert (outcome.status, outcome.out) == (2, "")
+
+
+@pytest.mark.parametrize("column", ["stamp", "t", "timestamp [s]", "header.stamp", "time_ns"])
+@pytest.mark.parametrize("source", [("base",), ()])
+def test_stamps_that_nobody_asks_for_are_told_once_where_the_tree_moves(
+    run: Run, column: str, source: tuple[str, ...]
+) -> None:
+    still = "frames: [{name: map}, {name: base, parent: map, xyz: [1, 0, 0]}]"
+    moving = "frames: [{name: base, parent: map, samples: [{stamp: 0, xyz: [1, 0, 0]}, {stamp: 9, xyz: [3, 0, 0]}]}]"
+    rows = f"{column},frame_id,x,y,z\n" + "0,base,0,0,0\n" * 3
+    quiet = run("apply", "t.yaml", "map", *source, stdin=rows, files={"t.yaml": still})
+    told = run("apply", "t.yaml", "map", *source, stdin=rows, files={"t.yaml": moving})
+    chosen = run("apply", "t.yaml", "map", *source, "--at", "9", stdin=rows, files={"t.yaml": moving})
+    assert (quiet.err, chosen.err) == ("", "")
+    assert chosen.out == told.out
+    assert told.err.count("give --time-column") == 1
+    assert told.err.startswith(f"frametool: warning: stdin:2: column {column!r} is not looked at")
+
+
+def test_a_pose_is_the_same_at_all_times(run: Run) -> None:
+    assert run("apply", "--transform", "{xyz: [1, 0, 0]}", stdin="t,x,y,z\n0,0,0,0\n").err == ""

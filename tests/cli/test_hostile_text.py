@@ -59,10 +59,10 @@ def test_a_nul_ends_no_name(tmp_path: Path) -> None:
     tree = tmp_path / "tree.yaml"
     tree.write_text("frames: [{name: map, parent: world, xyz: [1, 0, 0]}]")
     for options, cell in ((["world", "--source-column", "f"], b"1,map\0junk"), (["map", "--target-column", "f"], b"1,world\0")):
-        status, out, err = run("lookup", str(tree), *options, "--on-error", "skip", text=b"i,f\n" + cell + b"\n")
+        status, out, err = run("lookup", str(tree), *options, "--in", "csv", "--on-error", "skip", text=b"i,f\n" + cell + b"\n")
         assert (status, out.count(b"\n")) == (3, 1), err
         assert b"unknown frame" in err
-    both = ["--target-column", "f", "--source-column", "g", "--on-error", "skip"]
+    both = ["--target-column", "f", "--source-column", "g", "--in", "csv", "--on-error", "skip"]
     assert run("lookup", str(tree), *both, text=b"f,g\nworld\0map,map\nworld,map\n")[0] == 3
 
 

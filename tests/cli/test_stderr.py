@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import frametool
-from frametool.errors import FrametoolWarning, Tf2Warning, heard_by, overheard, quoted, warn
+from frametool.errors import FrametoolWarning, Tf2Warning, heard_by, overheard, shown, warn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 PACKAGE = Path(frametool.__file__).parent
 TALKING = {"echo", "secho", "warn", "catch_warnings", "print"}  # as names of functions
-ALLOWED = {("errors.py", "warn"), ("cli/stderr.py", "print"), ("view/tree_text.py", "print")}
+ALLOWED = {
+    ("errors.py", "warn"), ("cli/stderr.py", "print"), ("view/tree_text.py", "print"),
+    ("view/png.py", "catch_warnings"),  # what a drawing library says of fonts
+}  # fmt: skip
 MOVE = ["apply", "--transform", "{xyz: [1, 0, 0]}"]
 LINES = '{"xyz": [1, 2, 3]}\n{"xyz": [1, "?", 3]}\n{"xyz": [4, 5, 6]}\n'
 
@@ -41,7 +44,7 @@ def calls(path: Path) -> set[str]:
 
 def test_nothing_is_printed_but_by_the_sink_and_the_voice() -> None:
     found = {(str(path.relative_to(PACKAGE)), name) for path in PACKAGE.rglob("*.py") for name in calls(path)}
-    assert found == ALLOWED
+    assert found <= ALLOWED
 
 
 @pytest.mark.parametrize("on_error", ["skip", "null", "stop"])
@@ -82,8 +85,8 @@ def test_the_innermost_listener_hears_a_warning() -> None:
 @pytest.mark.parametrize(
     "text", ["", "a", "'", "\"'" * 40, "\x1b[31m" * 20, "x" * 60, "x" * 10**6, "\0" * 61, "\U0010ffff" * 30, "\udcff"]
 )
-def test_what_is_quoted_is_one_short_printable_line(text: str) -> None:
-    assert quoted(text).isprintable()
-    assert len(quoted(text)) <= 60
+def test_what_is_shown_is_one_short_printable_line(text: str) -> None:
+    assert shown(text).isprintable()
+    assert len(shown(text).removesuffix(f"... ({len(text)} characters)")) <= 60
     if len(repr(text)) <= 60:
-        assert quoted(text) == repr(text)
+        assert shown(text) == repr(text)

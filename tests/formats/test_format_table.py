@@ -173,3 +173,19 @@ def test_the_form_of_the_result_does_not_steer_how_the_input_is_read(
 ) -> None:
     tree = "{name: a, parent: map, xyz: [1, 0, 0]}"
     assert f"read as {form} " in run("apply", tree, "map", "a", "-v", *output, stdin=text).err
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ("x,y,z\n1,2,3\n".encode("utf-16"), "UTF-16, which is not read here"),
+        ("x,y,z\n1,2,3\n".encode("utf-16-le"), "UTF-16LE without a byte order mark"),
+        (b"\x89PNG\r\n\x1a\n\0\0", "not text but a PNG picture"),
+        (bytes(range(256)), "not text but binary data"),
+    ],
+)
+@pytest.mark.parametrize("name", ["", "a.csv", "a.jsonl"])
+def test_a_stream_of_what_is_no_utf_8_is_named_as_what_it_is(data: bytes, said: str, name: str) -> None:
+    with pytest.raises(FormatError, match=said) as caught:
+        detect(data, "rows", "records", name=name)
+    assert not caught.value.snippet

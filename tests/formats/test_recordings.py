@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+import random
 import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from frametool.documents import chunks
-from frametool.errors import FileProblem, FormatError, FrametoolWarning
+from frametool.errors import FileProblem, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
 from frametool.formats.recordings import Recording
 from frametool.grammar.result import Style
-from frametool.ros.echo_format import message_text
+from frametool.ros.echo_format import message_text, stamp
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from frametool.grammar.edges import Edge
@@ -187,8 +189,11 @@ def test_fast_and_full_reading_agree_on_names_that_yaml_knows(tmp_path: Path) ->
 # --- bags ----------------------------------------------------------------------------------------------------------
 
 
-def write_bag(path: Path, kind: str) -> None:
-    """Write the two samples as /tf, and one more as /tf_static."""
+RECORDED = [("/tf", EXPECTED[0]), ("/tf", EXPECTED[1]), ("/tf_static", EXPECTED[0])]
+
+
+def write_bag(path: Path, kind: str, recorded: list[tuple[str, Any]] = RECORDED) -> None:
+    """Write the two samples as /tf, and one more as /tf_static; or others."""
     from rosbags import typesys as stores
 
     store = stores.get_typestore(stores.Stores.ROS2_HUMBLE if kind != "ros1" else stores.Stores.ROS1_NOETIC)
@@ -210,16 +215,16 @@ def write_bag(path: Path, kind: str) -> None:
         from rosbags.rosbag1 import Writer as Writer1
 
         with Writer1(path) as writer:
-            topics = {topic: writer.add_connection(topic, name, typestore=store) for topic in ("/tf", "/tf_static")}
-            for topic, each in [("/tf", EXPECTED[0]), ("/tf", EXPECTED[1]), ("/tf_static", EXPECTED[0])]:
+            topics = {topic: writer.add_connection(topic, name, typestore=store) for topic in dict(recorded)}
+            for topic, each in recorded:
                 writer.write(topics[topic], each[3] + 7, store.serialize_ros1(message(*each), name))
         return
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
 
     with Writer2(path, version=9, storage_plugin=StoragePlugin[kind]) as writer2:
-        topics2 = {topic: writer2.add_connection(topic, name, typestore=store) for topic in ("/tf", "/tf_static")}
-        for topic, each in [("/tf", EXPECTED[0]), ("/tf", EXPECTED[1]), ("/tf_static", EXPECTED[0])]:
+        topics2 = {topic: writer2.add_connection(topic, name, typestore=store) for topic in dict(recorded)}
+        for topic, each in recorded:
             writer2.write(topics2[topic], each[3] + 7, store.serialize_cdr(message(*each), name))
 
 
@@ -239,3 +244,202 @@ def test_without_the_extra_a_bag_says_what_to_install(tmp_path: Path, monkeypatc
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     with pytest.raises(FileProblem, match=r"frametool\[bag\]"):
         list(Recording(path).edges())
+
+
+def spoilt(data: bytes, draw: random.Random) -> bytes:
+    """Return the bytes with one changed, or cut short."""
+    at = draw.randrange(len(data))
+    if draw.random() < 0.2:
+        return data[:at]
+    return data[:at] + bytes([data[at] ^ draw.choice((1, 4, 32, 128, 255))]) + data[at + 1 :]
+
+
+def check_spoilt_bags(kind: str, folder: Path, count: int) -> None:
+    """Read a bag that is spoilt in many ways; it comes out with every message, or with an error."""
+    path = folder / ("run.bag" if kind == "ros1" else "run")
+    write_bag(path, kind)
+    file = path if kind == "ros1" else next(each for each in path.iterdir() if each.suffix != ".yaml")
+    data, draw = file.read_bytes(), random.Random(1)  # noqa: S311 - not for secrets
+    for _ in range(count):
+        file.write_bytes(spoilt(data, draw))
+        try:
+            found = list(Recording(draw.choice((path, file))).edges())
+        except FrametoolError:
+            continue
+        assert len(found) == 3
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("kind", ["ros1", "SQLITE3", "MCAP"])
+def test_a_spoilt_bag_never_comes_out_short_in_silence(kind: str, tmp_path: Path) -> None:
+    check_spoilt_bags(kind, tmp_path, 30)
+
+
+@pytest.mark.large
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("kind", ["ros1", "SQLITE3", "MCAP"])
+def test_a_bag_spoilt_in_many_ways_never_comes_out_short_in_silence(kind: str, tmp_path: Path) -> None:
+    check_spoilt_bags(kind, tmp_path, 1000)
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(FrametoolError) as caught:
+        list(Recording(path).edges())
+    return str(caught.value).removeprefix(f"{path}: ")
+
+
+@pytest.mark.parametrize("name", ["run.bag", "run.db3", "run.mcap"])
+def test_an_empty_bag_is_named_as_that(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"")
+    assert refusal(tmp_path / name) == "nothing in it: an empty file is no bag"
+
+
+def test_a_comment_that_begins_as_a_bag_does_makes_no_bag(tmp_path: Path) -> None:
+    (tmp_path / "t.yaml").write_text("#ROSBAG V2.0\nframes: {a: {b: {xyz: [1, 2, 3]}}}\n")
+    assert len(list(Recording(tmp_path / "t.yaml").edges())) == 2
+
+
+def test_a_folder_of_bags_without_metadata_names_the_files_in_it(tmp_path: Path) -> None:
+    assert refusal(tmp_path) == "is a directory"
+    (tmp_path / "run_0.mcap").write_bytes(b"")
+    assert refusal(tmp_path) == "a folder without metadata.yaml; name a file in it: run_0.mcap"
+
+
+# --- stamps --------------------------------------------------------------------------------------------------------
+
+BEYOND = {
+    "nanosec: 123456789": [("nanosec: 1000000000", "nanosec 1000000000 is beyond 0 .. 999999999")],
+    "sec: 1700000000": [
+        ("sec: 4294967296", "sec 4294967296 is beyond -2147483648 .. 4294967295"),
+        ("sec: -2147483649", "sec -2147483649 is beyond -2147483648 .. 4294967295"),
+    ],
+}
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [(old, *each) for old, news in BEYOND.items() for each in news])
+@pytest.mark.parametrize("slow", [False, True])
+def test_a_stamp_that_no_message_can_hold_is_refused(old: str, new: str, said: str, slow: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    text = GOOD.replace(old, new)
+    assert refusal_of(tmp_path, text.replace("stamp:", "stamp:  # slow") if slow else text).endswith(said)
+
+
+def refusal_of(tmp_path: Path, text: str) -> str:
+    (tmp_path / "tf.txt").write_text(text)
+    return refusal(tmp_path / "tf.txt")
+
+
+def test_seconds_of_ros1_are_not_negative(tmp_path: Path) -> None:
+    text = echoed("ros1", MESSAGES[0]).replace("secs: 1700000000", "secs: -1")
+    assert refusal_of(tmp_path, text).endswith("secs -1 is beyond 0 .. 4294967295")
+
+
+def test_tf2_adds_up_what_a_stamp_holds(tmp_path: Path) -> None:
+    (tmp_path / "tf.txt").write_text(GOOD.replace("nanosec: 123456789", "nanosec: 2000000001"))
+    (edge,) = Recording(tmp_path / "tf.txt").edges(raw=True)
+    assert edge.stamp_ns == 1_700_000_002_000_000_001
+
+
+def test_no_message_is_written_whose_stamp_no_message_can_hold() -> None:
+    assert stamp(-1, "ros2") == {"sec": -1, "nanosec": 999_999_999}
+    for form, stamp_ns in (("ros1", -1), ("ros1", 2**32 * 10**9), ("ros2", 2**63)):
+        with pytest.raises(ValueInvalid, match="has no place in ros"):
+            stamp(stamp_ns, form)
+
+
+DATES = {
+    "2023-11-14T22:13:20Z": 0,
+    "2023-11-14T22:13:20.123456789Z": 123_456_789,
+    "2023-11-14T22:13:20.5000000000z": 500_000_000,
+    "2023-11-15T00:13:20+02:00": 0,
+    "2023-11-14t14:43:20.000000001-07:30": 1,
+}
+
+
+@pytest.mark.parametrize("date", DATES)
+def test_foxglove_stamps_may_be_dates(date: str, tmp_path: Path) -> None:
+    seconds = EXPECTED[0][3] // 10**9
+    line = json.loads(foxglove(*EXPECTED[0])) | {"timestamp": date}
+    (tmp_path / "f.jsonl").write_text(json.dumps(line) + "\n")
+    (edge,) = Recording(tmp_path / "f.jsonl").edges()
+    assert edge.stamp_ns == seconds * 10**9 + DATES[date]
+
+
+@pytest.mark.parametrize("date", ["2023-02-30T00:00:00Z", "2023-11-14T22:13:20", "yesterday", "2023-11-14T25:13:20Z"])
+def test_other_texts_are_no_dates(date: str, tmp_path: Path) -> None:
+    line = json.loads(foxglove(*EXPECTED[0])) | {"timestamp": date}
+    assert "expected a time as {sec, nsec} or 2023-11-14T22:13:20.5Z" in refusal_of(tmp_path, json.dumps(line) + "\n")
+
+
+def test_an_mcap_file_without_a_summary_says_what_cannot_be_known(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", "MCAP", RECORDED[:2])
+    file = tmp_path / "run" / "run.mcap"
+    data = file.read_bytes()
+    file.write_bytes(data[:-28] + bytes(20) + data[-8:])
+    with pytest.warns(FrametoolWarning, match=r"run\.mcap has no summary: whether it lost messages cannot be known"):
+        assert len(list(Recording(file).edges())) == 2
+
+
+# --- topics --------------------------------------------------------------------------------------------------------
+
+TWO_ROBOTS = [("/tf", EXPECTED[0]), ("/tf_static", EXPECTED[1]), ("/robot1/tf", EXPECTED[0])]
+
+
+def bridged(path: Path, recorded: list[tuple[str, Any]]) -> Path:
+    """Write a recording of rosbridge, one line a message."""
+    lines = [{"op": "publish", "topic": topic, "msg": {"transforms": [transform(*each)]}} for topic, each in recorded]
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    return path
+
+
+def two_robots(kind: str, folder: Path, recorded: list[tuple[str, Any]] = TWO_ROBOTS) -> Path:
+    if kind == "rosbridge":
+        return bridged(folder / "run.jsonl", recorded)
+    path = folder / ("run.bag" if kind == "ros1" else "run")
+    write_bag(path, kind, recorded)
+    return path
+
+
+KINDS = ["rosbridge", "ros1", "SQLITE3", "MCAP"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_two_robots_that_use_the_same_names_are_not_merged(kind: str, tmp_path: Path) -> None:
+    said = "frame 'base' comes by /tf and by /robot1/tf; choose with --topic /tf or --topic /robot1/tf"
+    assert refusal(two_robots(kind, tmp_path)).endswith(said)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("topics", "count"), [(["/tf"], 1), (["tf", "tf_static"], 2), (["/robot1/tf"], 1), (["/robot1/tf", "/tf_static"], 2)]
+)
+def test_the_topics_chosen_are_read(kind: str, topics: list[str], count: int, tmp_path: Path) -> None:
+    edges = list(Recording(two_robots(kind, tmp_path), topics=topics).edges())
+    assert {edge.topic.strip("/") for edge in edges} == {topic.strip("/") for topic in topics}
+    assert len(edges) == count
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_topic_that_is_not_there_is_told_with_those_that_are(kind: str, tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"no transforms on odom; topics: /robot1/tf, /tf, /tf_static"):
+        list(Recording(two_robots(kind, tmp_path), topics=["/odom"]).edges())
+
+
+def test_robots_with_names_of_their_own_are_one_tree(tmp_path: Path) -> None:
+    apart = [("/tf", EXPECTED[0]), ("/robot1/tf", EXPECTED[1])]
+    assert len(list(Recording(two_robots("rosbridge", tmp_path, apart)).edges())) == 2
+
+
+def test_what_names_no_topics_is_read_whatever_is_chosen(tmp_path: Path) -> None:
+    (tmp_path / "tf.txt").write_text(GOOD)
+    assert len(list(Recording(tmp_path / "tf.txt", topics=["/odom"]).edges())) == 1
+
+
+def test_the_command_line_chooses_and_lists_topics(run: Callable[..., Any], tmp_path: Path) -> None:
+    path = str(two_robots("rosbridge", tmp_path))
+    assert run("lookup", path, "map", "base").status == 1
+    assert run("lookup", path, "map", "base", "--topic", "/robot1/tf").status == 0
+    found = run("check", path)
+    assert "transforms on /tf (1), /tf_static (1), /robot1/tf (1) [topics]" in found.out
+    assert "frame 'base' comes by /tf and by /robot1/tf" in found.out
+    entry = json.loads(run("monitor", path, "--topic", "tf", "-f", "json").out)
+    assert entry["topics"] == "/tf (1)"

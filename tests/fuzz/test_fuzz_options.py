@@ -16,7 +16,7 @@ from frametool.cli.commands.sim import SUBCOMMANDS
 if TYPE_CHECKING:
     from oracles_of_use import Tool
 
-pytestmark = pytest.mark.fuzz
+pytestmark = [pytest.mark.fuzz, pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")]
 TREE = str(Path(__file__).parents[2] / "examples" / "drive.yaml")
 POSE = "{xyz: [1, 2, 3], rpy: [0, 0, 1]}"
 PLAIN = {
@@ -57,7 +57,7 @@ def test_an_option_takes_or_refuses_every_value(name: str, option: str, tool: To
     for value in some(HOSTILE, f"{name} {option}"):
         if endless(name, option, value) or "\0" in value:
             continue
-        for arguments in (PLAIN[name], STREAM.get(name)):
+        for arguments in (PLAIN.get(name, [TREE]), STREAM.get(name)):
             try:
                 if arguments is not None:
                     tool(*name.split(), *arguments, option, value, stdin=ROWS)
@@ -68,7 +68,7 @@ def test_an_option_takes_or_refuses_every_value(name: str, option: str, tool: To
 @pytest.mark.parametrize("name", NAMES)
 def test_arguments_are_taken_or_refused(name: str, tool: Tool) -> None:
     for random in cases(0.3):
-        words = [*PLAIN[name], *(random.choice(HOSTILE) for _ in range(random.randint(0, 2)))]
+        words = [*PLAIN.get(name, [TREE]), *(random.choice(HOSTILE) for _ in range(random.randint(0, 2)))]
         if words and random.random() < 0.7:
             words[random.randrange(len(words))] = random.choice(HOSTILE)
         if any("\0" in word or word in ("inf", "infinity", "Infinity") for word in words):

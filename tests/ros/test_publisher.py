@@ -14,7 +14,7 @@ from frametool.grammar.result import Result, Style
 from frametool.ros.publisher import read_call, write_poses
 
 TURN = Rotation.from_rpy([0.2, 0.1, 1.5])
-POSE = Pose((0.1, 0.0, -0.2), TURN.components, "my camera", "base")
+POSE = Pose((0.1, 0.0, -0.2), TURN.components, "camera:é", "base")
 
 
 def read(line: str) -> Pose:
@@ -66,3 +66,17 @@ def test_what_is_missing_is_zero_or_the_identity() -> None:
 def test_what_the_tool_would_guess_is_refused(line: str, message: str) -> None:
     with pytest.raises(ValueInvalid, match=message):
         read(line)
+
+
+@pytest.mark.parametrize(
+    ("name", "form"), [("cam 1", "static1"), ("cam\u00a01", "static1"), ("a\nb", "static1"), ("a\nb", "static2"), ("\x1b[2J", "static2")]
+)
+def test_a_name_that_cannot_be_read_back_is_not_written(name: str, form: str) -> None:
+    pose = Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), name, "map")
+    with pytest.raises(ValueInvalid, match=f"has no place in {form}: it could not be read back"):
+        write_poses([Result(pose)], Style(form))
+
+
+def test_a_name_with_a_blank_is_quoted_in_flags() -> None:
+    pose = Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), "cam 1", "map")
+    assert read(write_poses([Result(pose)], Style("static2"))).name == "cam 1"

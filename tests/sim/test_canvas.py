@@ -12,7 +12,8 @@ from frametool.sim.simulate import simulate
 from frametool.view.canvas import Canvas
 from frametool.view.drawing import Drawing
 from frametool.view.live import Screen
-from frametool.view.plot_svg import plot, ticks
+from frametool.view.run_plot import run_picture, ticks
+from frametool.view.svg import write_svg
 
 
 @pytest.mark.parametrize(
@@ -59,4 +60,4 @@ def test_a_drawing_of_nobody_is_a_picture() -> None:
     drawing = Drawing(scene)
     for step in simulate(scene):
         drawing.watch(step)
-    assert plot(drawing).count("<svg") == 2
+    assert write_svg(run_picture(drawing)).count("<svg") == 1

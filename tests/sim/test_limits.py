@@ -18,7 +18,7 @@ from frametool.sim.simulate import simulate
 from frametool.sim.step_writer import FORMS, StepWriter
 from frametool.sim.turtle import FASTEST_TURN, Turtle, Twist
 from frametool.sim.world import World
-from frametool.view.plot_svg import ticks
+from frametool.view.run_plot import ticks
 
 if TYPE_CHECKING:
     from collections.abc import Callable

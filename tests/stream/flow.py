@@ -8,7 +8,7 @@ from typing import NamedTuple
 from frametool.errors import FrametoolError
 from frametool.formats import readers
 from frametool.geometry.representations import notation
-from frametool.stream.faults import BadRows
+from frametool.stream.faults import MOST, BadRows
 from frametool.stream.operation import Operation
 from frametool.stream.record_stream import run_records
 from frametool.stream.request import Request
@@ -31,11 +31,11 @@ class Flow(NamedTuple):
 
 
 def flow(
-    text: bytes, request: Request, form: str = "csv", *, header: bool = True, size: int = 0, jobs: int = 1
+    text: bytes, request: Request, form: str = "csv", *, header: bool = True, size: int = 0, jobs: int = 1, most: int = MOST
 ) -> Flow:
     out = io.BytesIO()
     told: list[str] = []
-    bad = BadRows("in", request.on_error, tell=lambda error: told.append(str(error)))
+    bad = BadRows("in", request.on_error, most=most, tell=lambda error: told.append(str(error)))
     try:
         if form in readers("records"):
             outcomes = run_records(io.BytesIO(text), form, request, source="in", size=size, jobs=jobs)

@@ -47,3 +47,11 @@ def test_angles_of_records_go_on_beyond_half_a_turn() -> None:
     assert yaws == pytest.approx([170, 190, 320, 450])
 
 
+
+
+@pytest.mark.parametrize("cut", ['{"k":1,"point":[1,', '{"k":[', '{"point":', '{"k":"x', '{"a":{"b":[[1,2],'])
+@pytest.mark.parametrize("count", [1, 2, 60])
+def test_a_cut_first_line_takes_no_other_with_it(cut: str, count: int) -> None:
+    result = flow(f"{cut}\n{GOOD * count}".encode(), MOVE._replace(on_error="skip"), "json")
+    assert result.text.count(b"[-1.0,3.0,6.0]") == count
+    assert result.told[-1] == f"in: 1 of {count + 1} rows skipped"

@@ -44,7 +44,11 @@ def test_flat_rotations_go_to_other_representations(spec: str) -> None:
 @pytest.mark.parametrize(
     ("record", "named"),
     [
-        ('{"x":0,"y":0,"z":0,"w":1}', "quaternion"),
+        ('{"x":0,"y":0,"z":0,"w":1,"k":1}', "quaternion"),
+        ('{"x":0,"y":0,"z":0,"qx":0,"qy":0,"qz":0}', "qw"),
+        ('{"x":0,"y":0,"z":0,"roll":0,"pitch":0}', "yaw"),
+        ('{"x":0,"y":0,"z":0,"roll_foo":0,"ox":0,"oy":0,"oz":0,"ow":1}', "ox oy oz ow"),
+        ('{"x (furlong)":0,"y (furlong)":0,"z (furlong)":0,"yaw":1}', "furlong"),
         ('{"x":0,"y":0,"z":0,"qx":0,"qy":0,"qz":0,"qw":1,"roll":0,"pitch":0,"yaw":0}', "roll pitch yaw"),
         ('{"x":0,"y":0,"z":0,"qx":0,"qy":0,"qz":0,"qw":1,"rpy":[0,0,0]}', "rpy"),
         ('{"pose":{"xyz":[1,2,3],"rpy":[0,0,0]},"pose2":{"xyz":[1,2,3],"rpy":[0,0,0]}}', "pose, pose2"),
@@ -58,3 +62,36 @@ def test_what_is_ambiguous_is_a_fault_that_names_the_keys(record: str, named: st
         result = flow((record + "\n").encode(), request, "json")
         assert (result.status, result.text) == (1, b"")
         assert named in result.told[0]
+
+
+def test_four_members_alone_are_a_quaternion() -> None:
+    record = '{"x":0,"y":0,"z":0.6,"w":0.8}\n'
+    assert json.loads(flow(record.encode(), INVERT, "json").text) == {"x": 0.0, "y": 0.0, "z": -0.6, "w": 0.8}
+    moved_record = json.loads(flow(record.encode(), MOVE, "json").text)
+    assert moved_record["xyz"] == [1.0, 2.0, 3.0]
+    assert set(moved_record) == {"xyz", "quaternion"}
+
+
+@pytest.mark.parametrize("yaw", ["yaw", "theta"])
+@pytest.mark.parametrize("count", [1, 40])
+def test_a_place_and_a_turn_about_z_are_a_pose_in_the_plane(yaw: str, count: int) -> None:
+    record = f'{{"x":1,"y":2,"{yaw}":0,"k":7}}\n'
+    found = flow(record.encode() * count, INVERT, "json")
+    assert [json.loads(line) for line in found.text.splitlines()] == [{"x": -1.0, "y": -2.0, yaw: 0.0, "k": 7}] * count
+    turned = flow(record.encode() * count, convert("quaternion"), "json")
+    assert json.loads(turned.text.splitlines()[0])["quaternion"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+
+
+@pytest.mark.parametrize("count", [1, 40])
+def test_what_leaves_the_plane_is_a_bad_record(count: int) -> None:
+    found = flow(b'{"x":1,"y":2,"yaw":0}\n' * count, MOVE, "json")
+    assert (found.status, found.text) == (1, b"")
+    assert "--to rpy" in found.told[0]
+
+
+@pytest.mark.parametrize("count", [1, 40])
+def test_units_in_names_count_as_written(count: int) -> None:
+    record = '{"x_mm":1000,"y_mm":0,"z_mm":0,"roll [deg]":0,"pitch [deg]":0,"yaw[deg]":90}\n'
+    found = flow(record.encode() * count, INVERT, "json")
+    wanted = {"x_mm": 0.0, "y_mm": 1000.0, "z_mm": 0.0, "roll [deg]": 0.0, "pitch [deg]": 0.0, "yaw[deg]": -90.0}
+    assert [json.loads(line) for line in found.text.splitlines()] == [wanted] * count

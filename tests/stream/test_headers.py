@@ -105,6 +105,14 @@ def test_half_a_rotation_is_an_error_that_names_what_is_missing(header: str, tol
     assert result.told[0].startswith(f"in:1: {told}")
 
 
+def test_x_y_z_w_are_a_quaternion_alone_and_refused_beside_others() -> None:
+    assert flow(b"x,y,z,w\n0,0,0.6,0.8\n", INVERT).text == b"x,y,z,w\n0.0,0.0,-0.6,0.8\n"
+    beside = b"id,x,y,z,w\n1,0,0,0.6,0.8\n"
+    assert "x y z w may be a quaternion or a point and a number" in flow(beside, MOVE).told[0]
+    assert flow(beside, MOVE._replace(columns=("x,y,z",))).text == b"id,x,y,z,w\n1,1.0,2.0,3.6,0.8\n"
+    assert flow(beside, INVERT._replace(given=convert("xyzw").notations[0])).text == b"id,x,y,z,w\n1,0.0,0.0,-0.6,0.8\n"
+
+
 def test_halves_do_no_harm_beside_a_whole_rotation_or_a_choice() -> None:
     whole = b"x,y,z,qx,qy,qz,qw,roll,pitch\n1,2,3,0,0,0,1,9,9\n"
     assert flow(whole, SHIFT).text.splitlines()[1] == b"2.0,2.0,3.0,0.0,0.0,0.0,1.0,9,9"

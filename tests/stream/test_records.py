@@ -160,3 +160,13 @@ def test_a_frame_that_the_result_does_not_know_is_left_out_and_told_once(count: 
         found = flow(b'{ "point" : [1, 2,3], "frame": "a" }\n' * count, MOVE, "json")
     assert found.text == b'{ "point" : [-1.0, 3.0,6.0] }\n' * count
     assert len(told) == 1
+
+
+@pytest.mark.parametrize("copies", [1, 40])
+@pytest.mark.parametrize("specs", ["rpy_deg,rotvec", "rotvec,rpy_deg", "rpy_rad,rotvec_deg,axis_angle"])
+def test_each_key_of_several_notations_says_the_unit_of_its_own_angles(copies: int, specs: str) -> None:
+    text = b'{"quaternion": {"x": 0, "y": 0, "z": 0.6, "w": 0.8}}\n' * copies
+    together = json.loads(flow(text, convert(specs), "json").text.splitlines()[-1])
+    for spec in specs.split(","):
+        alone = json.loads(flow(text, convert(spec), "json").text.splitlines()[-1])
+        assert together | alone == together

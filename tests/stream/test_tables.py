@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import random
+import sys
 from itertools import pairwise
 
 import pytest
@@ -231,3 +232,56 @@ def test_sixteen_columns_are_a_matrix(first: bytes) -> None:
     given = convert("quaternion")._replace(given=convert("matrix").notations[0])
     row = first + b"1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1\n"
     assert flow(row, given, "columns", header=False).text == first + b"1.0 2.0 3.0 0.0 0.0 0.0 1.0\n"
+
+
+@pytest.mark.parametrize("size", [0, 20])
+def test_semicolons_part_cells_as_commas_do(size: int) -> None:
+    text = b'id;x;y;z;tag\n"a;\nb";1;2;3;x,y\nb;1,5;2;3;\n'
+    result = flow(text, MOVE._replace(on_error="skip"), "semicolon", size=size)
+    assert result.text == b'id;x;y;z;tag\n"a;\nb";-1.0;3.0;6.0;x,y\n'
+    assert result.told[0].startswith("in:4:x: '1,5' has a decimal comma")
+
+
+@pytest.mark.parametrize("row", [b"1,2", b"1,2,3,4", b"x,2,3"])
+def test_no_consecutive_row_at_all_is_no_crash(row: bytes) -> None:
+    result = flow(b"x,y,z\n" + row + b"\n", Request(Operation(of="previous"), on_error="skip"))
+    assert result.text == b"x,y,z,qx,qy,qz,qw,distance,angle,angle_deg\n"
+    assert result.status == 3
+
+
+def calls(text: bytes, request: Request) -> int:
+    """Count the calls that a run makes, into Python and out of it."""
+    count = 0
+
+    def counted(_frame: object, event: str, _argument: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(counted)
+    try:
+        flow(text, request)
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def wide(columns: int, name: str) -> bytes:
+    return f"{','.join(name.format(at) for at in range(columns))},x,y,z\n{'1,' * columns}1,2,3\n".encode()
+
+
+@pytest.mark.parametrize(
+    ("short", "long"),
+    [
+        pytest.param(wide(1000, "c{}"), wide(2000, "c{}"), id="columns"),
+        pytest.param(wide(1000, "c"), wide(2000, "c"), id="repeated columns"),
+        pytest.param(wide(1000, "p{}_x"), wide(2000, "p{}_x"), id="affixes"),
+        *(
+            pytest.param(b"x,y,z\n" + row * 500, b"x,y,z\n" + row * 1000, id=f"rows like {row.decode().strip()}")
+            for row in (b"1,oops,3\n", b"1,2\n", b'1,2,"3\n4"\n', b"\n", b"1e308,1e308,1e308\n")
+        ),
+    ],
+)
+def test_the_work_grows_with_the_text_and_not_faster(short: bytes, long: bytes) -> None:
+    request = MOVE._replace(on_error="skip")
+    flow(short, request)
+    assert calls(long, request) < 2.2 * calls(short, request)

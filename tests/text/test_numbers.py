@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from frametool.errors import ValueInvalid
-from frametool.text.numbers import parse_angle, parse_number, shown
+from frametool.errors import ValueInvalid, shown
+from frametool.text.numbers import parse_angle, parse_number
 
 NUMBERS = {
     "1e-3": 0.001,

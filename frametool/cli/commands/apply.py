@@ -11,9 +11,9 @@ from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, one_pose, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
 from frametool.documents.source import Source
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 )
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest; messages: their own]")
 @rules_options
+@topic_option
 @stream_options
 def command(
     arguments: tuple[str, ...],
@@ -217,7 +218,8 @@ def _settled(own: str | None, source: str | None) -> str | None:
     """Decide which frame a record is given in: where both it and the command say, they must agree."""
     if own and source is not None and own != source:
         raise ValueInvalid(
-            f"a record is given in {own!r}, not in {source!r}; leave SOURCE out to use each record's own frame"
+            f"a record is given in {shown(own)}, not in {shown(source)}; "
+            "leave SOURCE out to use each record's own frame"
         )
     return own or source
 

@@ -9,7 +9,7 @@ import click
 from frametool.cli.command import FILE, Command, pose_options, verbose_option
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import opened
+from frametool.cli.trees import opened, topic_option
 from frametool.lint.findings import RULES, WRITERS
 from frametool.lint.rules import check
 
@@ -36,6 +36,7 @@ class CheckCommand(Command):
 @click.option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
               help="how findings are written")  # fmt: skip
 @click.option("--strict", is_flag=True, help="let warnings fail too")
+@topic_option
 @verbose_option
 @pose_options
 def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> int:

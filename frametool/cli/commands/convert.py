@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from math import radians
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, pose_from_numbers, values_of
 from frametool.cli.streaming import Stream, one_notation, stream_options
@@ -15,11 +16,17 @@ from frametool.geometry import quaternion
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
+from frametool.text.numbers import parse_angle
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Quaternion
+
+
+AXES = 3
 
 
 @click.command(cls=Command, name="convert", short_help="one rotation or pose in other representations")
@@ -31,6 +38,15 @@ if TYPE_CHECKING:
     help="the pose at the same place with these axes; alone, the pose of such axes on a ROS body: "
     "optical, opengl, frd, flu, enu, ned, or A_from_B",
 )
+@click.option(
+    "--find",
+    type=TEXT,
+    metavar="A,B,C",
+    help="show the Euler conventions in which these angles are the rotation, radians or with --deg degrees",
+)
+@click.option(
+    "--tolerance", type=Number(), default=1e-6, metavar="RAD", help="how near --find wants it  [default: 1e-06]"
+)
 @rotation_options
 @pose_options
 @result_options("poses")
@@ -40,6 +56,8 @@ def command(
     values: tuple[str, ...],
     given: tuple[Notation, ...] | None,
     axes: str | None,
+    find: str | None,
+    tolerance: float,
     deg: bool,
     normalize: bool,
     unwrap: bool,
@@ -52,6 +70,8 @@ def command(
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
       frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle --format json
       frametool convert --axes optical --to rpy_deg
+      frametool convert --from rpy_deg 10 20 30 --to euler:all
+      frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
@@ -83,9 +103,30 @@ def command(
         results = [Result(_turned(pose, turn))]
     else:
         results = list(values_of(values, request, output))
+    poses = [each.pose for each in results if isinstance(each, Result)]
+    if find is not None:
+        output.use(_found(poses, find, tolerance, degrees=deg))
     output.values(results)
-    output.tell_of_lock([each.pose for each in results if isinstance(each, Result)])
+    output.tell_of_lock(poses)
     return 0
+
+
+def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool) -> tuple[Notation, ...]:
+    """Return the Euler conventions in which three angles are a rotation, as notations."""
+    from frametool.geometry.conventions import find_euler
+    from frametool.geometry.rotation import Rotation
+
+    if len(poses) != 1 or poses[0].rotation is None:
+        raise click.UsageError("--find is about one rotation")
+    try:
+        read = [parse_angle(text) for text in find.split(",")]
+    except ValueInvalid as error:
+        raise click.UsageError(f"--find: {error}") from None
+    if len(read) != AXES:
+        raise click.UsageError(f"--find takes three angles like 0.1,0,pi/2; found {len(read)}")
+    angles = [radians(angle) if unit == "deg" or (degrees and unit is None) else angle for angle, unit in read]
+    axes = find_euler(Rotation.of(*poses[0].rotation), angles, tolerance=tolerance)
+    return tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes)
 
 
 def _turned(pose: Pose, turn: tuple[Rigid, ...]) -> Pose:

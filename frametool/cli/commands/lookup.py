@@ -11,7 +11,7 @@ from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, Skipped, at_ns, read_times, rules, rules_options, times_option
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
 from frametool.grammar.edges import stop
 from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, why_missing
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")
 @times_option
 @rules_options
+@topic_option
 @pose_options
 @rotation_options
 @result_options("poses")

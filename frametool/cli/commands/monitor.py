@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, verbose_option
 from frametool.cli.output import Output
-from frametool.cli.trees import opened
+from frametool.cli.trees import opened, topic_option
 from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 @click.argument("recording", type=TEXT)
 @click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
+@topic_option
 @verbose_option
 @pose_options
 @result_options("report")

@@ -8,12 +8,13 @@ import click
 
 from frametool.cli.command import Command, Text
 from frametool.cli.leader import leader_of
+from frametool.cli.pictures import drawn
 from frametool.cli.sim_options import LAW, LEADER, MAX_ANGULAR, MAX_LINEAR, RATE, REACH, SEED, SPAWN, Duration
 from frametool.cli.sim_output import check_files, format_options, style_of, suffix_of
 from frametool.cli.sink import writing
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown
 from frametool.sim.step_writer import table
-from frametool.text.numbers import parse_number, shown
+from frametool.text.numbers import parse_number
 
 MOST = 10_000  # values of one gain
 
@@ -86,7 +87,7 @@ def command(
     with writing(output, force=force) as write:
         write(text)
     if plot:
-        from frametool.view import heat_map
+        from frametool.view.heat_map import sweep_picture
 
         with writing(plot, force=force) as write:
-            write(heat_map.plot(gain_linear, gain_angular, result, suffix_of(plot)))
+            write(drawn(sweep_picture(gain_linear, gain_angular, result), suffix_of(plot)))

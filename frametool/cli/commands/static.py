@@ -10,7 +10,7 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.output import Output
 from frametool.cli.trees import load_tree
 from frametool.documents.source import Source
-from frametool.errors import ValueInvalid, warn
+from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames.tree import FrameTree
 from frametool.grammar.readers import NotARotation, Reading
 from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_positional
@@ -69,7 +69,7 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
 def _pose(arguments: Sequence[str], flags: dict[str, str], reading: Reading) -> Pose:
     """Read the arguments of one call."""
     if flags and arguments:
-        raise click.UsageError(f"extra arguments {' '.join(arguments)!r} beside the flags")
+        raise click.UsageError(f"extra arguments {shown(' '.join(arguments))} beside the flags")
     try:
         pose = read_flags(flags, reading) if flags else read_positional(arguments, reading)
     except NotARotation:

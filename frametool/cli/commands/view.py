@@ -1,0 +1,205 @@
+"""`frametool view`: the frames of a tree, seen: in the terminal, as a page, as a picture."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import FILE, TEXT, Command, Text, decorated, verbose_option
+from frametool.cli.pictures import drawn
+from frametool.cli.sink import refuse_existing, writing
+from frametool.cli.stderr import say
+from frametool.cli.times import TIME, at_ns, rules, rules_options
+from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.errors import ValueInvalid, shown
+from frametool.text.numbers import parse_angle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.view.frame_scene import FrameScene
+    from frametool.view.frames_picture import StillPicture
+
+FORMS = ("text", "html", "svg", "glb", "png")
+SUFFIXES = {".html": "html", ".htm": "html", ".svg": "svg", ".glb": "glb", ".png": "png", ".txt": "text"}
+NAMED_EYES = ("slanted", "front", "side", "top")
+PIPE_SIZE = (100, 30)  # columns and lines where nobody says how many there are
+
+
+class Eye(Text):
+    """From where one looks: a name, or azimuth and elevation in degrees."""
+
+    name = "eye"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return azimuth and elevation in radians."""
+        text = str(super().convert(value, param, ctx))
+        if text in NAMED_EYES:
+            from frametool.view.projection import EYES
+
+            return EYES[text]
+        cells = text.split(",")
+        if len(cells) != 2:
+            self.fail(f"expected {', '.join(NAMED_EYES)} or AZ,EL in degrees, found {shown(text)}", param, ctx)
+        try:
+            azimuth, elevation = map(_in_radians, cells)
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+        if abs(elevation) > math.pi / 2.0:
+            self.fail(f"the elevation must be -90 .. 90 degrees, found {shown(cells[1])}", param, ctx)
+        return azimuth, elevation
+
+
+def _in_radians(text: str) -> float:
+    angle, unit = parse_angle(text.strip())
+    return angle if unit == "rad" else math.radians(math.fmod(angle, 360.0))
+
+
+def scene_options(function: Any) -> Any:
+    """Add to a command the options that choose what is drawn."""
+    options = [
+        click.option("--frame", "fixed", type=FRAME, metavar="FIXED",
+                     help="what all is seen in  [default: TARGET, or the root of most frames]"),
+        click.option("--at", type=TIME, metavar="TIME",
+                     help="seconds, nanoseconds with ns  [default: the first time that all edges have]"),
+        click.option("--below", type=FRAME, metavar="FRAME", help="only this frame and those that hang from it"),
+        click.option("--only", type=TEXT, metavar="REGEX", help="only frames whose name matches"),
+        click.option("--path", "path_only", is_flag=True, help="only the frames between TARGET and SOURCE"),
+        click.option("--from", "eye", type=Eye(), default="slanted", show_default=True, metavar="EYE",
+                     help="slanted, front, side, top, or AZ,EL in degrees"),
+    ]  # fmt: skip
+    return decorated(function, options)
+
+
+@click.command(cls=Command, name="view")
+@click.argument("tree", type=FILE)
+@click.argument("target", type=FRAME, required=False)
+@click.argument("source", type=FRAME, required=False)
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
+@scene_options
+@rules_options
+@verbose_option
+@click.option("-f", "--format", "form", type=click.Choice(FORMS),
+              help="form of the picture  [default: by the suffix of --output, else text]")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all")
+@click.option("--force", is_flag=True, help="let --output replace an existing file")
+@click.option("--live", is_flag=True, help="play what moves in the terminal, a second a second, from --at on")
+@click.option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
+@click.option("--open", "opens", is_flag=True, help="show the page in the browser")
+@click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
+              help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
+def command(
+    tree: str, target: str | None, source: str | None, more: Sequence[str], eye: tuple[float, float],
+    moving: bool, cache: int | None, tf2: str | None, form: str | None, output: str | None, force: bool, opens: bool,
+    live: bool, overlay: bool, color: str, **options: Any,
+) -> None:  # fmt: skip
+    """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
+
+    \b
+      frametool view robot.yaml
+      frametool view robot.yaml --below base_link --from side
+      frametool view robot.yaml map tool -o robot.html
+      frametool view drive.yaml --at 2.5 -o drive.svg
+      frametool view robot.yaml arm.yaml --overlay -o moved.html
+
+    The page needs nothing beside it and asks nothing of anybody: turn it, search, click a frame to see its transform
+    from TARGET in every notation, play what moves. TREE is a file, a recording, - for standard input, or . for the
+    file that FRAMETOOL_TREE names.
+    """
+    chosen = _form(form, output, opens=opens)
+    refuse_existing(output, force=force)
+    if chosen == "png":
+        from frametool.view.png import require_matplotlib
+
+        require_matplotlib()
+    if overlay and (source or not target):
+        raise click.UsageError("--overlay takes two trees: frametool view AFTER BEFORE --overlay")
+    if options["path_only"] and not (target and source):
+        raise click.UsageError("--path draws the way between TARGET and SOURCE; name both")
+    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
+    from frametool.view.frame_scene import FrameScene
+
+    stamp_ns, ends = at_ns(options.pop("at")), {} if overlay else {"target": target, "source": source}
+    names = ends | {"fixed": options["fixed"], "below": options["below"]}
+    options |= {key: name and frame_name(name, frames) for key, name in names.items()}
+    scene = FrameScene(frames, at_ns=stamp_ns, **options)
+    before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed) if overlay else None
+    if live:
+        if chosen != "text" or output is not None or not sys.stdout.isatty() or scene.at_ns is None:
+            raise click.UsageError("--live plays what moves in a terminal: give it a tree that moves and no -o")
+        from frametool.view.frames_terminal import play
+
+        play(scene, eye, color)
+        return
+    if chosen == "text" and output is None and sys.stdout.isatty():
+        from frametool.view.frames_terminal import TerminalPicture, print_terminal
+
+        columns, lines = os.get_terminal_size(sys.stdout.fileno())
+        print_terminal(TerminalPicture(scene, columns, lines - 1, eye), color)
+        return
+    content = _content(scene, chosen, tree, eye, before, str(target))
+    path = _page_file(tree) if opens and output is None else output
+    with writing(path, force=force or output is None) as write:
+        write(content)
+    if opens and path:
+        import webbrowser
+
+        say(f"the page is {path}")
+        webbrowser.open(f"file://{os.path.abspath(path)}")
+
+
+def _form(form: str | None, output: str | None, *, opens: bool) -> str:
+    """Choose the form: as told, else by the file's suffix, else text; a browser shows pages."""
+    suffix = os.path.splitext(output or "")[1].lower()
+    chosen = form or SUFFIXES.get(suffix) or ("html" if opens else None)
+    if chosen is None and suffix and output != "-":
+        raise click.UsageError(f"no form has the suffix {shown(suffix)}; give --format {'|'.join(FORMS)}")
+    if opens and (chosen != "html" or output == "-"):
+        raise click.UsageError("--open shows a page: give -o FILE.html, or no -o")
+    return chosen or "text"
+
+
+def _content(
+    scene: FrameScene, form: str, tree: str, eye: tuple[float, float], before: FrameScene | None, before_tree: str,
+) -> str | bytes:  # fmt: skip
+    """Return the picture in a form."""
+    title, other_title = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, before_tree))
+    if form == "html":
+        from frametool.view.html_page import write_page
+
+        return write_page(scene, title=title, file=tree, eye=eye, other=before, other_title=other_title)
+    if form == "glb":
+        from frametool.view.glb import write_glb
+
+        return write_glb(scene)
+    if form == "text":
+        from frametool.view.frames_terminal import TerminalPicture
+
+        return TerminalPicture(scene, *PIPE_SIZE, eye).text()
+    from frametool.view.frames_picture import still_picture
+
+    still = still_picture(scene, eye, title, before)
+    _tell_of_crowd(still, scene)
+    return drawn(still.picture, f".{form}")
+
+
+def _tell_of_crowd(still: StillPicture, scene: FrameScene) -> None:
+    """Say what a still picture does not show."""
+    if still.crowded:
+        say(f"note: {still.crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part")
+    if still.hidden:
+        say(f"note: {still.hidden} names found no place")
+
+
+def _page_file(tree: str) -> str:
+    """Name a file of one's own for a page that is only looked at."""
+    from tempfile import mkstemp
+
+    begin = "".join(letter for letter in os.path.basename(tree)[:40] if letter.isalnum())
+    handle, path = mkstemp(prefix=f"frametool_{begin}_", suffix=".html")
+    os.close(handle)
+    return path

@@ -1,0 +1,220 @@
+"""What is drawn of a tree: which frames, seen in which one, at which time; poses and trails in its metres.
+
+Knows no form: the page, SVG, PNG, GLB and the terminal ask here.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import ValueInvalid, shown
+from frametool.frames.path import IDENTITY
+from frametool.geometry import rigid
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from frametool.frames.lookups import Frames
+    from frametool.frames.track import MovingTrack
+    from frametool.geometry.types import Rigid
+
+    Point = tuple[float, float, float]
+
+PARTS = 8  # of the way between two stamps, so that a trail is round where a frame turns
+FEW_STAMPS = 500  # above, a trail has one point a stamp
+FURTHEST = 1e30  # metres; beyond, nothing is drawn: programs that read GLB have float32
+STILL = 1e-9  # metres: a frame that stays within has no trail
+MOST_STAMPS = 4000  # of a trail; of more, every second, third, .. is taken
+
+
+class Trail(NamedTuple):
+    """Where a frame went: stretches of points, in metres, cut where its parent changes or data are missing."""
+
+    frame: str
+    stretches: list[list[Point]]
+
+
+class FrameScene:
+    """The frames of a tree as they are drawn.
+
+    tree: what they come from
+    names: every frame, parents before children by the first parents
+    tracks: of the frames that move, by name
+    fixed: the frame that all is seen in
+    at_ns: the time; None where nothing moves
+    target, source: the two frames whose transform is asked for, if any
+    chosen: the frames that are drawn; None for all
+    path_only: whether only those between target and source are drawn
+    """
+
+    def __init__(
+        self, tree: Frames, *, fixed: str | None = None, at_ns: int | None = None, below: str | None = None,
+        only: str | None = None, target: str | None = None, source: str | None = None, path_only: bool = False,
+    ) -> None:  # fmt: skip
+        """Choose what is drawn.
+
+        fixed: left out, the target, or `below`, or the root of most frames.
+        at_ns: left out, the first time that all moving edges have.
+        below: only this frame and those that hang from it.  only: a regular expression that names must match.
+        Raises UnknownFrame; ValueInvalid for an empty tree, a bad expression, or one that matches nothing.
+        """
+        if not tree.frames:
+            raise ValueInvalid("no frames in it: nothing to draw")
+        for frame in filter(None, (fixed, below, target, source)):
+            tree.require(frame, frame)
+        self.tree = tree
+        self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.standing}
+        self.names, self._roots = _in_order(tree, {name: _first_parent(tree, name) for name in tree.frames})
+        self.target, self.source, self.path_only = target, source, path_only
+        self.at_ns = self._time(at_ns)
+        self.fixed = fixed or target or below or max(self._roots, key=lambda root: self._roots[root])
+        self.chosen = self._choice(below, only)
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """Return the first and the last stamp of all."""
+        return (
+            min((track.first_ns for track in self.tracks.values()), default=0),
+            max((track.last_ns for track in self.tracks.values()), default=0),
+        )
+
+    def _time(self, at_ns: int | None) -> int | None:
+        if not self.tracks:
+            return None
+        return max(track.first_ns for track in self.tracks.values()) if at_ns is None else at_ns
+
+    def _choice(self, below: str | None, only: str | None) -> set[str] | None:
+        """Return the names to draw."""
+        if below is None and only is None and not self.path_only:
+            return None
+        chosen = set(self.names)
+        if below is not None:
+            found = {below}
+            for name in self._ordered_now():
+                if self.parent(name) in found:
+                    found.add(name)
+            chosen &= found
+        if self.path_only and self.target and self.source:
+            chosen &= set(self.tree.path(self.target, self.source, self.at_ns))
+        if only is not None:
+            try:
+                chosen = {name for name in chosen if re.search(only, name)}
+            except re.error as error:
+                raise ValueInvalid(f"{shown(only)} is no regular expression: {error}") from None
+        if not chosen:
+            raise ValueInvalid("no frame is left to draw: nothing matches")
+        return chosen
+
+    def parent(self, name: str) -> str | None:
+        """Return the parent of a frame at the time; None for a root and where it is not known."""
+        return self.tree.parent(name, self.at_ns)
+
+    def edge(self, name: str) -> Rigid | None:
+        """Return parent_from_child of a frame at the time; None for a root and where there are no data."""
+        track = self.tree.track(name)
+        return None if track is None else track.at(self.at_ns or 0)
+
+    def poses(self) -> dict[str, Rigid]:
+        """Return the pose in `fixed` of every chosen frame that is connected to it at the time, parents first."""
+        in_root: dict[str, tuple[str, Rigid]] = {}
+        for name in self._ordered_now():
+            parent, pose = self.parent(name), self.edge(name)
+            if parent is None and self.tree.track(name) is None:
+                in_root[name] = name, IDENTITY
+            elif pose is not None and parent in in_root:
+                root, above = in_root[parent]
+                in_root[name] = root, rigid.compose(*above, *pose)
+        if self.fixed not in in_root:
+            return {self.fixed: IDENTITY} if self._is_chosen(self.fixed) else {}
+        home, fixed_in_home = in_root[self.fixed]
+        back = rigid.inverse(*fixed_in_home)
+        return {
+            name: IDENTITY if name == self.fixed else rigid.compose(*back, *pose)
+            for name, (root, pose) in in_root.items()
+            if root == home and self._is_chosen(name)
+        }
+
+    def _is_chosen(self, name: str) -> bool:
+        return self.chosen is None or name in self.chosen
+
+    def _ordered_now(self) -> Sequence[str]:
+        """Return the names with parents first at the time; only changing parents can upset their order."""
+        if not any(track.varies for track in self.tracks.values()):
+            return self.names
+        return _in_order(self.tree, {name: self.parent(name) for name in self.names})[0]
+
+    @cached_property
+    def trails(self) -> list[Trail]:
+        """Return where each chosen frame that moves went in `fixed`."""
+        chosen = ((name, self._stretches(name)) for name in self.tracks if self._is_chosen(name))
+        return [Trail(name, stretches) for name, stretches in chosen if stretches]
+
+    def _stretches(self, name: str) -> list[list[Point]]:
+        """Look a frame up at the stamps of all that moves on its way, and between them."""
+        import numpy as np
+
+        movers = self._movers_above(name) | self._movers_above(self.fixed)
+        stamps = sorted({stamp for mover in movers for stamp, _, _ in self.tracks[mover].walk()})
+        stamps = stamps[:: -(-len(stamps) // MOST_STAMPS) or 1]
+        parts = 1 if len(stamps) > FEW_STAMPS else PARTS
+        times = [a + (b - a) * part // parts for a, b in pairwise(stamps) for part in range(parts)] + stamps[-1:]
+        with np.errstate(over="ignore", invalid="ignore"):  # what is too far is not drawn
+            points = self.tree.lookup_many(self.fixed, name, times, missing="nan").xyz
+        known: NDArray[np.bool_] = np.max(np.abs(points), axis=1) < FURTHEST
+        changes = sorted(stamp for mover in movers for stamp in self.tracks[mover].changes())
+        epoch = np.searchsorted(changes, times, side="right")
+        cuts = np.flatnonzero((known[1:] != known[:-1]) | (epoch[1:] != epoch[:-1])) + 1
+        pieces = [piece for piece, here in zip(np.split(points, cuts), known[[0, *cuts]], strict=True) if here]
+        if not pieces or np.ptp(np.concatenate(pieces), axis=0).max() < STILL:
+            return []
+        return [[(x, y, z) for x, y, z in piece.tolist()] for piece in pieces]
+
+    def _movers_above(self, name: str) -> set[str]:
+        """Return the moving frames on any way from a frame to a root."""
+        found: set[str] = set()
+        waiting, seen = [name], {name}
+        while waiting:
+            each = waiting.pop()
+            track = self.tree.track(each)
+            if track is None:
+                continue
+            if not track.standing:
+                found.add(each)
+            above = {parent for _, parent, _ in track.walk()} if track.varies else {track.parent}
+            waiting += above - seen
+            seen |= above
+        return found
+
+
+def can_be_drawn(point: Sequence[float]) -> bool:
+    """Tell whether a point is near enough to be drawn."""
+    return all(abs(value) < FURTHEST for value in point)
+
+
+def _first_parent(tree: Frames, name: str) -> str | None:
+    track = tree.track(name)
+    if track is None or track.standing:
+        return tree.parent(name)
+    return track.parent_near(track.first_ns)
+
+
+def _in_order(tree: Frames, parents: dict[str, str | None]) -> tuple[list[str], dict[str, int]]:
+    """Return the frames as a walk through the tree meets them, and how many hang from each root."""
+    children: dict[str | None, list[str]] = {}
+    for name, parent in parents.items():
+        children.setdefault(parent if parent in parents else None, []).append(name)
+    order: list[str] = []
+    sizes = {}
+    for root in children.get(None, []):
+        before, waiting = len(order), [root]
+        while waiting:
+            order.append(waiting.pop())
+            waiting += reversed(children.get(order[-1], []))
+        sizes[root] = len(order) - before
+    return order or list(tree.frames), sizes or {tree.frames[0]: 1}

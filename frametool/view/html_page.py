@@ -1,0 +1,124 @@
+"""One HTML file in which frames can be looked at from all sides, with everything inside and no request to anywhere.
+
+Its script and style stand as plain files in the folder `page`, one after another in the order of SCRIPTS; the page
+lets nothing else run.  Poses go in as doubles, stamps as doubles of nanoseconds since the first.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from array import array
+from base64 import b64encode
+from hashlib import sha256
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from frametool import __version__
+from frametool.frames.stamps import format_stamp
+
+if TYPE_CHECKING:
+    from frametool.frames.track import MovingTrack
+    from frametool.view.frame_scene import FrameScene
+
+FOLDER = os.path.join(os.path.dirname(__file__), "page")
+SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
+PACKED = 48_000  # bytes of doubles, from where on they are compressed
+NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def write_page(
+    scene: FrameScene, *, title: str, file: str = "", eye: tuple[float, float] | None = None,
+    other: FrameScene | None = None, other_title: str = "",
+) -> str:  # fmt: skip
+    """Return the page.
+
+    title: its heading.  file: the tree's name in the command that the page offers to copy.
+    eye: azimuth and elevation of the first view, radians.
+    other: another tree seen in the same frame, laid over this one; other_title: what it is called.
+    """
+    head, numbers = _data(scene)
+    data = numbers.tobytes()
+    packed = len(data) > PACKED
+    head |= {"title": title, "file": file or title, "made": f"frametool {__version__}", "packed": packed}
+    head["show"] = _shown(scene, eye)
+    if other is not None:
+        here = {name: number for number, name in enumerate(scene.names)}
+        poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
+        head["overlay"] = {"title": other_title, "poses": poses}
+    if packed:
+        from zlib import compress
+
+        data = compress(data, 6)
+    script, style = "".join(map(_file, [f"{name}.js" for name in SCRIPTS])), _file("page.css")
+    parts = {
+        "POLICY": _policy(script, style),
+        "TITLE": escape(title),
+        "STYLE": style,
+        "HEAD": _json(head),
+        "BLOB": b64encode(data).decode(),
+        "SCRIPT": script,
+    }
+    return re.sub("@([A-Z]+)@", lambda mark: parts[mark[1]], _file("page.html"))
+
+
+def _file(name: str) -> str:
+    with open(os.path.join(FOLDER, name), encoding="utf-8") as stream:
+        return stream.read()
+
+
+def _policy(script: str, style: str) -> str:
+    """Allow the page its own script and style, and nothing else."""
+    own = (f"{kind}-src 'sha256-{_digest(text)}'" for kind, text in (("script", script), ("style", style)))
+    return f"default-src 'none'; {'; '.join(own)}; base-uri 'none'; form-action 'none'"
+
+
+def _digest(text: str) -> str:
+    return b64encode(sha256(text.encode()).digest()).decode()
+
+
+def _json(value: dict[str, Any]) -> str:
+    """Write JSON that no name in it can end."""
+    from json import dumps
+
+    return dumps(value, separators=(",", ":")).replace("<", "\\u003c").replace("&", "\\u0026")
+
+
+def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]:
+    """Return what the page shows first."""
+    shown: dict[str, Any] = {"fixed": scene.fixed, "path": scene.path_only}
+    shown |= {key: name for key, name in (("target", scene.target), ("source", scene.source)) if name}
+    if scene.at_ns is not None:
+        shown["t"] = format_stamp(scene.at_ns)
+    if scene.chosen is not None and not scene.path_only:
+        shown["only"] = [name for name in scene.names if name in scene.chosen]
+    return shown | ({"view": eye} if eye else {})
+
+
+def _data(scene: FrameScene) -> tuple[dict[str, Any], array[float]]:
+    """Return names, parents and where each track's numbers begin, and all numbers."""
+    index = {name: number for number, name in enumerate(scene.names)}
+    numbers = array("d")
+    parents = []
+    for name in scene.names:
+        track = None if name in scene.tracks else scene.tree.track(name)
+        parents.append(-1 if track is None else index[track.parent])
+        numbers.extend(NO_POSE if track is None else track.components)
+    first_ns, last_ns = scene.span_ns
+    tracks = []
+    for name, moving in scene.tracks.items():
+        at = numbers.itemsize * len(numbers)
+        tracks.append({"frame": index[name], "count": moving.count, "at": at, "parents": _parents(moving, index)})
+        numbers.extend(stamp - first_ns for stamp, _, _ in moving.walk())
+        for _, _, sample in moving.walk():
+            numbers.extend(sample)
+    if sys.byteorder == "big":
+        numbers.byteswap()
+    head = {"names": scene.names, "parents": parents, "tracks": tracks}
+    return head | {"t0": str(first_ns), "first": 0, "last": last_ns - first_ns}, numbers
+
+
+def _parents(track: MovingTrack, index: dict[str, int]) -> int | list[int]:
+    """Return the parent of all samples, or that of each where it changes."""
+    return [index[parent] for _, parent, _ in track.walk()] if track.varies else index[track.parent]

@@ -1,0 +1,10 @@
+// What the command wrote into the page: a head as JSON, and poses and stamps as little-endian doubles, packed if many.
+
+const head = JSON.parse(document.getElementById("head-data").textContent);
+const blob = await unpack(document.getElementById("blob").textContent.trim(), head.packed);
+
+async function unpack(text, packed) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  if (!packed) return bytes.buffer;
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
+}

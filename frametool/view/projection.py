@@ -1,0 +1,179 @@
+"""A picture's geometry: from metres in space to pixels on a plane, seen from a direction, without perspective."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.geometry import quaternion
+from frametool.view.frame_scene import can_be_drawn
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from frametool.geometry.types import Rigid
+    from frametool.view.frame_scene import FrameScene, Point
+
+SLANTED = (-0.9, 0.5)
+# name -> azimuth and elevation of the eye, radians: from where one looks along -x, along +y, and down
+EYES = {
+    "slanted": SLANTED,
+    "front": (0.0, 0.0),
+    "side": (-math.pi / 2.0, 0.0),
+    "top": (-math.pi / 2.0, math.pi / 2.0),
+}
+AXIS_PART = 0.55  # of the usual distance between a frame and its parent
+USUAL_LINK = 0.5  # metres, where there is none
+LEAST = 1e-9  # metres; below, frames lie on one point
+SPOT = 0.12  # of the picture: a small part of it
+
+
+class Flat(NamedTuple):
+    """A point on the picture: across and down in pixels, and metres toward the eye."""
+
+    x: float
+    y: float
+    depth: float
+
+
+class Size(NamedTuple):
+    """A picture's size.
+
+    width, height: in pixels, or dots of a terminal.
+    margin: pixels left free on each side, for names.
+    axes: the least and the greatest length of drawn axes, in pixels.
+    """
+
+    width: float
+    height: float
+    margin: float
+    axes: tuple[float, float]
+
+
+class Projection:
+    """Where the frames of a scene are on a picture, and how long their axes are drawn.
+
+    poses: of the drawn frames in `fixed`, by name
+    trails: where the moving ones went
+    links: (parent, child) where both are drawn
+    axis: metres of a drawn axis
+    scale: pixels of a metre
+    view: the rows right, up, toward the eye
+    """
+
+    def __init__(self, scene: FrameScene, size: Size, eye: tuple[float, float] = SLANTED) -> None:
+        """Fit all that is drawn into the picture."""
+        self.scene, self.size = scene, size
+        self.view = _view(*eye)
+        self.poses = {name: pose for name, pose in scene.poses().items() if can_be_drawn(pose[:3])}
+        self.trails = scene.trails
+        self.links = [(parent, name) for name in self.poses if (parent := scene.parent(name)) in self.poses and parent]
+        usual = self._usual_link()
+        self.low, self.high = _bounds(self._points())
+        flat = [self.turned(point) for point in self._points()]
+        (left, down, _), (right, up, _) = _bounds(flat)
+        self.middle = (left + right) / 2.0, (down + up) / 2.0
+        room = [max(pixels - 2.0 * size.margin, 0.2 * pixels) for pixels in size[:2]]
+        self.scale = min(
+            room[0] / max(right - left, LEAST),
+            room[1] / max(up - down, LEAST),
+            0.4 * min(size[:2]) / (AXIS_PART * usual),  # one frame alone is not blown up
+        )
+        self._origins = {name: self.at(pose[:3]) for name, pose in self.poses.items()}
+        least, most = (pixels / self.scale for pixels in size.axes)
+        self.axis = min(max(AXIS_PART * usual, least), most)
+
+    def _points(self) -> Iterator[Point]:
+        for x, y, z, *_ in self.poses.values():
+            yield x, y, z
+        for trail in self.trails:
+            for stretch in trail.stretches:
+                yield from stretch
+
+    def _usual_link(self) -> float:
+        lengths = sorted(math.dist(self.poses[parent][:3], self.poses[name][:3]) for parent, name in self.links)
+        lengths = [length for length in lengths if length > LEAST]
+        return lengths[len(lengths) // 2] if lengths else USUAL_LINK
+
+    def turned(self, point: Sequence[float]) -> Point:
+        """Return metres to the right, up, and toward the eye."""
+        (a, b, c), (d, e, f), (g, h, i) = self.view
+        x, y, z = point
+        return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+
+    def at(self, point: Sequence[float]) -> Flat:
+        """Return where a point in metres is on the picture."""
+        right, up, toward = self.turned(point)
+        across = self.size.width / 2.0 + (right - self.middle[0]) * self.scale
+        return Flat(across, self.size.height / 2.0 - (up - self.middle[1]) * self.scale, toward)
+
+    def origin(self, name: str) -> Flat:
+        """Return where a frame is on the picture."""
+        return self._origins[name]
+
+    def tips(self, name: str, part: float = 1.0) -> list[Flat]:
+        """Return where the axes x, y, z of a frame end, or a part of the way there."""
+        return [self.at(tip) for tip in axis_tips(self.poses[name], part * self.axis)]
+
+    def nearest_last(self) -> list[str]:
+        """Return the frames from the farthest to the nearest to the eye."""
+        return sorted(self.poses, key=lambda name: self.origin(name).depth)
+
+    def axis_order(self, name: str) -> list[int]:
+        """Return the axes 0, 1, 2 of a frame from the farthest to the nearest."""
+        tips = self.tips(name)
+        return sorted(range(3), key=lambda axis: tips[axis].depth)
+
+    def groups(self, near: float) -> list[tuple[Flat, list[str]]]:
+        """Gather the frames that lie within some pixels of one another, nearest to the eye first."""
+        spots: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
+        for name in reversed(self.nearest_last()):
+            place = self.origin(name)
+            spots.setdefault((round(place.x / near), round(place.y / near)), (place, []))[1].append(name)
+        return list(spots.values())
+
+    def crowded(self) -> int:
+        """Return how many frames lie in a small spot of the picture, where that is most of them; else 0."""
+        places = [self.origin(name) for name in self.poses]
+        middle = [sorted(column)[len(places) // 2] for column in zip(*(place[:2] for place in places), strict=True)]
+        reach = SPOT * min(self.size[:2])
+        near = sum(math.dist(place[:2], middle) < reach for place in places)
+        return near if len(places) >= 6 and near > 0.6 * len(places) else 0
+
+    def ground(self) -> tuple[float, list[tuple[Point, Point, bool]]]:
+        """Return the spacing of a grid on z = 0, in metres, and its lines with whether they pass the origin."""
+        wide = max(self.high[0] - self.low[0], self.high[1] - self.low[1], 4.0 * self.axis)
+        step = nice(wide / 8.0)
+        first = [math.floor(low / step - 0.6) for low in self.low]
+        last = [math.ceil(high / step + 0.6) for high in self.high]
+        (left, near), (right, far) = ([number * step for number in ends[:2]] for ends in (first, last))
+        across = [((k * step, near, 0.0), (k * step, far, 0.0), k == 0) for k in range(first[0], last[0] + 1)]
+        along = [((left, k * step, 0.0), (right, k * step, 0.0), k == 0) for k in range(first[1], last[1] + 1)]
+        return step, across + along
+
+
+def axis_tips(pose: Rigid, metres: float) -> list[Point]:
+    """Return the ends of the axes x, y, z of a pose, in metres."""
+    x, y, z, *rotation = pose
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(*rotation)
+    columns = ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33))
+    return [(x + metres * dx, y + metres * dy, z + metres * dz) for dx, dy, dz in columns]
+
+
+def nice(length: float) -> float:
+    """Return a round length near another: 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(length))
+    factor = length / power
+    return (1.0 if factor < 1.5 else 2.0 if factor < 3.5 else 5.0 if factor < 7.5 else 10.0) * power
+
+
+def _view(azimuth: float, elevation: float) -> tuple[Point, Point, Point]:
+    """Return the directions right, up and toward the eye."""
+    ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
+    return (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
+
+
+def _bounds(points: Iterable[Sequence[float]]) -> tuple[list[float], list[float]]:
+    """Return the least and the greatest coordinates of some points; of none, 0."""
+    columns = list(zip(*points, strict=True)) or [(0.0,)] * 3
+    return [min(column) for column in columns], [max(column) for column in columns]

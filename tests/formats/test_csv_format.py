@@ -1,0 +1,32 @@
+"""Single results as CSV: no column twice, none dropped."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from conftest import Outcome
+
+    class Run(Protocol):
+        def __call__(self, *arguments: str, stdin: str = ..., files: dict[str, str] | None = None) -> Outcome: ...
+
+
+def test_two_notations_that_need_one_column_are_refused(run: Run) -> None:
+    outcome = run("convert", "{rpy: [1, 2, 3]}", "--to", "euler:rxyz,euler:rzxy", "-f", "csv")
+    assert (outcome.status, outcome.out) == (1, "")
+    assert "columns euler_1, euler_2, euler_3 would stand twice" in outcome.err
+
+
+def test_an_angle_that_the_notation_says_stands_once(run: Run) -> None:
+    text = run("relative", "{xyz: [1, 0, 0]}", "{rpy: [0, 0, 1]}", "--to", "axis_angle", "-f", "csv").out
+    header = text.splitlines()[0].split(",")
+    assert header == ["x", "y", "z", "axis_x", "axis_y", "axis_z", "angle", "distance", "angle_deg"]
+    assert run("invert", stdin=text).status == 0
+
+
+def test_the_columns_are_those_of_all_results(run: Run) -> None:
+    text = run("convert", "{xyz: [1, 0, 0], rpy: [0, 0, 0]}", "{name: b, rpy: [0, 0, 1]}", "-f", "csv").out
+    first, second = csv.DictReader(io.StringIO(text))
+    assert (first["x"], first["name"], second["x"], second["name"]) == ("1.0", "", "", "b")

@@ -1,0 +1,50 @@
+"""Pages of the examples, and a real browser for them: chromium where it is installed, driven by playwright where that is."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from console import ROOT
+
+import frametool
+from frametool.view.frame_scene import FrameScene
+from frametool.view.html_page import write_page
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    MakePage = Callable[..., Path]
+
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+NEEDS_CHROMIUM = pytest.mark.skipif(CHROMIUM is None, reason="no chromium to look at the page with")
+OPTIONS = ("--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000")
+
+
+def make_page(folder: Path, tree: str, *, eye: tuple[float, float] | None = None, **options: Any) -> Path:
+    """Write the page of a tree: a file in examples, or its text; further options are the scene's."""
+    source = ROOT / "examples" / tree
+    if "{" in tree:
+        source = folder / "tree.yaml"
+        source.write_text(tree)
+    scene = FrameScene(frametool.load(source), **options)
+    path = folder / f"page{len(list(folder.iterdir()))}.html"
+    path.write_text(write_page(scene, title=source.name, file=f"examples/{source.name}", eye=eye))
+    return path
+
+
+def seen_in_chromium(path: Path, fragment: str = "") -> str:
+    """Return the page's elements as they stand after its script has run; needs no package."""
+    arguments = [str(CHROMIUM), *OPTIONS, "--dump-dom", f"file://{path}#{fragment}"]
+    done = subprocess.run(arguments, capture_output=True, text=True, timeout=120, check=False)
+    assert re.search("<html[^>]*data-ready", done.stdout), done.stderr
+    return done.stdout
+
+
+def playwright() -> Any:
+    """Return playwright's entry, or skip by name."""
+    return pytest.importorskip("playwright.sync_api", reason="no playwright to click with").sync_playwright
