@@ -41,6 +41,7 @@ FORMATS = {
         writer="frametool.formats.yaml_format",
         signs=(
             ("yaml key", "frames"),
+            ("line", r"\{ *[A-Za-z_][\w.]*: "),  # no JSON, whatever the suffix says: its keys have quotes
             # a header of CSV whose first column ends in a colon is no key
             ("header", r"""(?!(?!.*(?:[{\[]|: )).*,)(?:---(?:\s|$)|%YAML|- |(?:[\w./-]+|"[^"\n]*"):(?:\s|$)|[\[{])"""),
         ),
