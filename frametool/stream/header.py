@@ -32,6 +32,7 @@ LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0, "um": 1e6}  # how many 
 ANGLES = {"deg": True, "degree": True, "degrees": True, "°": True, "rad": False, "radian": False, "radians": False}
 NO_UNIT = ("", "-", "1")
 MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
+LONGEST_RANGE = 40  # characters: more digits name no column
 # behind an underscore: these are units of no length, and those are lengths that nobody should have to guess
 UNITS = re.compile(r"_(deg|rad|mm|cm|um|m)(?![^\W_])|_(km|in|ft|s)$")
 BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
@@ -538,7 +539,7 @@ def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
     if word in numbers:
         return [numbers[word]]
     first, dash, last = word.partition("-")
-    if first.isdecimal() and (last.isdecimal() if dash else not last):
+    if first.isdecimal() and (last.isdecimal() if dash else not last) and len(word) < LONGEST_RANGE:
         low, high = int(first), int(last or first)
         if 1 <= low <= high <= width:
             return list(range(low - 1, high))

@@ -40,6 +40,18 @@ class Trail(NamedTuple):
     stretches: list[list[Point]]
 
 
+def _expression(text: str) -> re.Pattern[str]:
+    """Compile a regular expression; what Python would warn of is nobody's business here."""
+    import warnings
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FutureWarning)
+            return re.compile(text)
+    except (re.error, OverflowError, RecursionError) as error:
+        raise ValueInvalid(f"{shown(text)} is no regular expression: {error}") from None
+
+
 class FrameScene:
     """The frames of a tree as they are drawn.
 
@@ -103,10 +115,8 @@ class FrameScene:
         if self.path_only and self.target and self.source:
             chosen &= set(self.tree.path(self.target, self.source, self.at_ns))
         if only is not None:
-            try:
-                chosen = {name for name in chosen if re.search(only, name)}
-            except re.error as error:
-                raise ValueInvalid(f"{shown(only)} is no regular expression: {error}") from None
+            matches = _expression(only)
+            chosen = {name for name in chosen if matches.search(name)}
         if not chosen:
             raise ValueInvalid("no frame is left to draw: nothing matches")
         return chosen
