@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.marks import Event
 
+JSON_NUMBER = r"-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+"
 _BLANKS = re.compile(r"[ \t\n\r]*")
 _WORD = r'"[^"\\]*+(?:\\.[^"\\]*+)*+"|[{}\[\]]|[^\s{}\[\],:"]+'
 # up to \ud83d and the like without the other half of the pair

@@ -17,14 +17,16 @@ from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, re
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
 from frametool.ros.message_parts import read_stamp, whole_list
-from frametool.stream.header import Columns, PoseColumns, plain_pose, row_shape
 from frametool.stream.row_layout import COVARIANCE, POINT, POSE, TWIST, VECTOR, WRENCH, Shape
 from frametool.text.numbers import NotFinite, read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from frametool.documents.source import Source
+    from frametool.errors import FormatError
     from frametool.grammar.readers import Path
+    from frametool.stream.header import Columns, PoseColumns
     from frametool.stream.request import Request
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
@@ -162,14 +164,14 @@ def _holds_numbers(value: dict[str, Any]) -> bool:
     if any(type(value.get(key)) in (dict, list) for key in INNER):
         return False
     try:
-        return plain_pose(_scalars(value)) != PoseColumns(None, None)
-    except ValueInvalid:
+        return _flat_pose(value, []) is not None
+    except Misfit:
         return True  # half a rotation, or two: reading it says so
 
 
 def _scalars(value: dict[str, Any]) -> list[str]:
-    """Name the members that may be numbers."""
-    return [key for key, each in value.items() if type(each) not in (dict, list)]
+    """Name the members that may be numbers of ours."""
+    return [key for key, each in value.items() if type(each) not in (dict, list) and key not in NOTHING_BUT]
 
 
 def _is_holder(value: dict[str, Any]) -> bool:
@@ -233,18 +235,18 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     positions = [key for key in value if key in POINT_KEYS and _holds(key, value[key])]
     rotations = [key for key, each in value.items() if _is_rotation(key, each)]
     flat = _flat_pose(value, rotations)
-    if len(positions) > 1 and not _is_pose(positions, rotations or flat.rotation):
+    if len(positions) > 1 and not _is_pose(positions, rotations or (flat and flat.rotation)):
         raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
-    _refuse_typos(value, rotations=bool(rotations or flat.rotation), position=bool(positions or flat.position))
+    turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
+    _refuse_typos(value, rotations=bool(turned), position=bool(there))
     key = positions[0] if positions else ""
-    record = Record(path, Shape(_kind(key, rotations or flat.rotation, request), None), key=key)
+    record = Record(path, Shape(_kind(key, turned, request), None), key=key)
     if positions:
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
-        flat = flat._replace(position=Columns((), (), unit=record.shape.unit))
-    elif flat.position:
+    elif flat and flat.position:
         record = _with_members(record, value, flat.position)
     reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else request.degrees
-    if flat.rotation:
+    if flat and flat.rotation:
         record = _with_flat_rotation(record, value, flat, reading, request)
     elif rotations:
         within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
@@ -299,12 +301,16 @@ def _refuse_disagreement(
         read_pose({key: value[key] for key in value if key in keys}, reading)
 
 
-def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns:
+def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | None:
     """Find a position and a rotation among the keys by the names that columns have: x y z, qx qy qz qw, yaw_deg, ..
 
-    Raises Misfit for half a rotation, for two of them, and for a unit that is not known.
+    None where there is neither.  Raises Misfit for half a rotation, for two of them, and for a unit that is not known.
     """
     names = _scalars(value)
+    if not names:
+        return None
+    from frametool.stream.header import Columns, PoseColumns, plain_pose
+
     if not rotations and set(names) == set(QUATERNION) and len(names) == len(value):
         alone = Columns((0, 1, 2, 3), QUATERNION, notation=notation("quaternion"), degrees=(None,) * 4)
         return PoseColumns(None, alone)
@@ -320,7 +326,7 @@ def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns:
     if found.position and not found.rotation and not rotations and "w" in value:
         message = "x, y, z beside w may be a quaternion or a point; write {quaternion: {..}} or {point: [..], w: ..}"
         raise Misfit(message, ("w",), key=True)
-    return found
+    return found if found.position or found.rotation else None
 
 
 def _with_members(record: Record, value: dict[str, Any], columns: Columns) -> Record:
@@ -335,9 +341,13 @@ def _with_flat_rotation(
     record: Record, value: dict[str, Any], flat: PoseColumns, reading: Reading, request: Request
 ) -> Record:
     """Add a rotation whose numbers are members of the record itself."""
+    from frametool.stream.header import Columns, row_shape
+
     if flat.rotation is None or request.poses != 1:
         raise Misfit("a record holds one pose; two in a row are for tables")
     names = flat.rotation.names
+    if record.key:
+        flat = flat._replace(position=Columns((), (), unit=record.shape.unit))
     reading_here = request._replace(degrees=reading.degrees, kind=POSE)
     shape = row_shape(flat, reading_here)
     numbers, own = [], 0 if shape.whole else len(record.values)
@@ -486,3 +496,17 @@ def value_at(value: Any, path: Path) -> Any:
     for step in path:
         value = value[step]
     return value
+
+
+def placed(misfit: Misfit, source: Source) -> FormatError:
+    """Make the error that names line and column of a misfit whose path begins with the index of its document."""
+    index, *path = misfit.path
+    return type(misfit)(str(misfit), tuple(path), key=misfit.key, rule=misfit.rule).placed(source, int(index))
+
+
+def lost_name(record: Record, request: Request) -> str:
+    """Name a frame that the record names and its result cannot, because the operation does not know the other one."""
+    if request.rename is None:
+        return ""
+    before = record.parent.text or record.name.text or ""
+    return before if request.rename(record.parent.text, record.name.text) == (None, None) else ""

@@ -9,8 +9,8 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import parse_documents
+from frametool.documents.json_reader import JSON_NUMBER
 from frametool.documents.json_writer import Verbatim
-from frametool.documents.nodes import parse_nodes
 from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.tree_reader import tell
@@ -19,15 +19,10 @@ from frametool.geometry import floats
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, Reading
 from frametool.grammar.result import Result
-from frametool.stream.faults import Fault
-from frametool.stream.record import PARTS, STALE, XYZ, find_records, value_at
+from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, placed, value_at
 from frametool.stream.request import Request
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
-from frametool.stream.splice import target_of
-from frametool.stream.splitter import Splitter
-from frametool.stream.template import JSON_NUMBER, lost_name, placed
-from frametool.text.lines import read_blocks
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -97,6 +92,8 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
 
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
+    from frametool.documents.nodes import parse_nodes
+
     nodes: list[Node] = []
     found = False
     for document, records in documents(source, request):
@@ -196,6 +193,8 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
 
 def _flat(answer: Answer, request: Request) -> dict[str, Any]:
     """Return a point, vector, twist or wrench as a mapping without levels."""
+    from frametool.stream.splice import target_of
+
     record = answer.record
     entry: dict[str, Any] = {"frame": answer.parent} if answer.parent is not None else {}
     numbers = target_of(record, request).written(answer.parts, floats)[:6]
@@ -207,6 +206,8 @@ def _flat(answer: Answer, request: Request) -> dict[str, Any]:
 
 def _rewritten(node: Node, unit: Path, answers: list[Answer], request: Request) -> Any:
     """Return a document or an item of it with the numbers and frames of its results, all else as it is."""
+    from frametool.stream.splice import target_of
+
     if type(node.value) is list:
         return _flat(answers[0], request)
     changes: dict[Path, Any] = {}
@@ -271,6 +272,10 @@ def stream_results(
     stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows
 ) -> Iterator[Value]:
     """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
+    from frametool.stream.faults import Fault
+    from frametool.stream.splitter import Splitter
+    from frametool.text.lines import read_blocks
+
     splitter = Splitter(form)
     line, rows = 1, 0
     for block in read_blocks(stream, whole=splitter.whole):

@@ -11,14 +11,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.document import Document, parse_documents
-from frametool.documents.json_reader import strict_json
+from frametool.documents.json_reader import JSON_NUMBER, strict_json
 from frametool.documents.nodes import Node, parse_nodes
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
 from frametool.grammar.pose import POSE_KEYS
 from frametool.grammar.readers import Misfit, Reading, within
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
-from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_records
+from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_records, lost_name, placed
 from frametool.stream.run import RowNote
 from frametool.stream.splice import OURS, Splicer, target_of
 from frametool.stream.stamp_source import stamp_path
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from frametool.stream.text_parts import Piece
 
 # what a number looks like: JSON's is exact, YAML's is judged when it is read
-JSON_NUMBER = r"-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+"
 YAML_NUMBER = r"[-+.]?[0-9][-+.0-9eE]*+"
 JSON_TEXT = r'"[^"\\\x00-\x1f]*(?:\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4})[^"\\\x00-\x1f]*)*"'
 # what may stand for a scalar that passes, by its quotes: never anything that could be read as more than one scalar
@@ -171,14 +170,6 @@ def _notes(entries: Sequence[Entry], request: Request) -> Iterator[RowNote]:
             yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
 
 
-def lost_name(record: Record, request: Request) -> str:
-    """Name a frame that the record names and its result cannot, because the operation does not know the other one."""
-    if request.rename is None:
-        return ""
-    before = record.parent.text or record.name.text or ""
-    return before if request.rename(record.parent.text, record.name.text) == (None, None) else ""
-
-
 def _may_matter(key: str) -> bool:
     """Tell whether a scalar under this key, beside our numbers, may be one of them or change what they mean."""
     return re.split(r"[^a-z0-9_]|_(?:deg|rad|mm)", key.casefold(), maxsplit=1)[0] in _WORDS
@@ -291,12 +282,6 @@ def _entries(document: Document, request: Request, source: Source) -> list[Entry
         error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
         raise error from misfit
     return made
-
-
-def placed(misfit: Misfit, source: Source) -> FormatError:
-    """Make the error that names line and column of a misfit whose path begins with the index of its document."""
-    index, *path = misfit.path
-    return type(misfit)(str(misfit), tuple(path), key=misfit.key, rule=misfit.rule).placed(source, int(index))
 
 
 def _entry(document: Document, record: Record, request: Request) -> Entry:
