@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import suppress
 from functools import cached_property
 
 from frametool.documents.source import LOOKED_AT, UTF16, not_text
@@ -72,10 +73,11 @@ class Beginning:
         keys, depth = set(), 0
         if looks_like_json(text):
             outermost = 1 + text.startswith("[")
-            for kind, word, _, end, *_ in json_events(text):
-                depth += (kind != LEAF) - 2 * (kind == END)
-                if kind == LEAF and depth == outermost and text[end:].lstrip().startswith(":"):
-                    keys.add(word)
+            with suppress(ValueError):  # JSON up to a word with a backslash that JSON does not know
+                for kind, word, _, end, *_ in json_events(text):
+                    depth += (kind != LEAF) - 2 * (kind == END)
+                    if kind == LEAF and depth == outermost and text[end:].lstrip().startswith(":"):
+                        keys.add(word)
         return keys
 
     @cached_property

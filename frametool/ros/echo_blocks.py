@@ -84,10 +84,11 @@ class Blocks:
     `at` is the offset reached, always at the beginning of a document, and `line` its number.
     """
 
-    __slots__ = ("at", "line", "tally", "text")
+    __slots__ = ("at", "line", "normalize", "tally", "text")
 
-    def __init__(self, text: str, line: int, tally: Tally) -> None:
-        """Start at the top of a text."""
+    def __init__(self, text: str, line: int, tally: Tally, *, normalize: bool = False) -> None:
+        """Start at the top of a text; normalize: take any non-zero quaternion."""
+        self.normalize = normalize
         self.text = text
         self.at = 0
         self.line = line
@@ -99,25 +100,28 @@ class Blocks:
         while head := HEAD(text, self.at):
             spelling = SPELLINGS[text.startswith("  ", head.end())]
             found = []
+            rough = len(self.tally.rough)
             at, line = head.end(), self.line + 1
             while entry := spelling.match(text, at):
-                edge = _edge(entry.groups(), self.tally, line + spelling.first)
+                edge = plain_edge(entry.groups(), self.tally, line + spelling.first, normalize=self.normalize)
                 if edge is None:
+                    del self.tally.rough[rough:]
                     return
                 found.append(edge)
                 at = entry.end()
                 line += spelling.lines
             if not text.startswith(TAIL, at) and (at < len(text) or not found):
+                del self.tally.rough[rough:]
                 return
             self.at, self.line = at + len(TAIL), line + 1
             yield from found
 
 
-def _edge(texts: tuple[str, ...], tally: Tally, line: int) -> Edge | None:
+def plain_edge(texts: tuple[str, ...], tally: Tally, line: int, *, normalize: bool) -> Edge | None:
     """Make the record of one transform's texts; None for one that needs a closer look."""
     parent, child = tally.names[texts[2]], tally.names[texts[3]]
     try:
-        components = unit_components(tally, line, *map(float, texts[4:]))
+        components = unit_components(tally, line, *map(float, texts[4:]), normalize=normalize)
     except ValueError:
         return None
     seconds, nanoseconds = int(texts[0]), int(texts[1])

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.chunks import Piece, documents
+from frametool.documents.chunks import Piece, documents, lines
 from frametool.errors import FormatError
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Misfit, Reading, as_mapping
 from frametool.ros import messages
 from frametool.ros.echo_blocks import Blocks
-from frametool.ros.message_stream import Message, document_messages, end_of_document, read_messages
+from frametool.ros.json_blocks import plain_line
+from frametool.ros.message_stream import Message, document_messages, end_of_document, line_messages, read_messages
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,6 +31,9 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     if file.form == "echo":
         for piece in documents(file.stream, file.name):
             yield from _echo(piece, file.name, options)
+    elif file.form == "jsonl":
+        for piece in lines(file.stream, file.name):
+            yield from _json_lines(piece, file.name, options)
     else:
         for message in read_messages(file.stream, file.name, file.form, options.tally):
             yield from _message_edges(message, options)
@@ -36,7 +41,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 def _echo(piece: Piece, name: str, options: Options) -> Iterator[Edge]:
     """Read plain documents fast and the others in full."""
-    blocks = Blocks(piece.text, piece.line, options.tally)
+    blocks = Blocks(piece.text, piece.line, options.tally, normalize=options.normalize)
     while True:
         if not options.raw:
             yield from blocks.edges()
@@ -47,6 +52,27 @@ def _echo(piece: Piece, name: str, options: Options) -> Iterator[Edge]:
             yield from _message_edges(message, options)
         blocks.at += len(text)
         blocks.line += text.count("\n")
+
+
+def _json_lines(piece: Piece, name: str, options: Options) -> Iterator[Edge]:
+    """Read plain lines fast and the others in full."""
+    at, text = 0, piece.text
+    plains = not options.raw and not options.topics.chosen
+    for line in count(piece.line):
+        if at >= len(text):
+            return
+        if plains and (plain := plain_line(text, at, line, options.tally, normalize=options.normalize)):
+            topic, edges, at = plain
+            for edge in edges:
+                if not topic:
+                    yield edge
+                elif options.topics.takes(topic):
+                    yield _on_topic(edge, topic, name, options)
+        else:
+            end = text.find("\n", at) + 1 or len(text) + 1
+            for message in line_messages(text[at : end - 1], line, name, options.tally):
+                yield from _message_edges(message, options)
+            at = end
 
 
 def _message_edges(message: Message | FormatError, options: Options) -> Iterator[Edge]:
@@ -61,7 +87,6 @@ def _message_edges(message: Message | FormatError, options: Options) -> Iterator
         return
     numbers = _header_lines(message, len(found))
     topic = messages.topic_of(message.value)
-    still = topic.endswith("tf_static")
     for (transform, path), line in zip(found, numbers, strict=True):
         if topic and not options.topics.takes(topic):
             continue
@@ -71,9 +96,15 @@ def _message_edges(message: Message | FormatError, options: Options) -> Iterator
         except Misfit as misfit:
             options.report(message.error(misfit.below(*path)))
             continue
-        if topic and (problem := options.topics.conflict(topic, child)):
-            options.report(FormatError(problem, source=message.source.name, line=line, column=1, rule="two-topics"))
-        yield Edge(parent, child, components, None if still else stamp_ns, line, message.received_ns, topic=topic)
+        edge = Edge(parent, child, components, stamp_ns, line, message.received_ns)
+        yield _on_topic(edge, topic, message.source.name, options) if topic else edge
+
+
+def _on_topic(edge: Edge, topic: str, name: str, options: Options) -> Edge:
+    """Keep the topic that an edge came by: what comes by tf_static has no stamp; one frame by two topics is a fault."""
+    if problem := options.topics.conflict(topic, edge.child):
+        options.report(FormatError(problem, source=name, line=edge.line, column=1, rule="two-topics"))
+    return edge._replace(topic=topic, stamp_ns=None if topic.endswith("tf_static") else edge.stamp_ns)
 
 
 def _read(

@@ -53,7 +53,9 @@ def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Itera
         for piece in documents(stream, name):
             yield from document_messages(piece, name, tally)
     elif form == "jsonl":
-        yield from _by_line(stream, name, tally, lambda line, number: _json_line(line, number, name))
+        for piece in lines(stream, name):
+            for number, line in enumerate(piece.text.split("\n"), piece.line):
+                yield from line_messages(line, number, name, tally)
     else:
         yield from _csv(stream, name, form, tally)
 
@@ -99,8 +101,10 @@ def _parsed(text: str, line: int, name: str) -> Iterator[Message | FormatError]:
         yield Message(document.value, Source(name, text), line, document.index)
 
 
-def _json_line(text: str, line: int, name: str) -> Iterator[Message | FormatError]:
-    """Read the values on a line that must be JSON."""
+def line_messages(text: str, line: int, name: str, tally: Tally) -> Iterator[Message | FormatError]:
+    """Yield the messages on a line that must be JSON, if it is neither blank nor noise."""
+    if not _is_data(text, line, tally):
+        return
     source = Source(name, text.removeprefix("\ufeff"))
     try:
         with counted_from(line):
@@ -119,10 +123,16 @@ def _by_line(
     """Read what stands on each line that is neither blank nor noise."""
     for piece in lines(stream, name):
         for number, line in enumerate(piece.text.split("\n"), piece.line):
-            if NOISE(line):
-                tally.noise.append((number, line.strip()))
-            elif line.strip():
+            if _is_data(line, number, tally):
                 yield from read(line, number)
+
+
+def _is_data(line: str, number: int, tally: Tally) -> bool:
+    """Tell whether a line is neither blank nor noise; count what is noise."""
+    if NOISE(line):
+        tally.noise.append((number, line.strip()))
+        return False
+    return bool(line.strip())
 
 
 def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:

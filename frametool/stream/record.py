@@ -9,9 +9,10 @@ Arguments, files, streams and messages are read by this one definition; keys tha
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
@@ -281,12 +282,8 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
     """Stop at a key that is nearly that of a rotation or a position, where no other says it."""
     wanted = [*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)]
     known = {*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS}
-    near = [
-        (key, hint)
-        for key in value
-        if wanted and key not in known and (hint := did_you_mean(key, wanted, cutoff=0.75))
-    ]
-    if near:
+    unknown = islice((key for key in value if wanted and key not in known), MOST_COMPARED)
+    if near := [(key, hint) for key in unknown if (hint := did_you_mean(key, wanted, cutoff=0.75))]:
         raise _unknown(near)
 
 

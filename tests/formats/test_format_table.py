@@ -13,6 +13,7 @@ import pytest
 from frametool.errors import FormatError
 from frametool.formats import FORMATS, Format, by_suffix, readers, writers
 from frametool.formats.detect import by_sign, detect, of_folder
+from frametool.formats.load import load
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -189,3 +190,8 @@ def test_a_stream_of_what_is_no_utf_8_is_named_as_what_it_is(data: bytes, said: 
     with pytest.raises(FormatError, match=said) as caught:
         detect(data, "rows", "records", name=name)
     assert not caught.value.snippet
+
+
+def test_a_word_that_only_yaml_reads_is_read_as_yaml(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text('{frames: {"a\\e[31m": {b: {xyz: [1, 0, 0]}}}}')
+    assert set(load(tmp_path / "a.yaml").frames) == {"a\x1b[31m", "b"}

@@ -96,7 +96,7 @@ def command(
     stream = Stream(options)
     output = Output("points", deg=deg, **options)
     if pose is None:
-        way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2), at)
+        way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize), at)
     elif time_column is not None or at is not None:
         raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
