@@ -141,11 +141,16 @@ def slerp(
     cos(g arc) (a + b) / 2c + sin(g arc) (b - a) / 2s, which treats both ends alike.
     """
     apart, along = halves(ax, ay, az, aw, bx, by, bz, bw, xp)
-    theta = xp.maximum(2.0 * incline(apart, along, xp), TINY)
-    sine, cosine = half_sincos(2.0 * ((fraction - 0.5) * theta), xp)
-    mean, across = 0.5 * (cosine / along), 0.5 * (sine / xp.maximum(apart, 0.5 * TINY))
-    to_a, to_b = mean - across, (mean + across) * xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
-    x, y, z, w = unit(to_a * ax + to_b * bx, to_a * ay + to_b * by, to_a * az + to_b * bz, to_a * aw + to_b * bw, xp)
+    beyond = fraction - 0.5
+    sine, cosine = half_sincos(2.0 * (beyond * (2.0 * incline(apart, along, xp))), xp)
+    mean = 0.5 * (cosine / along)
+    across = xp.where(apart > TINY, 0.5 * (sine / xp.maximum(apart, TINY)), beyond)
+    sign = xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
+    sx, sy, sz, sw = sign * bx, sign * by, sign * bz, sign * bw
+    x, y, z, w = unit(
+        mean * (ax + sx) + across * (sx - ax), mean * (ay + sy) + across * (sy - ay),
+        mean * (az + sz) + across * (sz - az), mean * (aw + sw) + across * (sw - aw), xp,
+    )  # fmt: skip
     at_start, at_end = fraction == 0.0, fraction == 1.0
     if not xp.some(at_start | at_end):
         return x, y, z, w

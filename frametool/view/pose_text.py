@@ -63,7 +63,7 @@ def _describe(result: Result, style: Style) -> str:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)
     lines += [NumberLine(*extra) for extra in _extra_lines(result)]
-    return _heading(result) + _layout(lines, style)
+    return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
 
 
 def _heading(result: Result) -> str:

@@ -36,3 +36,26 @@ def test_normalize_reaches_the_tree_that_points_are_moved_by(run: Run, tmp_path:
     assert "--normalize" in refused.err
     moved = run("apply", "--normalize", str(tmp_path / "a.yaml"), "map", "base", "1", "0", "0")
     assert (moved.status, moved.out) == (0, "frame: map\npoint: [2.0, 0.0, 0.0]\n")
+
+
+@pytest.mark.parametrize("text", ['{"xyz": [1, 2, 3]}\n', "xyz: [1, 2, 3]\n"])
+def test_a_record_alone_is_compared_with_nothing(run: Run, text: str) -> None:
+    for rows in (1, 40):
+        found = run("relative", stdin=(text if text.startswith("{") else text + "---\n") * rows)
+        assert (found.status, found.out) == (1, "")
+        assert found.err == (
+            "frametool: stdin:1:1: a record holds one pose; name A or B, or compare it with the one before by --consecutive\n"
+        )
+
+
+def test_a_pose_with_neither_position_nor_rotation_is_the_identity_in_text(run: Run) -> None:
+    assert run("invert", "{name: a}", "-f", "text").out == "  identity\n"
+    assert run("invert", "{name: a, parent: b}", "-f", "text").out.endswith("\n  identity\n")
+
+
+@pytest.mark.parametrize("fraction", ["1e16", "1e160", "-1e200", "1e308"])
+def test_poses_turned_alike_stay_so_at_every_fraction(run: Run, fraction: str) -> None:
+    poses = ["{xyz: [1, 0, 0], rpy_deg: [0, 0, 90]}"] * 2
+    found = run("interpolate", "--", *poses, fraction)
+    assert (found.status, found.err) == (0, "")
+    assert "quaternion: {x: 0.0, y: 0.0, z: 0.7071067811865476, w: 0.7071067811865476}" in found.out
