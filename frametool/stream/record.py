@@ -88,10 +88,10 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
             found = [((), ())]
         if not found:
             raise _nothing_in(document)
-        if request.operation.of == "pair":
-            raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive")
     except Misfit as misfit:
         raise misfit.below(*path) from None
+    if request.operation.of == "pair":
+        raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
     for inner, outer in found:
         yield _record(document, inner, outer, request, reading, path)
 
