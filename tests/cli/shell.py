@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,11 @@ TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key not in ("PYTHONUNBUFFERED", "FRAMETOOL_TREE")} | {
     "PYTHONPATH": str(ROOT)
 }
+
+
+def by_default() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def start(*arguments: str | bytes, **options: object) -> subprocess.Popen[bytes]:

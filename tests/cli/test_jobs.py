@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from shell import run, start
+from shell import by_default, run, start
 
 from frametool.errors import FormatError, UnknownFrame
 
@@ -24,7 +24,7 @@ CHILDREN = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="no l
 
 def begun(*arguments: str) -> tuple[subprocess.Popen[bytes], list[int]]:
     """Start a stream that waits for more input, with its two workers at work."""
-    process = start(*MOVE, *arguments)
+    process = start(*MOVE, *arguments, preexec_fn=by_default)  # runs in the background ignore SIGINT
     assert process.stdin is not None
     process.stdin.write(HEAD)
     workers: list[int] = []

@@ -11,7 +11,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 import pytest
-from shell import ENVIRONMENT, TOOL, run, start
+from shell import ENVIRONMENT, TOOL, by_default, run, start
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,7 +34,7 @@ def test_an_ended_run_replaces_nothing(number: int, arguments: list[str], link: 
     (tmp_path / "link").symlink_to("old")
     target = str(tmp_path / ("link" if link else "old"))
     # a test may itself run under nohup, where SIGHUP is ignored and would stay so
-    with start(*arguments, "-o", target, "--force", preexec_fn=_by_default) as process:
+    with start(*arguments, "-o", target, "--force", preexec_fn=by_default) as process:
         assert process.stdin is not None
         process.stdin.write(b"x,y,z\n1,2,3\n")
         process.stdin.flush()
@@ -44,11 +44,6 @@ def test_an_ended_run_replaces_nothing(number: int, arguments: list[str], link: 
     assert (tmp_path / "old").read_bytes() == b"before"
     left = {path.name for path in tmp_path.iterdir()} - {"old", "link"}
     assert left == ({f"old.{process.pid}.part"} if number == signal.SIGKILL else set())
-
-
-def _by_default() -> None:
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
 
 
 def test_what_is_ignored_stays_ignored(tmp_path: Path) -> None:
@@ -98,7 +93,7 @@ def test_a_terminal_is_as_before(number: int, arguments: list[str]) -> None:
     environment = ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "80", "LINES": "24"}
     with subprocess.Popen(
         [*TOOL, "sim", *arguments], stdin=theirs, stdout=theirs, stderr=theirs, env=environment,
-        preexec_fn=_by_default,  # noqa: PLW1509 - no thread is running yet
+        preexec_fn=by_default,  # noqa: PLW1509 - no thread is running yet
     ) as tool:
         drawn = b""
         while b"\x1b[?25l" not in drawn or drawn.count(b"turtle2") < 2:  # it is drawing, without a cursor
