@@ -34,7 +34,7 @@ def _spelled(option: click.Option, ctx: click.Context) -> str:
     return f"{names} {option.opts[-1].strip('-').upper() if _has_many_choices(option, ctx) else taken}"
 
 
-def _row(option: click.Option, ctx: click.Context) -> tuple[str, str]:
+def option_row(option: click.Option, ctx: click.Context) -> tuple[str, str]:
     """Return an option and its meaning, with the choices that its name does not list."""
     text = option.help or ""
     if _has_many_choices(option, ctx):
@@ -88,7 +88,7 @@ class WithHelp(click.Command):
                 if title == NAMES_ONLY:
                     formatter.write_text("  ".join(each.opts[-1] for each in ours))
                 else:
-                    rows = [_row(each, ctx) for each in ours]
+                    rows = [option_row(each, ctx) for each in ours]
                     formatter.write_dl([(left.ljust(width), text) for left, text in rows], WIDEST, col_spacing=1)
 
     def get_help_option(self, ctx: click.Context) -> click.Option | None:  # noqa: ARG002 - click's signature
