@@ -66,6 +66,13 @@ def test_help_lists_subjects_and_commands(run: Callable[..., Any]) -> None:
     assert run("help", "axes").out == topic("axes")
 
 
+def test_the_version_can_tell_what_it_runs_on(run: Callable[..., Any]) -> None:
+    for order in (("--version", "-v"), ("-v", "--version")):
+        lines = run(*order).out.splitlines()
+        assert lines[0] == run("--version").out.strip()
+        assert [line.split()[0] for line in lines] == ["frametool", "Python", "numpy", "click", "rich", "pyyaml", "rosbags", "matplotlib"]
+
+
 def test_help_of_a_command_is_its_own(run: Callable[..., Any]) -> None:
     assert run("help", "lookup").out == run("lookup", "--help").out
 
