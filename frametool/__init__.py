@@ -5,6 +5,11 @@
     map_from_camera = tree.lookup("map", "camera_optical")      # the pose of camera_optical in map
     point_in_map = map_from_camera.apply([0.0, 0.0, 1.0])
 
+`FORMATS` is the table of the forms of files, name -> row: what is read from a form and written in it, how it is
+recognised, what its numbers mean; `frametool formats` prints it.
+
+    [name for name, row in frametool.FORMATS.items() if "tree" in row.reads]    # what `load` takes as its format
+
 Arguments are always in the order (target, source). Metres, radians, quaternions x, y, z, w, stamps in integer
 nanoseconds. Names are loaded when first used: `import frametool` alone loads neither numpy nor yaml.
 """
@@ -14,6 +19,7 @@ from __future__ import annotations
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.errors import FrametoolError as FrametoolError
+    from frametool.formats import FORMATS as FORMATS
     from frametool.formats.load import load as load
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.tree import FrameTree as FrameTree
@@ -29,6 +35,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "FORMATS": "frametool.formats",
     "FollowController": "frametool.sim.controllers",
     "FrameTree": "frametool.frames.tree",
     "FrametoolError": "frametool.errors",
@@ -43,6 +50,7 @@ _HOMES = {
     "tutorial": "frametool.sim.scene",
 }
 __all__ = [
+    "FORMATS",
     "FollowController",
     "FrameTree",
     "FrametoolError",
