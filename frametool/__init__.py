@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from frametool.frames.tree import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
+    from frametool.lint.tree_diff import diff as diff
     from frametool.sim.controllers import FollowController as FollowController
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
@@ -44,6 +45,7 @@ _HOMES = {
     "TransformBuffer": "frametool.frames.buffer",
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
+    "diff": "frametool.lint.tree_diff",
     "load": "frametool.formats.load",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
@@ -60,6 +62,7 @@ __all__ = [
     "Turtle",
     "Twist",
     "__version__",
+    "diff",
     "load",
     "simulate",
     "simulate_many",

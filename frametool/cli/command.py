@@ -36,6 +36,8 @@ class Command(WithHelp):
     own check of misspelled options; `Text` takes the blank off again.
     """
 
+    exit_codes = EXIT_CODES
+
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers, then parse."""
         return super().parse_args(ctx, [f" {each}" if NEGATIVE.match(each) else each for each in args])
@@ -44,7 +46,7 @@ class Command(WithHelp):
         """End every help with the exit codes."""
         super().format_epilog(ctx, formatter)
         formatter.write_paragraph()
-        formatter.write_text(EXIT_CODES)
+        formatter.write_text(self.exit_codes)
 
 
 class Text(click.ParamType[str]):
