@@ -137,6 +137,14 @@ FORMATS = {
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
     "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.dot"),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.mermaid"),
+    "urdf": Format(
+        "URDF robot",
+        suffixes=(".urdf",),
+        reads=("tree",),
+        reader="frametool.formats.urdf",
+        signs=(("xml", "robot"),),
+        states="parent<-child, metres, radians, rpy about fixed axes",
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
         signs=(("xml text", r"<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b"),),
