@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.source import Source
+from frametool.documents.source import UTF16, Source
 from frametool.documents.xml_events import XmlFile
 from frametool.errors import FormatError, ValueInvalid, alternatives, bare, shown
 from frametool.formats import FORMATS
@@ -91,8 +91,9 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
     """
     xml = XmlFile(file)
     reader = _Reader(xml, options)
-    for element in xml.elements():
+    for element in xml.elements(deepest=3, ends=False):
         reader.take(element)
+    reader.end_joint()
     robot = RobotDescription(xml, reader.links, list(reader.connected()))
     if not robot.links:
         raise FormatError("no links in it", source=file.name)
@@ -112,60 +113,63 @@ class _Reader:
         self.bare = options.tally.names.bare
         self.links: dict[str, int] = {}
         self.hinges: dict[str, Hinge] = {}
+        self.outer: Element | None = None  # the link or joint in hand
         self.parts: dict[str, Element] = {}
-        self.outer = ""
+        # few files hold what would have to be looked for in every attribute
+        self.suspicious = b"$" in xml.data or b"xacro" in xml.data or xml.data.startswith(UTF16)
 
     def take(self, element: Element) -> None:
-        """Take the beginning or end of an element; those deeper than the parts of joints are not ours."""
-        ends, tag, _, depth, *_ = element
-        if depth > 3:
+        """Take the beginning of an element down to the parts of joints."""
+        if self.suspicious:
             self._refuse_xacro(element)
-        elif ends:
-            if depth == 2 and tag == "joint":
-                self._end_joint(element)
-        elif depth == 1:
-            self._begin(element)
-        elif depth == 2:
-            self._open(element)
-        else:
+        if element.depth == 3:
             self._inside(element)
-
-    def _begin(self, element: Element) -> None:
-        if element.tag != "robot":
-            raise self.xml.error(element, f"URDF begins with <robot>, found <{bare(element.tag)}>")
-        self._refuse_xacro(element)
-
-    def _open(self, element: Element) -> None:
-        """Begin a link or a joint; other elements say nothing of frames."""
-        self.outer = element.tag
-        self._refuse_xacro(element)
-        if element.tag == "joint":
-            self.parts = {}
+            return
+        self.end_joint()
+        self.outer = element
+        self.parts = {}
+        if element.depth == 1:
+            if element.tag != "robot":
+                raise self.xml.error(element, f"URDF begins with <robot>, found <{bare(element.tag)}>")
         elif element.tag == "link":
             try:
-                name = self.bare(self._name(element))
-                if name in self.links:
-                    raise self.xml.error(element, f"link {shown(name)} twice; first in line {self.links[name]}", "name")
-                self.links[name] = element.line
+                self._link(element)
             except FormatError as error:
                 self.options.report(error)
 
+    def _link(self, element: Element) -> None:
+        name = self.bare(self._name(element))
+        if name in self.links:
+            raise self.xml.error(element, f"link {shown(name)} twice; first in line {self.links[name]}", "name")
+        self.links[name] = element.line
+
     def _inside(self, element: Element) -> None:
-        """Keep a part of a joint."""
-        self._refuse_xacro(element)
-        tag = element.tag
-        if self.outer == "link" and tag in ("link", "joint"):
-            raise self.xml.error(element, f"<{tag}> inside a <link>; joints and links stand side by side in <robot>")
-        if self.outer == "joint" and tag in PARTS and self.parts.setdefault(tag, element) is not element:
-            self.options.report(self.xml.error(element, f"<{tag}> twice in one joint"))
+        """Keep a part of a joint; links and joints do not stand inside links."""
+        outer, tag = self.outer.tag if self.outer else "", element.tag
+        if outer == "joint":
+            if tag in PARTS and self.parts.setdefault(tag, element) is not element:
+                self.options.report(self.xml.error(element, f"<{tag}> twice in one joint"))
+        elif outer == "link" and tag in ("link", "joint"):
+            raise self.xml.error(element, f"<{tag}> inside a <link>; links and joints stand side by side in <robot>")
 
     def _refuse_xacro(self, element: Element) -> None:
         """Refuse what xacro would have to expand first: its elements, and expressions in attributes."""
         if element.tag.startswith("xacro:"):
             raise self.xml.error(element, f"<{bare(element.tag)}> is {_XACRO}")
         for name, value in element.attributes.items():
-            if "$" in value and ("${" in value or "$(" in value):
+            if "${" in value or "$(" in value:
                 raise self.xml.error(element, f"{shown(value)} is {_XACRO}", name)
+
+    def end_joint(self) -> None:
+        """Read the joint in hand, if it is one, from its parts."""
+        if self.outer is None or self.outer.tag != "joint":
+            return
+        try:
+            hinge = self._hinge(self.outer, self.parts)
+        except FormatError as error:
+            self.options.report(error)
+        else:
+            self.hinges[hinge.name] = hinge
 
     def _name(self, element: Element, attribute: str = "name") -> str:
         """Return an attribute that names something."""
@@ -173,14 +177,6 @@ class _Reader:
         if not name:
             raise self.xml.error(element, f"<{element.tag}> has no {attribute}", attribute if name is not None else "")
         return name
-
-    def _end_joint(self, element: Element) -> None:
-        try:
-            hinge = self._hinge(element, self.parts)
-        except FormatError as error:
-            self.options.report(error)
-        else:
-            self.hinges[hinge.name] = hinge
 
     def _hinge(self, element: Element, parts: dict[str, Element]) -> Hinge:
         """Read one joint from its parts."""
@@ -250,7 +246,8 @@ class _Reader:
         leader = self._name(element, "joint")
         if kind in ("planar", "floating"):
             raise self.xml.error(element, f"joint {shown(name)} is {kind}: it follows no other")
-        (multiplier,), (offset,) = self.xml.numbers(element, "multiplier", 1, "1"), self.xml.numbers(element, "offset", 1, "0")
+        (multiplier,) = self.xml.numbers(element, "multiplier", 1, "1")
+        (offset,) = self.xml.numbers(element, "offset", 1, "0")
         return Mimic(leader, multiplier, offset)
 
     def connected(self) -> Iterator[Hinge]:
