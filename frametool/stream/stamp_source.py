@@ -19,6 +19,7 @@ LARGEST = (1 << 63) - 1
 
 
 HEADER = "header.stamp"
+STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 
 
 class Timed(NamedTuple):
@@ -72,8 +73,8 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
     return stamp_ns
 
 
-def stamp_path(document: Any, holder: Path, name: str) -> Path:
-    """Find the stamp of a point or pose: its own key, else that of a mapping around it; raises Misfit."""
+def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 12.5") -> Path:
+    """Find a scalar of a point or pose, its stamp: its own key, else that of a mapping around it; raises Misfit."""
     around = [document]
     for step in holder:
         around.append(around[-1][step])
@@ -81,10 +82,20 @@ def stamp_path(document: Any, holder: Path, name: str) -> Path:
         for keys in ((name,), tuple(name.split("."))):
             if (found := _below(around[depth], keys)) is not None:
                 if type(found[0]) in (dict, list):
-                    raise Misfit(f"expected a time like 12.5, found {kind(found[0])}", (*holder[:depth], *keys))
+                    raise Misfit(f"expected {wanted}, found {kind(found[0])}", (*holder[:depth], *keys))
                 return (*holder[:depth], *keys)
     known = [key for each in around if type(each) is dict for key in each]
     raise Misfit(f"no key {shown(name)}{did_you_mean(name, known)}", holder)
+
+
+def stamp_keys(document: Any, holder: Path) -> Path:
+    """Find the key of a record's stamp by the names such keys have; raises Misfit."""
+    for name in STAMP_KEYS:
+        try:
+            return key_path(document, holder, name)
+        except Misfit:
+            continue
+    raise Misfit(f"@ row: no stamp is found ({', '.join(STAMP_KEYS)}); name its key with --time-column", holder)
 
 
 def _below(value: Any, keys: Sequence[str]) -> tuple[Any] | None:

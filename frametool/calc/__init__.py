@@ -1,0 +1,1 @@
+"""Expressions over poses, points and numbers, whose frames are checked like units."""
