@@ -30,6 +30,7 @@ COMMANDS = {
     "monitor": ("frametool.cli.commands.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
     "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
     "check": ("frametool.cli.commands.check", "what is wrong or odd in trees and recordings"),
+    "help": ("frametool.cli.commands.help", "a subject on one screen: pose, rotations, euler, axes, time, streams, .."),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 IN_OUT, INTERRUPTED = 5, 130  # exit codes

@@ -9,8 +9,8 @@ import click
 
 from frametool.cli.help import WithHelp
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid, shown
-from frametool.formats import writers
+from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.formats import FORMATS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 from frametool.text.numbers import parse_number
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
+READ = readers("tree", "records", "rows", "joints")
 SPELLINGS = [row.spelling for row in REPRESENTATIONS.values()]
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file, 130 interrupted."
 
@@ -146,6 +147,45 @@ def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> Non
 verbose_option = click.option(
     "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
     help="say on stderr what each input was taken for",
+)  # fmt: skip
+
+
+READING = "frametool.reading"  # where a command's context keeps the options about files of frames
+FORMS = "frametool.forms"  # where a command's context keeps those of --in
+
+
+class Form(Text):
+    """The name of a form of text from which something is read."""
+
+    name = "form"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse what is none, with the nearest names."""
+        if value not in READ:
+            near = did_you_mean(value, READ)
+            self.fail(f"no form {shown(value)} is read{near}; `frametool formats` lists all", param, ctx)
+        return value
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Offer the forms."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(name, help=FORMATS[name].summary) for name in READ if name.startswith(incomplete)]
+
+
+def _keep_forms(context: click.Context, _: click.Parameter, chosen: Sequence[str]) -> None:
+    context.meta[FORMS] = chosen
+
+
+def forms_told() -> tuple[str, ...]:
+    """Return the forms that --in names."""
+    context = click.get_current_context(silent=True)
+    return () if context is None else tuple(context.meta.get(FORMS, ()))
+
+
+in_option = click.option(
+    "--in", "input_forms", type=Form(), multiple=True, metavar="FORM", expose_value=False, callback=_keep_forms,
+    help="form of the input, one of `frametool formats`; once a file  [default: by content, then by suffix]",
 )  # fmt: skip
 
 

@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, UTF8, Notations, decorated, say_if_verbose, verbose_option
+from frametool.cli.command import (
+    FILE,
+    READING,
+    TEXT,
+    UTF8,
+    Notations,
+    decorated,
+    forms_told,
+    in_option,
+    say_if_verbose,
+    verbose_option,
+)
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
@@ -34,10 +45,6 @@ RECORDS = readers("records")
 OPTIONS = {
     "input_path": click.option(
         "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream from this file instead of standard input"
-    ),
-    "input_form": click.option(
-        "--in", "input_form", type=click.Choice(readers(*STREAMED)),
-        help="form of the stream  [default: by suffix or first line]",
     ),
     "given": click.option(
         "--from", "given", type=Notations(), metavar="REP",
@@ -72,7 +79,7 @@ OPTIONS = {
 
 def stream_options(function: Function) -> Function:
     """Add to a command the options of streams; `Stream` takes them."""
-    return decorated(function, [*OPTIONS.values(), verbose_option])
+    return decorated(function, [OPTIONS["input_path"], in_option, *list(OPTIONS.values())[1:], verbose_option])
 
 
 class Stream:
@@ -104,6 +111,18 @@ class Stream:
             raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
         return self.path is not None or argument in (None, "-")
 
+    @staticmethod
+    def told_form() -> str:
+        """Return the form that --in names for the stream, "" if it names none."""
+        told = forms_told()
+        streamed = [form for form in told if not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
+        if len(streamed) > 1:
+            raise click.UsageError(f"--in {streamed[0]} and --in {streamed[1]}: there is one stream")
+        context = click.get_current_context(silent=True)
+        if told and not streamed and READING not in (context.meta if context else {}):
+            raise click.UsageError(f"--in {told[0]} is not streamed; streams are {', '.join(readers(*STREAMED))}")
+        return streamed[0] if streamed else ""
+
     def run(
         self, request: Request, output: Output, *, tables_only: bool = False
     ) -> int:
@@ -111,8 +130,8 @@ class Stream:
         name = self.path or "stdin"
         with self.opened() as stream:
             begin = stream.peek()
-            form, known_by = self.options["input_form"], ""
-            if form is None:
+            form, known_by = self.told_form(), ""
+            if not form:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
                 say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")

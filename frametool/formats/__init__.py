@@ -13,6 +13,9 @@ class Format(NamedTuple):
     reads: what is read from it: `tree` by `read` of `reader`; `records` and `rows` by the streams
     writes: what is written in it, by `write_poses`, `write_points` (also for a `report`), `write_tree` of `writer`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
+    states: what its numbers mean (which frame in which, units, order), told when such a file was read
+    asks: the options that say what it leaves open
+    instead: of a form that is known and not read: what to do
     """
 
     summary: str
@@ -22,6 +25,9 @@ class Format(NamedTuple):
     writes: tuple[str, ...] = ()
     writer: str = ""
     signs: tuple[tuple[str, str | bytes], ...] = ()
+    states: str = ""
+    asks: tuple[str, ...] = ()
+    instead: str = ""
 
 
 _TREE = "frametool.formats.tree_reader"
@@ -131,12 +137,52 @@ FORMATS = {
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
     "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.dot"),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.mermaid"),
+    "xacro": Format(
+        "xacro, from which URDF is made",
+        signs=(("xml text", r"<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b"),),
+        instead="expand it: xacro FILE > robot.urdf (pip install xacro)",
+    ),
+    "camera_info": Format(
+        "camera_info, the intrinsics of a camera",
+        signs=(("yaml key", "projection_matrix|distortion_model"),),
+        instead="there is no pose in it; its frame stands in the tree of the robot",
+    ),
+    "map": Format(
+        "map.yaml of a map server",
+        signs=(("yaml key", "occupied_thresh"),),
+        instead="its origin is the lower left corner of the picture in the map: {xyz: [x, y, 0], rpy: [0, 0, yaw]}",
+    ),
+    "usd": Format(
+        "a USD scene",
+        signs=(("magic", rb"#usda |PXR-USDC"),),
+        instead="its units and axes differ from file to file; export URDF, or the poses as JSON",
+    ),
+    "gltf": Format(
+        "a glTF scene",
+        signs=(("magic", rb"glTF"), ("json path", "asset/version")),
+        instead="glTF has y up and z forward; export URDF, or the poses as JSON",
+    ),
+    "unity": Format(
+        "a Unity scene",
+        signs=(("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),),
+        instead="Unity is left-handed with y up; export poses as JSON and convert them",
+    ),
+    "itk": Format(
+        "an ITK or ANTs transform",
+        signs=(("magic", rb"#Insight Transform File"),),
+        instead="it maps points about a centre in LPS axes, in mm; convert it to a 4x4 matrix first",
+    ),
 }
 
 
 def readers(*what: str) -> tuple[str, ...]:
     """Name the forms from which any of `tree`, `records` and `rows` is read."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
+
+
+def unread() -> tuple[str, ...]:
+    """Name the forms that are known by their signs and not read."""
+    return tuple(name for name, row in FORMATS.items() if row.instead)
 
 
 def writers(what: str) -> tuple[str, ...]:

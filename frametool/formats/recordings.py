@@ -11,7 +11,7 @@ from frametool.documents.input_file import InputFile
 from frametool.errors import FileProblem, FormatError, warn
 from frametool.formats import BAG, FORMATS
 from frametool.formats.detect import detect, of_folder
-from frametool.grammar.edges import Edge, Options, Tally, Topics, stop
+from frametool.grammar.edges import Answers, Edge, Options, Tally, Topics, stop
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -31,10 +31,12 @@ class Recording(InputFile):
         stream: BinaryIO | None = None,
         form: str | None = None,
         topics: Iterable[str] = (),
+        answers: Answers = Answers(),  # noqa: B008 - it is frozen
     ) -> None:
         """Open a file, a bag's folder, or standard input for `-`, and find its form, unless it is told.
 
         stream: what was opened already, with nothing of it read.  topics: those of a recording that are read.
+        answers: what the form may leave open.
         Raises FileProblem.
         """
         folder = None if form else of_folder(str(path))
@@ -44,6 +46,7 @@ class Recording(InputFile):
         self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
         self.tally = Tally()
         self.topics = Topics(topics)
+        self.answers = answers
 
     @classmethod
     def inline(cls, source: Source) -> Recording:
@@ -62,6 +65,12 @@ class Recording(InputFile):
         """Say what the file was taken for."""
         return f"{self.name}: {FORMATS[self.form].summary}"
 
+    @property
+    def stated(self) -> str:
+        """Say what a file that was read means, if its form is not one of ours: directions, units, what was assumed."""
+        states = FORMATS[self.form].states
+        return f"{self.described}{', ' if self.tally.about else ''}{self.tally.about}; {states}" if states else ""
+
     def edges(
         self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
     ) -> Iterator[Edge]:
@@ -72,7 +81,7 @@ class Recording(InputFile):
         normalize: take any non-zero quaternion and any matrix near a rotation.
         """
         try:
-            options = Options(self.tally, self.topics, report, raw, normalize)
+            options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
             yield from import_module(FORMATS[self.form].reader).read(self, options)
         finally:
             self.close()

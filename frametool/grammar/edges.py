@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import NamedTuple
 
 from frametool.errors import shown
@@ -9,7 +10,7 @@ from frametool.grammar.readers import slash_note
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from frametool.errors import FormatError
     from frametool.geometry.types import Rigid
@@ -79,10 +80,14 @@ class Remark(NamedTuple):
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
-    __slots__ = ("names", "noise", "notes", "others", "rough")
+    __slots__ = ("about", "names", "noise", "notes", "others", "rough")
 
     def __init__(self) -> None:
-        """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic."""
+        """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic.
+
+        about: what this file holds and what was taken for granted, told beside what its form means
+        """
+        self.about = ""
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
         self.rough: list[int] = []
@@ -148,6 +153,36 @@ def _source_of(topic: str) -> str:
     return topic.removesuffix("_static") if topic.endswith("/tf_static") or topic == "tf_static" else topic
 
 
+class Answers(NamedTuple):
+    """What options say about files whose form leaves it open.
+
+    frames: names of the frames that a form does not name, in its order: the world, then what is seen from it
+    direction: of matrices whose key does not say it, `parent-from-child` or `child-from-parent`
+    camera_axes: of cameras, `optical` (x right, y down, z forward) or `opengl` (x right, y up, z back)
+    dh: `standard` or `modified` Denavit-Hartenberg parameters
+    stamps: a file with a time for each pose, one a line
+    joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
+    joint_files: files with values of joints, over time or for good
+    """
+
+    frames: tuple[str, ...] = ()
+    direction: str = ""
+    camera_axes: str = ""
+    dh: str = ""
+    stamps: str = ""
+    joints: Mapping[str, str] = MappingProxyType({})
+    joint_files: tuple[str, ...] = ()
+
+    def names(self, *defaults: str) -> tuple[str, ...]:
+        """Return the names of a form's frames: as told, then its own."""
+        return (*self.frames[: len(defaults)], *defaults[len(self.frames) :])
+
+
+DIRECTIONS = ("parent-from-child", "child-from-parent")
+CAMERA_AXES = ("optical", "opengl")
+DH = ("standard", "modified")
+
+
 class Options(NamedTuple):
     """How a file of frames is read.
 
@@ -156,6 +191,7 @@ class Options(NamedTuple):
     report: takes the errors, and reading goes on behind them
     raw: messages are taken as tf2 receives them, unchecked
     normalize: any non-zero quaternion and any matrix near a rotation is taken
+    answers: what the form leaves open
     """
 
     tally: Tally
@@ -163,3 +199,4 @@ class Options(NamedTuple):
     report: Report = stop
     raw: bool = False
     normalize: bool = False
+    answers: Answers = Answers()

@@ -11,7 +11,7 @@ from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, one_pose, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
+from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import NotFinite, parse_number
@@ -51,7 +51,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 )
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest; messages: their own]")
 @rules_options
-@topic_option
+@reading_options(streams=True)
 @stream_options
 def command(
     arguments: tuple[str, ...],
@@ -172,7 +172,7 @@ def _way_by_tree(
     """
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
-    tree = load_tree(arguments[0], more, chosen_rules)
+    tree = load_tree(arguments[0], more, chosen_rules, streams=True)
     target, rest = frame_name(arguments[1], tree), arguments[2:]
     source = None
     if rest and not _is_record(rest[0]):

@@ -11,7 +11,7 @@ from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, Skipped, at_ns, read_times, rules, rules_options, times_option
-from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
+from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.grammar.edges import stop
 from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, why_missing
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")
 @times_option
 @rules_options
-@topic_option
+@reading_options(streams=True)
 @pose_options
 @rotation_options
 @result_options("poses")
@@ -63,7 +63,8 @@ def command(
     _check(at, source_at, fixed, times)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
-    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize))
+    chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize)
+    frames = load_tree(tree, more, chosen, streams=bool(by_row))
     if by_row or target is None or source is None:
         return by_row.run(stream, output, frames, target=target, source=source, at=at_ns(at))
     if tf2 is None:
