@@ -48,6 +48,13 @@ class Literals:
             warn(note.message)
         return term
 
+    def of_document(self, value: Any, source: Source) -> Term:
+        """Read a document as a literal; raises FormatError with the place."""
+        try:
+            return _read(value, Reading(source, degrees=self.degrees, normalize=self.normalize))
+        except Misfit as misfit:
+            raise misfit.placed(source, 0) from None
+
 
 def _read(value: Any, reading: Reading) -> Term:
     if type(value) is not dict:

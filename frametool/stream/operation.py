@@ -57,6 +57,9 @@ class Formula(Protocol):
     def extras(self, row: str) -> tuple[str, ...]:
         """Name the numbers that come beside a pose or point."""
 
+    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
+        """Return the frames of the result of a row with these; raise FrametoolError where they do not fit."""
+
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
     ) -> Components:

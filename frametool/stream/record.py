@@ -560,6 +560,7 @@ def placed(misfit: Misfit, source: Source) -> FormatError:
 
 def lost_name(record: Record, request: Request) -> str:
     """Name a frame that the record names and its result cannot, because the operation does not know the other one."""
+    request = request.for_kind(record.shape.kind)
     if request.rename is None:
         return ""
     before = record.parent.text or record.name.text or ""

@@ -115,6 +115,7 @@ def _unit(record: Record, document: Any) -> Path:
 
 def _answer(record: Record, request: Request, source: Source) -> Answer:
     """Apply the operation to one record."""
+    request = request.for_kind(record.shape.kind)
     try:
         parent, name = record.parent.text, record.name.text
         if request.rename is not None:

@@ -95,7 +95,7 @@ class Splicer:
         self.node = root.at(record.path)
         self.record = record
         self.target = target
-        self.request = request
+        self.request = request.for_kind(record.shape.kind)
         self.json = json
         self.first = first
         self.edits: list[Edit] = []

@@ -36,6 +36,11 @@ class Timed(NamedTuple):
     one: Callable[[str | None, int], Rigid]
     moves: Callable[[str | None], bool] = bool
 
+    @classmethod
+    def of_rows(cls, name: str) -> Timed:
+        """Say where the stamps of rows stand for an expression, which knows by itself what they are for."""
+        return cls(name, _by_expression, _by_expression, lambda _: True)
+
     @property
     def in_ns(self) -> bool:
         """Tell whether the name says that stamps are integer nanoseconds."""
@@ -50,6 +55,11 @@ class Timed(NamedTuple):
         """Return the pose at one time, to the bit as `many` does; raises FrametoolError where there is none."""
         tx, ty, tz, x, y, z, w = (float(column[0]) for column in self.many(frame, [stamp_ns]))
         return (tx, ty, tz, x, y, z, w) if w == w else self.one(frame, stamp_ns)  # noqa: PLR0124 - nan is not itself
+
+
+def _by_expression(_frame: str | None, _at: Any) -> Any:
+    """Move nothing: what an expression looks up it looks up itself."""
+    raise ValueInvalid("an expression does its own look-ups")
 
 
 def read_header_stamp(seconds: str, nanoseconds: str) -> int:

@@ -37,6 +37,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         raise FormatError(wrong, source=source, line=1)
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
+    request = request.for_kind(shapes[0].kind) if shapes else request
     target = _target(shapes, request)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *asked)
     frames = _frame_columns(table, request, source)

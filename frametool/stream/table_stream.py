@@ -58,7 +58,7 @@ def run_table(
     plan, layout = plan_table(table, request, source)
     taken = len(first) - len(rest)
     yield Outcome(table.opening(layout), lines=first.count(b"\n", 0, taken), size=taken)
-    work = TableWork(table, plan, layout, Naming(table, layout, request), unasked)
+    work = TableWork(table, plan, layout, Naming(table, layout, request.for_kind(plan.shapes[0].kind) if plan.shapes else request), unasked)
     yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
 
 

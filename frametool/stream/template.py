@@ -307,6 +307,7 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
         stamp = ((document.index, *within((document.index,), stamp_keys, document.value, record.path[1:])),)
     elif request.way is not None:
         edge = request.way(record.parent.text)
+    request = request.for_kind(record.shape.kind)
     if request.rename is not None:
         request.rename(record.parent.text, record.name.text)
     return Entry(record, target_of(record, request), edge, stamp)
