@@ -13,6 +13,7 @@ from frametool.calc.frame_rules import in_radians
 from frametool.calc.parser import walk
 from frametool.calc.tokens import CalcError
 from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, RADIAN, TREE, TWIST, VECTOR, RowValues, Type
+from frametool.errors import FrametoolError
 from frametool.geometry.representations import notation
 from frametool.geometry.trig import RADIAN as DEGREES
 from frametool.stream.row_layout import Target
@@ -73,6 +74,18 @@ class RowExpressions:
         self._bound: dict[Type, Bound] = {}
         self._plain: dict[str, Bound] = {}
 
+    def check(self, kinds: Sequence[str]) -> None:
+        """Raise the error of the first of some kinds of rows if the lines suit none of them."""
+        problems = []
+        for kind in kinds if self.reads_row else ("",):
+            try:
+                self._plainly(kind)
+            except FrametoolError as error:
+                problems.append(error)
+            else:
+                return
+        raise problems[0]
+
     def kind(self, row: str) -> str:
         """Return whether a row of some kind becomes a pose, a point or a vector; "" for numbers alone."""
         if self.adds:
@@ -91,7 +104,7 @@ class RowExpressions:
         if self.adds or not self.kind(row):
             return parent, name
         result = bound.terms[0][1].type
-        return result.target, result.source if result.kind == POSE else None
+        return result.target, result.source if result.kind == POSE else name
 
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace

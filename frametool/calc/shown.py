@@ -64,8 +64,7 @@ def line_of_value(term: Term, style: Style) -> str:
         return f"{_text(numbers[0], style)} {unit_text(type_.unit)}".rstrip() + "\n"
     if type_.kind == ANGLES:
         radians, degrees = ("  ".join(_text(each * unit, style) for each in numbers) for unit in (1.0, DEGREES))
-        first, second = (f"{degrees}  deg", f"{radians}  rad") if style.degrees else (f"{radians}  rad", f"{degrees}  deg")
-        return f"roll pitch yaw  {first}  ({second}){frame}\n"
+        return f"rpy  {radians}  rad{frame}\n     {degrees}  deg\n"
     assert type_.kind == TWIST  # noqa: S101 - all other kinds are written elsewhere
     linear, angular = ("  ".join(_text(each, style) for each in part) for part in (numbers[:3], numbers[3:]))
     return f"linear  {linear}  m\nangular  {angular}  rad{frame}\n"

@@ -191,7 +191,8 @@ def _formula_result(node: Node, unit: Path, answer: Answer, request: Request) ->
     rest = _rest(node, unit, answer.record)
     if kind == POSE:
         return Result(Pose.of(answer.parts[:7], answer.name, answer.parent), extras | rest)
-    named = {key: name for key, name in (("frame", answer.parent), ("name", answer.name)) if name is not None}
+    seen_from = "frame" if kind or shape.kind != POSE else "parent"
+    named = {key: name for key, name in (("name", answer.name), (seen_from, answer.parent)) if name is not None}
     return named | ({kind: list(answer.parts[:3])} if kind else {}) | extras | rest
 
 

@@ -78,6 +78,7 @@ def command(
     if stream.path is not None or any(mentions_row(line.tree) for line in lines):
         flags = [is_option for _, is_option in given]
         formula = _over_rows(lines, flags, scope, output)
+        formula.check((kind,) if kind else ("pose", "point", "vector"))
         request = _request(formula, kind or "", time_column, degrees=deg, normalize=normalize)
         return stream.run(request, output)
     from frametool.cli.calc_output import value_texts
