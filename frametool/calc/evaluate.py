@@ -1,7 +1,7 @@
 """From an expression to its value: each part is understood once, in order; what depends on a row is computed later.
 
-    scope = Scope(tree=frametool.load("robot.yaml"))
-    evaluate("inv(map<-base_link) * (map<-tool)", scope).type      # base_link<-tool
+scope = Scope(tree=frametool.load("robot.yaml"))
+evaluate("inv(map<-base_link) * (map<-tool)", scope).type      # base_link<-tool
 """
 
 from __future__ import annotations
@@ -207,8 +207,8 @@ class _Walk:
             return rules.list_of_numbers(items)
         kinds = {item.type.kind for item in items}
         if len(kinds) > 1:
-            raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and "
-                            f"{next(item for item in items if item.type.kind != items[0].type.kind).type.named}")  # fmt: skip
+            other = next(item for item in items if item.type.kind != items[0].type.kind)
+            raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and {other.type.named}")
         return Term(Type(LIST), (), items=items)
 
     def _call(self, branch: Branch) -> Term:
@@ -309,7 +309,7 @@ def _at_row(tree: Frames, target: str, source: str) -> Callable[[RowValues], Com
             return tree.lookup_many(target, source, row.times_ns, missing="nan").components
         found = tree.lookup_many(target, source, [row.times_ns], missing="nan").components  # to the bit as of many
         single = tuple(float(column[0]) for column in found)
-        return single if single[6] == single[6] else tree.lookup_components(target, source, row.times_ns)  # noqa: PLR0124
+        return single if single[6] == single[6] else tree.lookup_components(target, source, row.times_ns)
 
     return compute
 

@@ -130,7 +130,7 @@ class RowExpressions:
             for line in self.bindings:
                 self._bind(line, scope)
             terms = tuple((line.name, self._bind(line, scope)) for line in self.lines)
-            named = terms if self.adds or not terms[0][1].type.kind in (POSE, POINT, VECTOR) else ()
+            named = terms if self.adds or terms[0][1].type.kind not in (POSE, POINT, VECTOR) else ()
             extras = tuple(name for own, term in named for name in self._names(own, term.type))
             self._bound[type_] = Bound(terms, extras)
         return self._bound[type_]

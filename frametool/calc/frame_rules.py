@@ -9,6 +9,7 @@ from frametool.calc.tokens import CalcError, frame_text
 from frametool.calc.values import (
     ANGLES,
     LIST,
+    METRE,
     NUMBER,
     PLAIN,
     POINT,
@@ -18,7 +19,6 @@ from frametool.calc.values import (
     TREE,
     TWIST,
     VECTOR,
-    METRE,
     Term,
     Type,
     made,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from frametool.calc.values import Dimension
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Components, Namespace, Number
+    from frametool.geometry.types import Components, Namespace, Number, Rigid
 
     Trees = Sequence[tuple[str, Frames]]
 
@@ -277,15 +277,18 @@ def power(base: Term, exponent: Term) -> Term:
     return made(Type(NUMBER, unit=unit), _powered, in_radians(base), exponent, check=_no_power)
 
 
-def _part_of_motion(*parts: Number) -> Components:
-    *pose, fraction, xp = parts
-    twist = rigid.log(*quaternion_settled(pose, xp), xp)
-    return rigid.exp(*(fraction * each for each in twist), xp)
+def _part_of_motion(
+    tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, fraction: Number, xp: Namespace
+) -> Components:
+    vx, vy, vz, wx, wy, wz = rigid.log(tx, ty, tz, *quaternion.unit(x, y, z, w, xp), xp)
+    f = fraction
+    return rigid.exp(f * vx, f * vy, f * vz, f * wx, f * wy, f * wz, xp)
 
 
-def quaternion_settled(pose: Sequence[Number], xp: Namespace) -> Components:
+def with_unit(pose: Sequence[Number], xp: Namespace) -> Rigid:
     """Return a pose with its quaternion made unit, which products keep only to some eps."""
-    return (*pose[:3], *quaternion.unit(*pose[3:], xp))
+    tx, ty, tz, x, y, z, w = pose
+    return tx, ty, tz, *quaternion.unit(x, y, z, w, xp)
 
 
 def _powered(base: Number, exponent: Number, xp: Namespace) -> Components:
@@ -320,7 +323,8 @@ def in_frame(term: Term, frame: str) -> Term:
         hint = "; a pose has two: .. as TARGET<-SOURCE" if type_.kind == POSE else ""
         raise CalcError(f"in names the frame of a point or vector; found {type_.named}{hint}")
     if not meet(type_.target, frame):
-        raise CalcError(f"this is in {shown(type_.target)} already; to move it: ({frame_text(frame)}<-{frame_text(type_.target)}) * ..")
+        moved = f"({frame_text(frame)}<-{frame_text(type_.target)}) * .."
+        raise CalcError(f"this is in {shown(type_.target)} already; to move it: {moved}")
     return term.typed(type_._replace(target=frame))
 
 
@@ -366,7 +370,8 @@ def list_of_numbers(items: Sequence[Term]) -> Term:
     """Return the point of three numbers, or the twist of six."""
     if len(items) not in (3, 6):
         numbers = "1 number" if len(items) == 1 else f"{len(items)} numbers"
-        raise CalcError(f"a list of {numbers}; a point has 3, a twist 6; rotations say what they are: {{rpy_deg: [..]}}")
+        hint = "a point has 3, a twist 6; rotations say what they are: {rpy_deg: [..]}"
+        raise CalcError(f"a list of {numbers}; {hint}")
     units = [METRE] * 3 + [RADIAN] * 3
     for term, unit in zip(items, units, strict=False):
         if term.type.unit not in (PLAIN, unit):

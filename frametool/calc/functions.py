@@ -12,9 +12,9 @@ from frametool.calc.frame_rules import (
     one_target,
     plain_angle,
     plain_number,
-    quaternion_settled,
     same_frames,
     wanted,
+    with_unit,
 )
 from frametool.calc.tokens import CalcError
 from frametool.calc.values import (
@@ -82,9 +82,7 @@ def _rot(name: str, terms: Sequence[Term], _: Trees) -> Term:
 def _rpy(name: str, terms: Sequence[Term], _: Trees) -> Term:
     def angles(*parts: Number) -> Components:
         *pose, xp = parts
-        unit = quaternion.unit(*pose[3:], xp)
-        found: Components = euler.from_quaternion(*unit, "sxyz", xp)
-        return found
+        return euler.from_quaternion(*with_unit(pose, xp)[3:], "sxyz", xp)
 
     pose = need(terms[0], (POSE,), name)
     return made(Type(ANGLES, pose.type.target), angles, pose)
@@ -93,7 +91,7 @@ def _rpy(name: str, terms: Sequence[Term], _: Trees) -> Term:
 def _log(name: str, terms: Sequence[Term], _: Trees) -> Term:
     def twist(*parts: Number) -> Components:
         *pose, xp = parts
-        return rigid.log(*quaternion_settled(pose, xp), xp)
+        return rigid.log(*with_unit(pose, xp), xp)
 
     pose = need(terms[0], (POSE,), name)
     return made(Type(TWIST, pose.type.target), twist, pose)
@@ -174,8 +172,8 @@ def _dist(name: str, terms: Sequence[Term], trees: Trees) -> Term:
         return (rigid.distance(*parts)[0],)
 
     def points(*parts: Number) -> Components:
-        *given, xp = parts
-        return (quaternion.magnitude(*(b - a for a, b in zip(given[:3], given[3:], strict=True)), xp),)
+        ax, ay, az, bx, by, bz, xp = parts
+        return (quaternion.magnitude(bx - ax, by - ay, bz - az, xp),)
 
     a, b = (need(each, (POSE, POINT), name) for each in terms)
     if a.type.kind != b.type.kind:
@@ -190,12 +188,11 @@ def _dist(name: str, terms: Sequence[Term], trees: Trees) -> Term:
 def _angle(name: str, terms: Sequence[Term], trees: Trees) -> Term:
     def own(*parts: Number) -> Components:
         *pose, xp = parts
-        return (rigid.extent(*quaternion_settled(pose, xp), xp)[1],)
+        return (rigid.extent(*with_unit(pose, xp), xp)[1],)
 
     def poses(*parts: Number) -> Components:
         *both, xp = parts
-        pair = (*quaternion_settled(both[:7], xp), *quaternion_settled(both[7:], xp))
-        return (rigid.distance(*pair, xp)[1],)
+        return (rigid.distance(*with_unit(both[:7], xp), *with_unit(both[7:], xp), xp)[1],)
 
     type_ = Type(NUMBER, unit=RADIAN)
     if len(terms) == 1:
@@ -216,18 +213,21 @@ def _no_direction(*parts: float) -> str:
     return "" if any(parts[:3]) and any(parts[3:6]) else "vector 0 0 0 has no direction; the angle to it is not defined"
 
 
-def _between_vectors(*parts: Number) -> Components:
+def _between_vectors(
+    ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace
+) -> Components:
     """Return the angle of two vectors: 2 atan2(|b - a|, |a + b|) of their directions (Kahan)."""
-    *given, xp = parts
-    a, b = (quaternion.unit_vector(*each, xp) for each in (given[:3], given[3:]))
-    apart = quaternion.length(*(0.5 * (q - p) for p, q in zip(a, b, strict=True)), xp)
-    along = quaternion.length(*(0.5 * (q + p) for p, q in zip(a, b, strict=True)), xp)
+    ax, ay, az = quaternion.unit_vector(ax, ay, az, xp)
+    bx, by, bz = quaternion.unit_vector(bx, by, bz, xp)
+    apart = quaternion.length(0.5 * (bx - ax), 0.5 * (by - ay), 0.5 * (bz - az), xp)
+    along = quaternion.length(0.5 * (bx + ax), 0.5 * (by + ay), 0.5 * (bz + az), xp)
     return (2.0 * trig.incline(apart, along, xp),)
 
 
 def _norm(name: str, terms: Sequence[Term], _: Trees) -> Term:
     def length(*parts: Number) -> Components:
-        return (quaternion.magnitude(*parts),)
+        x, y, z, xp = parts
+        return (quaternion.magnitude(x, y, z, xp),)
 
     return made(Type(NUMBER, unit=METRE), length, need(terms[0], PLACED, name))
 

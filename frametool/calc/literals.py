@@ -1,7 +1,7 @@
 """Literals in braces: a pose in the grammar that files share, or a point, a vector or a twist as results are written.
 
-    {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}    {name: tool, parent: wrist, xyz: [0, 0, 0.1]}
-    {frame: map, point: [1, 2, 3]}           {twist: [1, 0, 0, 0, 0, 0.5]}
+{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}    {name: tool, parent: wrist, xyz: [0, 0, 0.1]}
+{frame: map, point: [1, 2, 3]}           {twist: [1, 0, 0, 0, 0, 0.5]}
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """An expression as a small tree, by precedence climbing; knows the grammar, neither frames nor numbers.
 
-    sum     = product {("+" | "-") product}        product = factor {("*" | "/") factor}
-    factor  = {"-" | "+"} power                    power   = named ["^" factor]
-    named   = atom {"as" TARGET<-SOURCE | "in" FRAME}
-    atom    = NUMBER[UNIT] | LOOKUP ["@" time] | NAME "[" LOOKUP ["@" time] "]" | NAME "(" .. ")" | NAME
-              | row | row.COLUMN | {pose} | "[" .. "]" | "(" sum ")"
+sum     = product {("+" | "-") product}        product = factor {("*" | "/") factor}
+factor  = {"-" | "+"} power                    power   = named ["^" factor]
+named   = atom {"as" TARGET<-SOURCE | "in" FRAME}
+atom    = NUMBER[UNIT] | LOOKUP ["@" time] | NAME "[" LOOKUP ["@" time] "]" | NAME "(" .. ")" | NAME
+          | row | row.COLUMN | {pose} | "[" .. "]" | "(" sum ")"
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ def parse_line(text: str, taken: frozenset[str] = frozenset()) -> Line:
     if (match := _BINDING.match(text)):
         name = match[1]
         if name in RESERVED or name in taken:
-            raise CalcError(f"{shown(name)} has a meaning of its own and cannot be bound; take another name", match.start(1))
+            message = f"{shown(name)} has a meaning of its own and cannot be bound; take another name"
+            raise CalcError(message, match.start(1))
         return Line(name, _Parser(text, match.end()).whole(), text)
     return Line("", _Parser(text).whole(), text)
 
@@ -171,7 +172,8 @@ class _Parser:
         self._deeper(token.start)
         exponent = self.factor()
         self.depth -= 1
-        return Branch("power", token.start, base.left, exponent.right, base.left, exponent.right, None, (base, exponent))
+        left, right = base.left, exponent.right
+        return Branch("power", token.start, left, right, left, right, None, (base, exponent))
 
     def named(self) -> Branch:
         """Read a value and the frames it is said to have."""
@@ -260,7 +262,8 @@ class _Parser:
             return token.text, token.end
         if token.kind != "number" or token.unit not in TIME_UNITS:
             found = "" if token.kind == "end" else f", found {shown(token.text + token.unit)}"
-            raise CalcError(f"expected a time with its unit, 2.5s or 2500000000ns, or latest or row{found}", token.start)
+            expected = "expected a time with its unit, 2.5s or 2500000000ns, or latest or row"
+            raise CalcError(f"{expected}{found}", token.start)
         from frametool.frames.stamps import parse_stamp, whole_stamp
 
         written = TIME_UNITS[token.unit]

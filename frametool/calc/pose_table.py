@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from frametool.calc.values import LIST, POINT, POSE, Term, Type
 from frametool.documents.source import opened
@@ -57,7 +57,8 @@ def poses_of_table(path: str, form: str, *, normalize: bool, degrees: bool) -> T
     collector = _Collector()
     request = Request(Operation(moves=True, formula=collector), normalize=normalize, degrees=degrees)
     line = 1
-    with opened(path) as stream:
+    file: Any = opened(path)
+    with file as stream:
         for outcome in run_table(stream, form, request, source=path):
             if outcome.faults:
                 fault = outcome.faults[0]

@@ -101,9 +101,10 @@ def _unexpected(text: str, at: int) -> str:
     """Say what is wrong with a character that begins no word."""
     if odd := odd_characters(text[at]):
         return f"unexpected {odd}"
+    lookup = "a look-up is written TARGET<-SOURCE"
     hints = {
-        "}": "a { before it is missing", '"': 'a quote is not closed: "name"', "<": "a look-up is written TARGET<-SOURCE",
-        ">": "a look-up is written TARGET<-SOURCE", ".": "a number has a digit behind its point, a column is row.NAME",
+        "}": "a { before it is missing", '"': 'a quote is not closed: "name"', "<": lookup, ">": lookup,
+        ".": "a number has a digit behind its point, a column is row.NAME",
         ";": "write one expression a line", "~": "the inverse is inv(..)", "'": 'names with blanks stand in "',
     }  # fmt: skip
     hint = hints.get(text[at], "")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import re
 from typing import TYPE_CHECKING
 
+from frametool.calc.evaluate import read_line
 from frametool.calc.literals import PLACED, term_of_pose
 from frametool.calc.values import LIST, TREE, Term, Type
 from frametool.cli.poses import source_of
@@ -16,10 +19,34 @@ from frametool.formats.detect import detect
 from frametool.formats.recordings import Recording
 
 if TYPE_CHECKING:
+    from frametool.calc.evaluate import Scope
     from frametool.calc.literals import Literals
     from frametool.documents.source import Source
 
 OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
+
+
+NAMED = re.compile(r"\s*([^\W\d]\w*)\s*=\s*(.*?)\s*", re.DOTALL)
+LIKE_A_FILE = re.compile(r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*")
+LONGEST_PATH = 4096
+
+
+def file_named_in(text: str, scope: Scope) -> Term | None:
+    """Bind the name of `NAME=FILE` to what the file holds, and return it; None for everything else.
+
+    What looks like a file and is none is refused as one.
+    """
+    match = NAMED.fullmatch(text[:LONGEST_PATH]) if len(text) < LONGEST_PATH else None
+    if match is None or not (match[2] == "-" or _is_file(match[2]) or LIKE_A_FILE.fullmatch(match[2])):
+        return None
+    read_line(f"{match[1]}=0")  # refuses a name that is taken
+    found = named_file(match[1], match[2], scope.literals).written(match[1], atomic=True)
+    scope.names[match[1]] = found
+    return found
+
+
+def _is_file(path: str) -> bool:
+    return bool(path) and "\0" not in path and os.path.exists(path)
 
 
 def named_file(name: str, path: str, literals: Literals) -> Term:

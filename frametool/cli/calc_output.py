@@ -1,4 +1,4 @@
-"""The values of expressions, written: poses and points as everywhere, numbers bare, or with their units for a person."""
+"""The values of expressions, written: poses and points as everywhere, numbers bare or, for a person, with units."""
 
 from __future__ import annotations
 
@@ -80,6 +80,7 @@ def _csv(terms: Sequence[Term], style: Style) -> str:
             continue
         *_, numbers = result.values()
         suffix = "_deg" if "rpy_deg" in result else ""
+        names = [f"{name}{suffix}" for name in NAMES[term.type.kind]]
         frame = {} if term.type.target is None else {"frame": term.type.target}
-        rows.append(frame | {f"{name}{suffix}": value for name, value in zip(NAMES[term.type.kind], numbers, strict=True)})
+        rows.append(frame | dict(zip(names, numbers, strict=True)))
     return str(module.write_points(rows, style))

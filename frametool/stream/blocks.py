@@ -143,7 +143,8 @@ class Run:
 
     def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
-        shapes, operation, moved = self.plan.shapes, self.plan.operation, []
+        shapes, operation = self.plan.shapes, self.plan.operation
+        moved: list[Components] = []
         poses: list[Rigid] = []
         first = 0
         for shape, mover in zip(shapes, movers, strict=False):

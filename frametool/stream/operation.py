@@ -9,7 +9,7 @@ from frametool.geometry.trig import RADIAN
 from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.row_layout import Shape

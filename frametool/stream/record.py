@@ -222,10 +222,7 @@ def _record(
     reading.here = here = (*above, *path)
     try:
         if type(value) is list:
-            record = _bare_list(value, here, reading, request)
-            if request.operation.only_adds or request.operation.columns:
-                raise Misfit("a bare list has no keys; write a mapping like {point: [x, y, z]}")
-            return record
+            return _bare_list(value, here, reading, request)
         record = _mapping(value, here, reading, request)
         if request.operation.formula is not None:
             record = _for_formula(record, value, request.operation.formula)
@@ -276,6 +273,8 @@ def _with_asked(record: Record, document: Any, path: Path, above: Path, request:
 
 def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request) -> Record:
     """Read [x, y, z], or the rows of a matrix."""
+    if request.operation.only_adds or request.operation.columns:
+        raise Misfit("a bare list has no keys; write a mapping like {point: [x, y, z]}")
     if type(value[0]) is list:
         return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading, request)
     if len(value) != 3 or not request.operation.moves:

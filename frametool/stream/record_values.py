@@ -22,8 +22,8 @@ from frametool.grammar.result import Result
 from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, placed, value_at
 from frametool.stream.request import Request
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
-from frametool.stream.stamp_source import key_path, read_stamp, stamp_keys
 from frametool.stream.scalar import checked_rotation, moved
+from frametool.stream.stamp_source import key_path, read_stamp, stamp_keys
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

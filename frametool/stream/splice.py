@@ -236,7 +236,8 @@ class Splicer:
         if self._has_swapped(name, parent):
             return
         self._name(record.name, name, "name")
-        self._name(record.parent, parent, "parent" if self.request.operation.result_kind(record.shape.kind) == POSE else "frame")
+        becomes_pose = self.request.operation.result_kind(record.shape.kind) == POSE
+        self._name(record.parent, parent, "parent" if becomes_pose else "frame")
 
     def _name(self, old: Name, new: str | None, key: str) -> None:
         """Write a frame's name where the record says it, or as a member of its own."""
@@ -358,7 +359,7 @@ class Splicer:
 def root_of_extras(root: Node, record: Record) -> Node:
     """Return the mapping that an expression's results stand in: the outermost that holds this record alone."""
     lists = [at for at, step in enumerate(record.path) if type(step) is int]
-    return root.at(record.path[: lists[-1] + 1])  # type: ignore[no-any-return]
+    return root.at(record.path[: lists[-1] + 1])
 
 
 def _flow(value: Any, text: Any) -> str:

@@ -52,13 +52,15 @@ def run_table(
     table = _as_tum(table, form, request)
     unasked = None
     if request.timed is not None and request.operation.formula is not None:
-        request = request._replace(timed=request.timed._replace(name=request.timed.name or _stamp_column(table, source)))
+        name = request.timed.name or _stamp_column(table, source)
+        request = request._replace(timed=request.timed._replace(name=name))
     elif request.timed is not None and not request.timed.name:  # rows have no header
         unasked, request = _stamps_unasked(table, request.timed), request._replace(timed=None)
     plan, layout = plan_table(table, request, source)
     taken = len(first) - len(rest)
     yield Outcome(table.opening(layout), lines=first.count(b"\n", 0, taken), size=taken)
-    work = TableWork(table, plan, layout, Naming(table, layout, request.for_kind(plan.shapes[0].kind) if plan.shapes else request), unasked)
+    named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
+    work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
     yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ import click
 from frametool.calc.evaluate import Scope, evaluate_line, mentions_row, read_line
 from frametool.calc.literals import Literals
 from frametool.calc.parser import walk
-from frametool.cli.calc_names import named_file
+from frametool.cli.calc_names import file_named_in
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 KINDS = ("point", "vector", "pose")
-NAMED = re.compile(r"\s*([^\W\d]\w*)\s*=\s*(.*)", re.DOTALL)
-LIKE_A_FILE = re.compile(r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*")
 
 
 @click.command(cls=Command, name="calc")
@@ -90,20 +87,10 @@ def command(
 def _given(arguments: Iterable[str], expressions: Iterable[str], scope: Scope) -> Iterator[tuple[str, bool]]:
     """Yield the expressions in order, and whether -e gave them; names of files are bound."""
     for text in arguments:
-        match = NAMED.fullmatch(text)
-        if match and (match[2] == "-" or os.path.exists(match[2]) or LIKE_A_FILE.fullmatch(match[2])):
-            scope.names[_free(match[1], text)] = named_file(match[1], match[2], scope.literals)
-        else:
+        if file_named_in(text, scope) is None:
             yield text, False
     for text in expressions:
         yield read_text(text[1:]) if text.startswith("@") else text, True
-
-
-def _free(name: str, text: str) -> str:
-    """Refuse a name with a meaning of its own."""
-    read_line(f"{name}=0")
-    del text
-    return name
 
 
 def _tree(files: Sequence[str], lines: Sequence[Line]) -> Any:

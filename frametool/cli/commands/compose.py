@@ -47,9 +47,10 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     if given.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
     at = given.index("-")
-    read = {each: each.of(one_pose(each.argument, degrees=deg, normalize=normalize)) for each in factors if each.argument != "-"}
-    left = [read[each] for each in factors[:at]]
-    right = [read[each] for each in factors[at + 1 :]]
+    left, right = (
+        [each.of(one_pose(each.argument, degrees=deg, normalize=normalize)) for each in side]
+        for side in (factors[:at], factors[at + 1 :])
+    )
     rows = factors[at]
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
