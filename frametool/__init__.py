@@ -13,6 +13,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from frametool.calc.python_face import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.formats.load import load as load
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "calc": "frametool.calc",
     "FollowController": "frametool.sim.controllers",
     "FrameTree": "frametool.frames.tree",
     "FrametoolError": "frametool.errors",
@@ -52,6 +54,7 @@ __all__ = [
     "Turtle",
     "Twist",
     "__version__",
+    "calc",
     "load",
     "simulate",
     "simulate_many",
@@ -65,7 +68,8 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'frametool' has no attribute {name!r}")
     from importlib import import_module
 
-    value: object = getattr(import_module(_HOMES[name]), name)
+    home = import_module(_HOMES[name])
+    value: object = home if _HOMES[name] == f"frametool.{name}" else getattr(home, name)
     globals()[name] = value
     return value
 
