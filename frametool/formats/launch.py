@@ -1,7 +1,7 @@
 """The transforms that launch files publish: the calls of static_transform_publisher in them, of ROS 1 and ROS 2.
 
-    <node pkg="tf" type="static_transform_publisher" name="a" args="0.1 0 0.2 1.57 0 0 base camera 100"/>
-    <node pkg="tf2_ros" exec="static_transform_publisher" args="--x 0.1 --yaw 1.57 --frame-id base --child-frame-id camera"/>
+    <node pkg="tf" type="static_transform_publisher" name="a" args="0.1 0 0.2 1.57 0 0 base cam 100"/>
+    <node pkg="tf2_ros" exec="static_transform_publisher" args="--x 1 --frame-id base --child-frame-id cam"/>
 
 XML of either ROS, YAML below `launch:`, and Python with `generate_launch_description`, which is parsed and never run.
 The pose of the child in its parent, metres, radians; the arguments are those of `frametool.ros.publisher`. Only what
@@ -39,7 +39,8 @@ def write_tree(tree: FrameTree, style: Style) -> str:
 
     lines = publisher.write_tree(tree, style.in_form("static2")).splitlines()
     if unsafe := next((line for line in lines if "$(" in line), None):
-        raise ValueInvalid(f"a frame name with $( has no place in a launch file: {unsafe[unsafe.index('--frame-id') :]}")
+        names = unsafe[unsafe.index("--frame-id") :]
+        raise ValueInvalid(f"a frame name with $( has no place in a launch file: {shown(names)}")
     node = f'  <node pkg="tf2_ros" exec="{publisher.CALL}" args="{{}}"/>\n'
     return f"<launch>\n{''.join(node.format(escape(line)) for line in lines)}</launch>\n"
 

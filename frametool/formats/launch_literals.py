@@ -17,7 +17,7 @@ _SCOPES = (ast.Module, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.Cl
 _CHANGING = frozenset(("append", "extend", "insert", "pop", "remove", "reverse", "sort", "clear"))
 
 
-class NotLiteral(ValueError):  # noqa: N818 - it ends a reading, and is no error
+class NotLiteral(ValueError):
     """An expression whose value the text does not say; `why` is "" where the expression says it best."""
 
     def __init__(self, node: ast.expr, why: str = "") -> None:

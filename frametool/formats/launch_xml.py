@@ -51,5 +51,4 @@ def _command(element: Element) -> str:
 def _call(xml: XmlFile, element: Element, attribute: str, conditions: Sequence[str]) -> Action:
     if attribute not in element.attributes:
         return not_read(f"it has no {attribute}", element.line, element.column)
-    place = xml.error(element, "", attribute)
-    return call(element.attributes[attribute], place.line, place.column, conditions)
+    return call(element.attributes[attribute], *xml.place(element, attribute), conditions)
