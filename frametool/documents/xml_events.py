@@ -56,33 +56,48 @@ class XmlFile:
         if len(self.data) > MOST_CHARACTERS:
             raise FormatError(f"longer than {MOST_CHARACTERS} bytes, the most in one file", source=self.name)
 
-    def elements(self) -> Iterator[Element]:
+    def elements(self, deepest: int = DEEPEST_ELEMENT, *, ends: bool = True) -> Iterator[Element]:
         """Yield the beginnings and ends of all elements, in order.
 
+        deepest: those further down are left out; ends: without them the text in elements is left out too.
         Raises FormatError for what is no XML, and for declarations of entities.
         """
         opened: list[Element] = []
         texts: list[list[str]] = []
         found: list[Element] = []
         parser = expat.ParserCreate()
+        depth = 0
 
         def start(tag: str, attributes: dict[str, str]) -> None:
-            place = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, parser.CurrentByteIndex
-            opened.append(Element(False, tag, attributes, len(opened) + 1, *place))  # noqa: FBT003 - a field of a record
-            texts.append([])
-            if len(opened) > DEEPEST_ELEMENT:
-                raise self.error(opened[-1], f"more than {DEEPEST_ELEMENT} elements inside one another")
-            found.append(opened[-1])
+            nonlocal depth
+            depth += 1
+            if depth <= deepest:
+                place = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, parser.CurrentByteIndex
+                found.append(Element(False, tag, attributes, depth, *place))  # noqa: FBT003 - a field of a record
+                if ends:
+                    opened.append(found[-1])
+                    texts.append([])
+            if depth > DEEPEST_ELEMENT:
+                message = f"more than {DEEPEST_ELEMENT} elements inside one another"
+                raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
 
         def end(_: str) -> None:
-            found.append(opened.pop()._replace(ends=True, text="".join(texts.pop())))
+            nonlocal depth
+            if ends and depth <= deepest:
+                found.append(Element(True, *opened.pop()[1:7], "".join(texts.pop())))  # noqa: FBT003 - a field
+            depth -= 1
+
+        def read_text(text: str) -> None:
+            if depth <= deepest:
+                texts[-1].append(text)
 
         def refuse(*_: object) -> NoReturn:
             message = "XML with entities of its own is not read; expand them: xmllint --noent FILE"
             raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
 
         parser.StartElementHandler, parser.EndElementHandler = start, end
-        parser.CharacterDataHandler = lambda text: texts[-1].append(text)  # noqa: PLW0108 - the last one changes
+        if ends:
+            parser.CharacterDataHandler = read_text
         parser.EntityDeclHandler = refuse
         parser.ExternalEntityRefHandler = refuse
         for begin in range(0, len(self.data) or 1, _BLOCK):

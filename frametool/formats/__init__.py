@@ -147,6 +147,14 @@ FORMATS = {
         signs=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
         states="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
     ),
+    "urdf": Format(
+        "URDF robot",
+        suffixes=(".urdf",),
+        reads=("tree",),
+        reader="frametool.formats.urdf",
+        signs=(("xml", "robot"),),
+        states="parent<-child, metres, radians, rpy about fixed axes",
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
         signs=(  # launch files have the same substitutions

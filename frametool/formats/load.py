@@ -11,7 +11,7 @@ from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, alternatives
 from frametool.formats import readers
 from frametool.formats.assembly import Assembly, Rules
-from frametool.formats.recordings import Recording
+from frametool.formats.recordings import Recording, refuse_unknown_joints
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
@@ -79,8 +79,10 @@ def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = No
     """Merge the frames of several texts and files; otherwise as `load`."""
     assembly = Assembly(", ".join(source.name for source in sources), rules)
     with paused_collector():
-        for source in sources:
-            _add(assembly, Recording.inline(source) if isinstance(source, Source) else source)
+        files = [Recording.inline(source) if isinstance(source, Source) else source for source in sources]
+        for file in files:
+            _add(assembly, file)
+        refuse_unknown_joints(files)
         return assembly.finish()
 
 
