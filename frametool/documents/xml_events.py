@@ -125,15 +125,19 @@ class XmlFile:
 
     def error(self, element: Element, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
         """Make the error for an element, or for the value of one of its attributes."""
-        line, column = element.line, element.column
-        if attribute:
-            tail = self.data[element.offset : element.offset + _BLOCK]
-            value = re.search(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()), tail)
-            if value:
-                before = tail[: value.end()].decode("utf-8", "replace")
-                line += before.count("\n")
-                column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
+        line, column = self.place(element, attribute)
         return self._at(line, column, message, rule=rule)
+
+    def place(self, element: Element, attribute: str = "") -> tuple[int, int]:
+        """Return line and column of an element, or of the value of one of its attributes."""
+        line, column = element.line, element.column
+        name = re.compile(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()))
+        value = name.search(self.data, element.offset, element.offset + _BLOCK) if attribute else None
+        if value:
+            before = self.data[element.offset : value.end()].decode("utf-8", "replace")
+            line += before.count("\n")
+            column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
+        return line, column
 
     def _at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
         # lines as expat counts them, which are those of every editor

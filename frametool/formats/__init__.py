@@ -142,6 +142,16 @@ FORMATS = {
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
     "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.dot"),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.mermaid"),
+    "launch": Format(
+        "launch file",
+        suffixes=(".launch",),
+        reads=("tree",),
+        reader="frametool.formats.launch",
+        writes=("tree",),
+        writer="frametool.formats.launch",
+        signs=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
+        states="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
+    ),
     "urdf": Format(
         "URDF robot",
         suffixes=(".urdf",),
@@ -162,7 +172,9 @@ FORMATS = {
     ),
     "xacro": Format(
         "xacro, from which URDF is made",
-        signs=(("xml text", r"<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b"),),
+        signs=(  # launch files have the same substitutions
+            ("xml text", r"(?s)\A(?!<launch\b).*?(?:<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b)"),
+        ),
         instead="expand it: xacro FILE > robot.urdf (pip install xacro)",
     ),
     "camera_info": Format(

@@ -105,6 +105,10 @@ class Tally:
         else:
             self.notes.setdefault(note.message, Remark(line, note.message, note.rule))
 
+    def note_each(self, message: str, line: int, rule: str = "odd") -> None:
+        """Keep a sentence about one line, also where it was said of other lines."""
+        self.notes.setdefault(f"{line}: {message}", Remark(line, message, rule))
+
     def told(self) -> Iterator[Remark]:
         """Yield one sentence for each kind of oddity."""
         if self.rough:

@@ -56,9 +56,12 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
     def report(error: FormatError) -> None:
         find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
 
-    for edge in recording.edges(report, tell=False, normalize=normalize):
-        w_first = looks_w_first(edge.components)
-        yield Statement(edge.parent or "", *edge[1:4], recording.name, edge.line, 1 if edge.line else 0, w_first)
+    try:
+        for edge in recording.edges(report, tell=False, normalize=normalize):
+            w_first = looks_w_first(edge.components)
+            yield Statement(edge.parent or "", *edge[1:4], recording.name, edge.line, 1 if edge.line else 0, w_first)
+    except FormatError as error:  # behind which nothing can be read
+        report(error)
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
