@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
 
 
-NAMED = re.compile(r"\s*([^\W\d]\w*)\s*=\s*(.*?)\s*", re.DOTALL)
-LIKE_A_FILE = re.compile(r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*")
+LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
 LONGEST_PATH = 4096
 
 
@@ -36,17 +35,19 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
 
     What looks like a file and is none is refused as one.
     """
-    match = NAMED.fullmatch(text[:LONGEST_PATH]) if len(text) < LONGEST_PATH else None
-    if match is None or not (match[2] == "-" or _is_file(match[2]) or LIKE_A_FILE.fullmatch(match[2])):
+    head, equals, tail = text.partition("=")
+    name, path = head.strip(), tail.strip()
+    if not equals or not name.isidentifier() or not 0 < len(path) < LONGEST_PATH:
         return None
-    read_line(f"{match[1]}=0")  # refuses a name that is taken
-    found = named_file(match[1], match[2], scope.literals).written(match[1], atomic=True)
-    scope.names[match[1]] = found
-    return found
+    if path != "-" and not _is_file(path) and not re.fullmatch(LIKE_A_FILE, path):
+        return None
+    read_line(f"{name}=0")  # refuses a name that is taken
+    scope.names[name] = named_file(name, path, scope.literals).written(name, atomic=True)
+    return scope.names[name]
 
 
 def _is_file(path: str) -> bool:
-    return bool(path) and "\0" not in path and os.path.exists(path)
+    return "\0" not in path and os.path.exists(path)
 
 
 def named_file(name: str, path: str, literals: Literals) -> Term:
