@@ -51,12 +51,16 @@ class Branch(NamedTuple):
         return self.kind in ATOMS
 
 
-class Line(NamedTuple):
+class Line:
     """A line: the name it binds, if it does, and its expression with the whole text it stands in."""
 
-    name: str
-    tree: Branch
-    text: str
+    __slots__ = ("name", "text", "tree")
+
+    def __init__(self, name: str, tree: Branch, text: str) -> None:
+        """Keep all of it."""
+        self.name = name
+        self.tree = tree
+        self.text = text
 
 
 def parse_line(text: str, taken: frozenset[str] = frozenset()) -> Line:

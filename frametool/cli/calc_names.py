@@ -11,12 +11,8 @@ from frametool.calc.literals import PLACED, term_of_pose
 from frametool.calc.values import LIST, TREE, Term, Type
 from frametool.cli.poses import source_of
 from frametool.cli.trees import load_tree
-from frametool.documents.document import parse_documents
-from frametool.documents.input_file import InputFile
 from frametool.errors import FormatError
 from frametool.formats import FORMATS
-from frametool.formats.detect import detect
-from frametool.formats.recordings import Recording
 
 if TYPE_CHECKING:
     from frametool.calc.evaluate import Scope
@@ -57,6 +53,7 @@ def named_file(name: str, path: str, literals: Literals) -> Term:
         found = _values(source, literals)
         if found is None:
             from frametool.formats.load import load_sources
+            from frametool.formats.recordings import Recording
 
             return Term(Type(TREE), (), tree=load_sources([Recording.inline(source)]), text=name)
         return found
@@ -71,6 +68,9 @@ def named_file(name: str, path: str, literals: Literals) -> Term:
 
 def _form(path: str) -> str:
     """Find the form of a file; what is none of tables and documents may be a tree."""
+    from frametool.documents.input_file import InputFile
+    from frametool.formats.detect import detect
+
     file = InputFile(path)
     try:
         return detect(file.head(), "tree", "rows", "records", name=path, otherwise="yaml")[0]
@@ -80,6 +80,7 @@ def _form(path: str) -> str:
 
 def _values(source: Source, literals: Literals) -> Term | None:
     """Read the poses or points of a document; None for a tree."""
+    from frametool.documents.document import parse_documents
     from frametool.stream.record_values import read_poses
 
     documents = [document.value for document in parse_documents(source.text, source.name)]

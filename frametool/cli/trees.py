@@ -13,8 +13,6 @@ from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.errors import shown, warn
 from frametool.formats import FORMATS
-from frametool.formats.load import load_sources
-from frametool.formats.recordings import Recording
 from frametool.grammar.edges import CAMERA_AXES, DH, DIRECTIONS, Answers
 
 if TYPE_CHECKING:
@@ -24,6 +22,7 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
     from frametool.formats.assembly import Rules
+    from frametool.formats.recordings import Recording
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
@@ -72,6 +71,8 @@ def load_tree(
 
     streams: `--in` is about what is streamed wherever that can be
     """
+    from frametool.formats.load import load_sources  # not every command that may read trees does
+
     files = opened((argument, *more), streams=streams)
     tree = load_sources(files, rules)
     state(files)
@@ -94,6 +95,8 @@ def opened(arguments: Sequence[str], *, streams: bool = False) -> list[Recording
 
     streams: as `load_tree` has it
     """
+    from frametool.formats.recordings import Recording
+
     if list(arguments).count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
