@@ -36,14 +36,15 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     if "-" not in poses:
         if stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")
-        products = [reduce(product, each) for each in combinations(poses, degrees=deg, normalize=normalize)]
+        factors = combinations(poses, stream.given, degrees=deg, normalize=normalize)
+        products = [reduce(product, each) for each in factors]
         output.poses(Result(each) for each in products)
         return 0
     if poses.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
     at = poses.index("-")
-    left = [one_pose(each, degrees=deg, normalize=normalize) for each in poses[:at]]
-    right = [one_pose(each, degrees=deg, normalize=normalize) for each in poses[at + 1 :]]
+    left = [one_pose(each, stream.given, degrees=deg, normalize=normalize) for each in poses[:at]]
+    right = [one_pose(each, stream.given, degrees=deg, normalize=normalize) for each in poses[at + 1 :]]
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
