@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from frametool.documents.source import Source, decode
 from frametool.errors import FormatError
+from frametool.grammar.readers import NotARotation
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
@@ -18,7 +19,11 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 INLINE = "argument"
-_PLAIN = re.compile(r"""\s*(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))""")  # grammar, or a header
+# the grammar's own, or a header
+_PLAIN = re.compile(r"""\s*(?![ijk]\s*$)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))""")
+
+_ROW = r"\[(?:[^\[\],]*,){%s}[^\[\],]*\]\s*,?\s*"
+_LISTED_ROWS = re.compile(rf"\s*(?:\[\s*(?:{_ROW % 3}){{3}}\]|(?:{_ROW % '2,3'}){{3,4}}\Z)")
 
 
 def is_inline(text: str) -> bool:
@@ -38,13 +43,20 @@ def is_pasted(text: str, given: Notation | None = None) -> bool:
     return "\n" in text or rewritten(Source(INLINE, text), given) is not None
 
 
-def rewritten(source: Source, given: Notation | None = None, *, normalize: bool = False) -> Source | None:
+def rewritten(
+    source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
+) -> Source | None:
     """Return a text that was pasted as one of the grammar; None for one that is."""
     if _PLAIN.match(source.text) and "\n" not in source.text.strip():
         return None
     from frametool.ros.pasted_blocks import in_grammar
 
-    return in_grammar(source, given, normalize=normalize)
+    try:
+        return in_grammar(source, given, normalize=normalize, points=points)
+    except FormatError as error:
+        if source.name == INLINE and not isinstance(error.__cause__, NotARotation):
+            error.exit_code = 2  # misuse, where numbers in a file are bad data
+        raise
 
 
 def rejoined(values: Sequence[str]) -> tuple[str, ...]:
@@ -75,7 +87,7 @@ def pasted_stream(stream: BufferedReader, name: str, request: Request) -> tuple[
     if len(data) > MOST_PASTED:
         raise FormatError(f"begins as what is pasted, which is {MOST_PASTED} bytes at most; give --in", source=name)
     source = Source(name, decode(data, name))
-    found = in_grammar(source, given, normalize=request.normalize)
+    found = in_grammar(source, given, normalize=request.normalize, points=request.operation.moves)
     return found, BufferedReader(BytesIO(data))
 
 
@@ -103,11 +115,9 @@ def _is_free(head: str, given: Notation | None, request: Request) -> bool:
 
 
 def _is_long(head: str) -> bool:
-    """Tell a list of 9, 12 or 16 numbers, or three rows of four, from lists of points and square matrices."""
+    """Tell a list of 9, 12 or 16 numbers, three rows of four, and rows one below the other from other lists."""
     found = re.match(r"\s*\[([^\[\]]*)\]", head)
-    return (found is not None and found[1].count(",") in (8, 11, 15)) or re.match(
-        r"\s*\[\s*(?:\[(?:[^\[\],]*,){3}[^\[\],]*\]\s*,?\s*){3}\]", head
-    ) is not None
+    return (found is not None and found[1].count(",") in (8, 11, 15)) or _LISTED_ROWS.match(head) is not None
 
 
 def _only_a_matrix(lines: list[str], request: Request) -> bool:

@@ -39,15 +39,17 @@ def source_of(argument: str | Source) -> Source:
     return Source("stdin", read_text("-"))
 
 
-def pose_source(argument: str | Source, given: Notation | None = None, *, normalize: bool = False) -> Source:
-    """Take an argument as text of the grammar of poses: what was pasted is rewritten, else as `source_of`."""
-    try:
-        if not isinstance(argument, Source) and is_pasted(argument, given):
-            argument = Source(INLINE, argument)
-        source = source_of(argument)
-        return rewritten(source, given, normalize=normalize) or source
-    except FormatError as error:
-        raise usage_if_inline(error) from error.__cause__
+def pose_source(
+    argument: str | Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
+) -> Source:
+    """Take an argument as text of the grammar of poses: what was pasted is rewritten, else as `source_of`.
+
+    points: three numbers are a point.
+    """
+    if not isinstance(argument, Source) and is_pasted(argument, given):
+        argument = Source(INLINE, argument)
+    source = source_of(argument)
+    return rewritten(source, given, normalize=normalize, points=points) or source
 
 
 def poses_from(
@@ -80,7 +82,8 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
     request = request._replace(notations=request.notations or output.notations)
     for argument in arguments:
         try:
-            source = pose_source(argument, request.given, normalize=request.normalize)
+            points = request.operation.moves
+            source = pose_source(argument, request.given, normalize=request.normalize, points=points)
             yield from results(source, request, output.style)
         except FormatError as error:
             raise usage_if_inline(error) from None

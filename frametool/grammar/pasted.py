@@ -145,7 +145,8 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
         return None
     rows = [_cells(piece) for piece in pieces if piece.strip()]
     cells = [cell for row in rows for cell in row]
-    if not cells or not (any(map(_is_number, cells)) if any_text else all(map(_is_number, cells))):
+    fits = any if any_text and not re.search("[:=\"']", body) else all
+    if not cells or not fits(map(_is_number, cells)):
         return None
     return [[_times(cell, scale[1]) for cell in row] for row in rows] if scale else rows
 

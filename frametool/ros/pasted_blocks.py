@@ -58,17 +58,22 @@ def may_be_pasted(text: str) -> bool:
     return bool(_BEGIN.match(text) or _TRANSLATION.search(text, 0, 4096)) or _mended(text) != text
 
 
-def in_grammar(source: Source, given: Notation | None = None, *, normalize: bool = False) -> Source | None:
+def in_grammar(
+    source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
+) -> Source | None:
     """Return a pasted text as text of the grammar, a value a line; None for what is none, or is grammar already.
 
-    given: the notation of numbers that do not say theirs; normalize: accept any non-zero quaternion.
+    given: the notation of numbers that do not say theirs; normalize: accept any non-zero quaternion
+    points: three numbers are a point
     Raises FormatError for what is known and cannot be taken.
     """
     text = source.text
     if len(text) > MOST_PASTED or not may_be_pasted(text):
         return None
+    values: list[Any] | None
     try:
-        values = _blocks(text) or _published(source, normalize=normalize) or _unless_grammar(source, given)
+        values = _blocks(text) or _published(source, normalize=normalize)
+        values = values or _unless_grammar(source, given, points=points)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source.name) from error
     if values is not None:
@@ -76,14 +81,13 @@ def in_grammar(source: Source, given: Notation | None = None, *, normalize: bool
     return Source(source.name, mended) if (mended := _mended(text)) != text else None
 
 
-def _unless_grammar(source: Source, given: Notation | None) -> list[Any] | None:
+def _unless_grammar(source: Source, given: Notation | None, *, points: bool) -> list[Any] | None:
     """Return the values of pasted numbers; of JSON only what the grammar would refuse."""
-    values = pasted_poses(source.text, given)
-    if values and looks_like_json(source.text) and type(values[0]) is not list and given is None:
+    if looks_like_json(source.text) and (points or given is None):
         read = parse_json(source)
-        if read is not None and (len(read) > 1 or {*map(_size, read)} & {(3, 3), (4, 4)}):
+        if read is not None and (points or {*map(_size, read)} & {(3, 3), (4, 4)}):
             return None
-    return values
+    return pasted_poses(source.text, given)
 
 
 def _size(value: Any) -> tuple[int, int]:

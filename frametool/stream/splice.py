@@ -101,7 +101,7 @@ class Splicer:
         """Return the edits, in no order."""
         shape = self.record.shape
         if type(self.node.value) is not dict or not self.node.value:
-            return self._numbers(range(len(self.slots)), 0) if self._same_rotation() else self._rewritten()
+            return self._numbers(range(len(self.slots)), 0) if self._stays_a_list() else self._rewritten()
         self._names()
         if shape.covariance:
             self._numbers(range(shape.own_size, shape.size), self.target.size)
@@ -114,6 +114,12 @@ class Splicer:
             self.dropped.update({*STALE, "inverse", *self.record.others} - set(self.record.flat))
         self._leave_out()
         return self.edits
+
+    def _stays_a_list(self) -> bool:
+        """Tell whether a result has the numbers of the bare list it comes from and no others."""
+        has_place = self.target.unit is None or self.record.shape.unit is not None
+        told = self.request.operation.extras if self.record.shape.kind == POSE else ()
+        return self._same_rotation() and has_place and not told
 
     def _same_rotation(self) -> bool:
         """Tell whether the rotation is written as it was read, number by number."""
@@ -301,7 +307,11 @@ class Splicer:
         members = self._members(0 if self.target.unit is None else 3)
         if self.target.unit is not None:
             members.insert(0, self._member({"xyz": list(SAMPLE[:3])}, 0))
-        pieces = [piece for member in members for piece in (Const(b", "), *member)]
+        members += self._extras(self.target.size)
+        pieces: list[Piece] = []
+        for member in members:
+            conditional = any(isinstance(piece, IfLocked) for piece in member)
+            pieces += [IfLocked(b", ") if conditional else Const(b", "), *member]
         self.edits.append(Edit(self.node.start, self.node.end, (Const(b"{"), *pieces[1:], Const(b"}"))))
         return self.edits
 
