@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.command import FILE, READING, TEXT, VERBOSE, Text, decorated, forms_told, in_option
-from frametool.cli.poses import is_inline, source_of
+from frametool.cli.pasted_input import is_inline
+from frametool.cli.poses import source_of
 from frametool.cli.stderr import say
 from frametool.errors import shown, warn
 from frametool.formats import FORMATS
