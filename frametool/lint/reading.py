@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.errors import FormatError
+from frametool.errors import FormatError, Unanswered
 from frametool.formats.tree_reader import read_edges, without_slashes
 from frametool.grammar.readers import Misfit, Note, Reading
 from frametool.lint.findings import Finding
@@ -57,11 +57,16 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
         find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
 
     in_documents = []
-    for edge in recording.edges(report, tell=False, normalize=normalize):
-        if edge.path:
-            in_documents.append(edge)
-        elif edge.parent is not None:
-            yield _stated(edge, recording.name, edge.line, 1 if edge.line else 0)
+    try:
+        for edge in recording.edges(report, tell=False, normalize=normalize):
+            if edge.path:
+                in_documents.append(edge)
+            elif edge.parent is not None:
+                yield _stated(edge, recording.name, edge.line, 1 if edge.line else 0)
+    except Unanswered:
+        raise
+    except FormatError as error:  # behind which nothing can be read
+        report(error)
     places = locate_many(recording.text, [edge.path for edge in in_documents]) if in_documents else []
     for edge, (line, column) in zip(in_documents, places, strict=True):
         if edge.parent is not None:
