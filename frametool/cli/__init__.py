@@ -32,6 +32,7 @@ COMMANDS = {
     "check": ("frametool.cli.commands.check", "what is wrong or odd in trees and recordings"),
     "diff": ("frametool.cli.commands.diff", "what differs between two trees, calibrations or recordings"),
     "formats": ("frametool.cli.commands.formats", "the forms of files that are read and written, and what they mean"),
+    "help": ("frametool.cli.commands.help", "a subject on one screen: pose, euler, axes, time, streams and more"),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 IN_OUT, INTERRUPTED = 5, 130  # exit codes

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
 READ = readers("tree", "records", "rows", "joints")
-SPELLINGS = [row.spelling for row in REPRESENTATIONS.values()]
-EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file, 130 interrupted."
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file."
 
 
 class Command(WithHelp):
@@ -148,7 +147,7 @@ def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> Non
 
 verbose_option = click.option(
     "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
-    help="say on stderr what each input was taken for",
+    help="say what each input was taken for",
 )  # fmt: skip
 
 
@@ -197,8 +196,7 @@ def forms_told() -> tuple[str, ...]:
 
 in_option = click.option(
     "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM", expose_value=False,
-    callback=_keep_forms,
-    help="form of the input, one of `frametool formats`; once a file  [default: by content, then by suffix]",
+    callback=_keep_forms, help="form of the input (`frametool formats`), once a file",
 )  # fmt: skip
 
 
@@ -210,15 +208,11 @@ def say_if_verbose(text: str) -> None:
 
 
 _PRECISION = click.option(
-    "--precision", type=Digits(), metavar="N|full",
-    help="digits after the point  [default: full, the shortest text that reads back to the same bits; "
-    "6 in an overview for people]",
+    "--precision", type=Digits(), metavar="N|full", help="digits after the point  [default: full; overviews 6]"
 )  # fmt: skip
 _PLACE = (
-    click.option(
-        "-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all"
-    ),
-    click.option("--force", is_flag=True, help="let --output replace an existing file"),
+    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
+    click.option("--force", is_flag=True, help="let --output replace a file"),
 )
 
 
@@ -226,7 +220,7 @@ def result_options(what: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     form = click.option(
         "-f", "--format", "format_name", type=click.Choice(("text", *writers(what))),
-        help="form of the result  [default: text on a terminal, yaml otherwise]",
+        help="form of the result",
     )  # fmt: skip
     return lambda function: decorated(function, (form, _PRECISION, *_PLACE))
 
@@ -238,7 +232,7 @@ def list_options(*more: str) -> Callable[[Function], Function]:
     """
     form = click.option(
         "-f", "--format", "format_name", type=click.Choice(("text", *writers("report"), *more)),
-        help="form of the result  [default: by the suffix of --output, else text]",
+        help="form of the result",
     )  # fmt: skip
     return lambda function: decorated(function, (form, *_PLACE))
 
@@ -253,11 +247,11 @@ def rotation_options(function: Function) -> Function:
                 "notations",
                 type=Notations(),
                 metavar="REP[,REP..]",
-                help=f"representations of the result: {', '.join(SPELLINGS)}; angles take _deg  [default: quaternion]",
+                help="representations of the result  [default: quaternion]",
             ),
             click.option("--deg", is_flag=True, help="angles in degrees"),
             click.option(
-                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out instead of w >= 0"
+                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"
             ),
         ],
     )
@@ -266,7 +260,7 @@ def rotation_options(function: Function) -> Function:
 def pose_options(function: Function) -> Function:
     """Add to a command the options that say how poses are read; they come beside `rotation_options`."""
     return click.option(
-        "--normalize", is_flag=True, help="accept any non-zero quaternion and any matrix near a rotation"
+        "--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation"
     )(function)
 
 

@@ -47,10 +47,10 @@ def _option(*names: str, **rest: Any) -> Callable[[Any], Any]:
     return click.option(*names, expose_value=False, callback=_keep, **rest)
 
 
-_quiet_option = _option("--quiet", "quiet", is_flag=True, help="do not say what was taken for what")
+_quiet_option = _option("--quiet", "quiet", is_flag=True, help="no word on what was taken for what")
 _READING_OPTIONS = (
     _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
-            help="read only this topic of a recording; may be repeated"),
+            help="read only this topic; may be repeated"),
     _option("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
             help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
     _option("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
