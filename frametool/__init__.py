@@ -18,6 +18,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from frametool.calc.python_face import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.formats import FORMATS as FORMATS
     from frametool.formats.load import load as load
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "calc": "frametool.calc",
     "FORMATS": "frametool.formats",
     "FollowController": "frametool.sim.controllers",
     "FrameTree": "frametool.frames.tree",
@@ -62,6 +64,7 @@ __all__ = [
     "Turtle",
     "Twist",
     "__version__",
+    "calc",
     "diff",
     "load",
     "simulate",
@@ -76,7 +79,8 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'frametool' has no attribute {name!r}")
     from importlib import import_module
 
-    value: object = getattr(import_module(_HOMES[name]), name)
+    home = import_module(_HOMES[name])
+    value: object = home if _HOMES[name] == f"frametool.{name}" else getattr(home, name)
     globals()[name] = value
     return value
 

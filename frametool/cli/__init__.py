@@ -26,6 +26,7 @@ COMMANDS = {
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
     "tree": ("frametool.cli.commands.tree", "the tree of frames, drawn or written in another form"),
     "view": ("frametool.cli.commands.view", "the frames seen: in the terminal, as a page that turns, as a picture"),
+    "calc": ("frametool.cli.commands.calc", "expressions over poses whose frames are checked like units"),
     "echo": ("frametool.cli.commands.echo", "where SOURCE is seen from TARGET as a recording goes by"),
     "monitor": ("frametool.cli.commands.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
     "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),

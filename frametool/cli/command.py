@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 # an argument that begins like this is a number, whatever short options there are
-NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
+NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+]| +(Translation|Rotation):)", re.IGNORECASE)
 READ = readers("tree", "records", "rows", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file."
 
@@ -196,7 +196,8 @@ def forms_told() -> tuple[str, ...]:
 
 in_option = click.option(
     "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM", expose_value=False,
-    callback=_keep_forms, help="form of the input (`frametool formats`), once a file",
+    callback=_keep_forms,
+    help="form of the input (`frametool formats`), once a file",
 )  # fmt: skip
 
 
@@ -208,7 +209,8 @@ def say_if_verbose(text: str) -> None:
 
 
 _PRECISION = click.option(
-    "--precision", type=Digits(), metavar="N|full", help="digits after the point  [default: full; overviews 6]"
+    "--precision", type=Digits(), metavar="N|full",
+    help="digits after the point  [default: full; overviews 6]",
 )  # fmt: skip
 _PLACE = (
     click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
@@ -232,7 +234,7 @@ def list_options(*more: str) -> Callable[[Function], Function]:
     """
     form = click.option(
         "-f", "--format", "format_name", type=click.Choice(("text", *writers("report"), *more)),
-        help="form of the result",
+        help="form of the result  [default: text]",
     )  # fmt: skip
     return lambda function: decorated(function, (form, *_PLACE))
 

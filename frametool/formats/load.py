@@ -11,7 +11,7 @@ from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, alternatives
 from frametool.formats import readers
 from frametool.formats.assembly import Assembly, Rules
-from frametool.formats.recordings import Recording, close_all, opened_together
+from frametool.formats.recordings import Recording, close_all, opened_together, refuse_unknown_joints
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
@@ -86,8 +86,10 @@ def load_sources(
     assembly = Assembly(", ".join(source.name for source in sources), rules)
     try:
         with paused_collector():
-            for source in sources:
-                _add(assembly, Recording.inline(source) if isinstance(source, Source) else source)
+            files = [Recording.inline(source) if isinstance(source, Source) else source for source in sources]
+            for file in files:
+                _add(assembly, file)
+            refuse_unknown_joints(files)
             tree = assembly.finish()
     finally:
         close_all(sources)

@@ -28,6 +28,7 @@ RULES = {
     "noise": ("note", "lines that a tool printed between messages"),
     "topics": ("note", "the topics that transforms came by"),
     "two-topics": ("error", "a frame that comes by the topics of two robots"),
+    "limit": ("warning", "the value of a joint beyond its limits"),
     "odd": ("warning", "anything else worth a look while reading"),
     "self": ("error", "a frame that is its own parent"),
     "cycle": ("error", "frames that form a cycle"),
