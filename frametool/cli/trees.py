@@ -106,8 +106,10 @@ def state(files: Sequence[Recording]) -> None:
     if context is None:
         return
     for file in files:
-        if said := ("" if is_quiet() else file.stated) or (file.described if context.meta.get(VERBOSE) else ""):
-            say(said)
+        if context.meta.get(VERBOSE):
+            say(file.known)
+        if file.stated and not is_quiet():
+            say(file.stated)
 
 
 def is_quiet() -> bool:
