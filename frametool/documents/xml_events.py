@@ -7,6 +7,7 @@ are read too.
 from __future__ import annotations
 
 import re
+from functools import partial
 from math import inf, isfinite
 from typing import NamedTuple
 from xml.parsers import expat
