@@ -12,8 +12,9 @@ import click
 
 from frametool.cli.command import (
     FILE,
-    READING,
+    STREAMED,
     TEXT,
+    TREES_OPENED,
     UTF8,
     Notations,
     decorated,
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 MOST_JOBS = 256
-STREAMED = ("records", "rows")
+_STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
 OPTIONS = {
     "input_path": click.option(
@@ -122,14 +123,13 @@ class Stream:
     @staticmethod
     def told_form() -> str:
         """Return the form that --in names for the stream, "" if it names none."""
-        told = forms_told()
-        streamed = [form for form in told if not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
-        if len(streamed) > 1:
-            raise click.UsageError(f"--in {streamed[0]} and --in {streamed[1]}: there is one stream")
+        others, form = forms_told(streams=True)
         context = click.get_current_context(silent=True)
-        if told and not streamed and READING not in (context.meta if context else {}):
-            raise click.UsageError(f"--in {told[0]} is not streamed; streams are {', '.join(readers(*STREAMED))}")
-        return streamed[0] if streamed else ""
+        reads_trees = context is not None and TREES_OPENED in context.meta
+        if others and not reads_trees:
+            both = f"--in {others[0]} and --in {form}: there is one stream"
+            raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
+        return form
 
     def run(
         self, request: Request, output: Output, *, tables_only: bool = False

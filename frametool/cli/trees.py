@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, READING, TEXT, VERBOSE, Text, decorated, forms_told, in_option
+from frametool.cli.command import FILE, READING, TEXT, TREES_OPENED, VERBOSE, Text, decorated, forms_told, in_option
 from frametool.cli.pasted_input import is_inline
 from frametool.cli.poses import source_of
 from frametool.cli.stderr import say
@@ -94,7 +94,7 @@ def load_sides(
     rules = Rules(normalize=normalize)
     trees = []
     for arguments, behind, found in ((a, 0, places[0]), (b, len(a), places[1])):
-        files = opened(arguments, behind=behind)
+        files = opened(arguments, behind=behind, of=len(a) + len(b))
         trees.append(load_sources(files, rules, found))
         state(files)
     return trees
@@ -106,8 +106,10 @@ def state(files: Sequence[Recording]) -> None:
     if context is None:
         return
     for file in files:
-        if said := ("" if is_quiet() else file.stated) or (file.described if context.meta.get(VERBOSE) else ""):
-            say(said)
+        if context.meta.get(VERBOSE):
+            say(file.known)
+        if file.stated and not is_quiet():
+            say(file.stated)
 
 
 def is_quiet() -> bool:
@@ -116,24 +118,34 @@ def is_quiet() -> bool:
     return bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
 
 
-def opened(arguments: Sequence[str], *, streams: bool = False, behind: int = 0) -> list[Recording]:
+def opened(
+    arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None
+) -> list[Recording]:
     """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
 
     streams: as `load_tree` has it
     behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
+    of: so many files there are in all
     """
     from frametool.formats.recordings import Recording, opened_together
 
     refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
-    forms = [form for form in forms_told() if _reads_trees(form, streams=streams)]
+    forms = forms_told(streams=streams)[0]
+    _check_forms(forms)
+    if not streams:
+        _refuse_more("--in", forms, of or len(arguments))
     told = iter(forms[behind:] or forms)
     context = click.get_current_context(silent=True)
+    if context is not None:
+        context.meta[TREES_OPENED] = True
     chosen = dict(context.meta.get(READING, {})) if context is not None else {}
     chosen.pop("quiet", None)
     topics = chosen.pop("topics", ())
     named = chosen.pop("named_frames", ())
+    if not streams:
+        _refuse_more("--frames", named, of or len(arguments))
     frames = iter(named[behind:] or named)
     chosen["joints"] = dict(map(_joint, chosen.pop("joints", ())))
     general = Answers(**{name: value for name, value in chosen.items() if value})
@@ -156,12 +168,16 @@ def refuse_two_readers(arguments: Sequence[str]) -> None:
         raise click.UsageError("standard input can be read once; only one argument may be -")
 
 
-def _reads_trees(form: str, *, streams: bool) -> bool:
-    """Tell whether `--in` is about a file of frames, and not about a stream."""
-    reads = FORMATS[form].reads
-    if "tree" not in reads and not streams:
-        raise click.UsageError(f"--in {form}: no frames are read from that; `frametool formats` lists what is")
-    return "tree" in reads and not (streams and {"rows", "records"} & {*reads})
+def _check_forms(forms: Sequence[str]) -> None:
+    """Refuse a form from which no frames are read."""
+    if other := [form for form in forms if "tree" not in FORMATS[form].reads]:
+        raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
+
+
+def _refuse_more(option: str, values: Sequence[str], files: int) -> None:
+    """Refuse an option that is given more often than there are files."""
+    if len(values) > files:
+        raise click.UsageError(f"{option} is given {len(values)} times for {files} file{'s' * (files != 1)}")
 
 
 def _joint(text: str) -> tuple[str, str]:
@@ -200,7 +216,8 @@ class Frame(Text):
 
         from frametool.errors import FrametoolError
 
-        named = ctx.params.get("tree") or ctx.params.get("a") or next(iter(ctx.params.get("arguments") or ()), None)
+        # behind an option that wants a frame click has not come to the arguments
+        named = ctx.params.get("tree") or next(iter(ctx.params.get("arguments") or ctx.args), None)
         if named is None and "arguments" in ctx.params:
             return [CompletionItem(incomplete, type="file")]
         try:

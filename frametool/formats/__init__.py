@@ -51,7 +51,7 @@ FORMATS = {
         writes=("poses", "points", "tree", "report"),
         writer="frametool.formats.yaml_format",
         signs=(
-            ("yaml key", "frames"),
+            ("own key", "frames|children"),
             ("line", r"\{ *[A-Za-z_][\w.]*: "),  # no JSON, whatever the suffix says: its keys have quotes
             # a header of CSV whose first column ends in a colon is no key
             ("header", r"""(?!(?!.*(?:[{\[]|: )).*,)(?:---(?:\s|$)|%YAML|- |(?:[\w./-]+|"[^"\n]*"):(?:\s|$)|[\[{])"""),
@@ -222,6 +222,7 @@ FORMATS = {
     ),
     "xacro": Format(
         "xacro, from which URDF is made",
+        suffixes=(".xacro",),
         signs=(  # launch files have the same substitutions
             ("xml text", r"(?s)\A(?!<launch\b).*?(?:<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b)"),
         ),
@@ -229,7 +230,7 @@ FORMATS = {
     ),
     "camera_info": Format(
         "camera_info, the intrinsics of a camera",
-        signs=(("yaml key", "projection_matrix|distortion_model"),),
+        signs=(("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
         instead="there is no pose in it; its frame stands in the tree of the robot",
     ),
     "map": Format(
@@ -239,21 +240,25 @@ FORMATS = {
     ),
     "usd": Format(
         "a USD scene",
+        suffixes=(".usd", ".usda", ".usdc", ".usdz"),
         signs=(("magic", rb"#usda |PXR-USDC"),),
         instead="its units and axes differ from file to file; export URDF, or the poses as JSON",
     ),
     "gltf": Format(
         "a glTF scene",
+        suffixes=(".gltf", ".glb"),
         signs=(("magic", rb"glTF"), ("json path", "asset/version")),
         instead="glTF has y up and z forward; export URDF, or the poses as JSON",
     ),
     "unity": Format(
         "a Unity scene",
+        suffixes=(".unity", ".prefab"),
         signs=(("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),),
         instead="Unity is left-handed with y up; export poses as JSON and convert them",
     ),
     "itk": Format(
         "an ITK or ANTs transform",
+        suffixes=(".tfm",),
         signs=(("magic", rb"#Insight Transform File"),),
         instead="it maps points about a centre in LPS axes, in mm; convert it to a 4x4 matrix first",
     ),

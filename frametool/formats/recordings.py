@@ -44,7 +44,9 @@ class Recording(InputFile):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
         try:
-            self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+            self.form, self.known_by = form or folder or "", "what it holds" if folder else ""
+            if not self.form:
+                self.form, self.known_by = detect(self.head(), "tree", name=self.path, empty="yaml")
         except BaseException:
             self.close()
             raise
@@ -68,6 +70,11 @@ class Recording(InputFile):
     def described(self) -> str:
         """Say what the file was taken for."""
         return f"{self.name}: {FORMATS[self.form].summary}"
+
+    @property
+    def known(self) -> str:
+        """Say what the file was taken for, and by what it was known, unless that was told."""
+        return f"{self.described}{f', known by {self.known_by}' if self.known_by else ''}"
 
     @property
     def stated(self) -> str:

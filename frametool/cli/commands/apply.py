@@ -161,11 +161,11 @@ def _way_by_tree(
     """
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
-    tree = load_tree(arguments[0], more, chosen_rules, streams=True)
-    target, rest = frame_name(arguments[1], tree), arguments[2:]
-    source = None
-    if rest and not _is_record(rest[0]):
-        source, rest = frame_name(rest[0], tree), rest[1:]
+    named = arguments[2:3] if len(arguments) > 2 and not _is_record(arguments[2]) else ()
+    rest = arguments[2 + len(named) :]
+    tree = load_tree(arguments[0], more, chosen_rules, streams=rest in ((), ("-",)))
+    target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
+    source = next(iter(sources), None)
 
     if not {target, source or target} <= set(tree.frames):
         tree.lookup(target, source or target)  # raises, and names the nearest frames
