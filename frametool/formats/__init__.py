@@ -155,6 +155,14 @@ FORMATS = {
         signs=(("xml", "robot"),),
         states="parent<-child, metres, radians, rpy about fixed axes",
     ),
+    "sdf": Format(
+        "SDF of Gazebo",
+        suffixes=(".sdf", ".world"),
+        reads=("tree",),
+        reader="frametool.formats.sdf",
+        signs=(("xml", "sdf"),),
+        states="parent<-child, metres, radians unless degrees; frames are model::link",
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
         signs=(  # launch files have the same substitutions

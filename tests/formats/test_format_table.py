@@ -112,6 +112,7 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a launch file in YAML": (b"%YAML 1.2\n---\nlaunch:\n- node: {pkg: x}\n", "tree", "launch"),
     "a launch file in Python": (b"import os\n\ndef generate_launch_description():\n    pass\n", "tree", "launch"),
     "a tree with a frame called launch": (b"frames:\n  launch:\n    a:\n", "tree", "yaml"),
+    "a world of Gazebo": (b"<?xml version='1.0' ?>\n<sdf version='1.6'>\n<world name='a'>", "tree", "sdf"),
     "rows": (b"x,y,z\n1,2,3\n", "rows records", "csv"),
     "rows whose first column ends in a colon": (b"a:,y\n1,2\n", "rows records", "csv"),
     "rows under a comment": (b"# t,x,y\n1,2,3\n", "rows records", "csv"),
