@@ -48,7 +48,7 @@ class _SdfTree:
         self.frames = frames
         self.joints = joints
         self.options = options
-        self.hung: dict[str, SdfJoint] = {}  # link, or the world -> the joint that it hangs on
+        self.hung: dict[str, SdfJoint] = {}  # link -> the joint that it hangs on
         for joint in joints.all:
             self._hang(joint)
         ends = [end for joint in joints.all for end in (joint.parent, joint.child)]
@@ -57,9 +57,10 @@ class _SdfTree:
 
     def _hang(self, joint: SdfJoint) -> None:
         """Let a link hang on a joint; a second one closes a loop, and is told."""
-        first = self.hung.setdefault(joint.child.name, joint)
+        link = joint.hanging.name
+        first = self.hung.setdefault(link, joint)
         if first is not joint:
-            where = f"{shown(joint.child.name)} hangs on joint {shown(first.frame.local)} already"
+            where = f"{shown(link)} hangs on joint {shown(first.frame.local)} already"
             message = f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}"
             self.options.tally.note_each(message, joint.frame.holder.element.line)
 
@@ -69,7 +70,7 @@ class _SdfTree:
         return link if link is not None and link.name in self.hung else None
 
     def _around(self, frame: SdfFrame) -> SdfFrame:
-        """Return the frame on which one hangs that no joint holds: of the nearest model that no joint moves."""
+        """Return the frame of the nearest model around one that no joint moves, or the world."""
         scope = frame.scope
         while scope is not None and self.carried.get(scope.name):
             scope = scope.scope
@@ -79,21 +80,22 @@ class _SdfTree:
         """Yield every edge, and the root where nothing stands in a world."""
         posture = self._posture()
         for frame in self.frames.all.values():
-            if frame.kind == "link" or frame is self.frames.top:
-                joint = self.hung.get(frame.name)
-                if joint is not None:
-                    yield from self._across(joint, posture)
-                elif frame.kind == "link":
-                    yield self._edge(self._around(frame), frame)
-            elif frame.kind == "model":
-                yield self._edge(self.carried[frame.name] or self._around(frame), frame)
-            else:
-                held = frame.kind == "joint"
-                yield self._edge(self.frames.end(frame, "child") if held else self.frames.attached(frame), frame)
+            if frame.name in self.hung:
+                yield from self._across(self.hung[frame.name], posture)
+            elif frame is not self.frames.top:
+                yield self._edge(self._outer(frame), frame)
         for sensor in self.frames.sensors:
             link = sensor.scope or self.frames.top
             pose = rigid.compose(*self.frames.relative(link, sensor.relative_to or link), *sensor.pose)
             yield Edge(link.name, sensor.name, pose, line=sensor.holder.element.line)
+
+    def _outer(self, frame: SdfFrame) -> SdfFrame:
+        """Return the frame on which one hangs that no joint holds."""
+        if frame.kind == "joint":
+            return self.frames.end(frame, "child")
+        if frame.kind == "frame":
+            return self.frames.attached(frame)
+        return self.carried.get(frame.name) or self._around(frame)
 
     def _edge(self, outer: SdfFrame, frame: SdfFrame) -> Edge:
         """Return an edge that stands still."""
@@ -127,16 +129,17 @@ class _SdfTree:
 
     def _across(self, joint: SdfJoint, posture: Posture) -> Iterator[Edge]:
         """Yield the edge across a joint: for good, or a sample at each time."""
-        parent, child = joint.parent, joint.child
+        hanging = joint.hanging
+        outer = joint.child if joint.turned else joint.parent
+        rest = self.frames.relative(outer, hanging)
         line = joint.frame.holder.element.line
-        rest = self.frames.relative(parent, child)
         for stamp_ns, moved in posture.motions(*(motion.name for motion in joint.motions)):
             pose = rest if all(each == IDENTITY for each in moved) else self._moved(joint, moved)
-            yield Edge(parent.name, child.name, pose, stamp_ns, line)
+            yield Edge(outer.name, hanging.name, pose, stamp_ns, line)
 
     def _moved(self, joint: SdfJoint, moved: tuple[Rigid, ...]) -> Rigid:
-        """Return the pose of the child in the parent once the joint has moved."""
+        """Return the pose of the body that hangs on a joint once that has moved."""
         pose = self.frames.relative(joint.parent, joint.frame)
-        for each in moved:
+        for each in (*moved, self.frames.relative(joint.frame, joint.child)):
             pose = rigid.compose(*pose, *each)
-        return rigid.compose(*pose, *self.frames.relative(joint.frame, joint.child))
+        return rigid.inverse(*pose) if joint.turned else pose

@@ -99,9 +99,9 @@ def read_elements(xml: XmlFile) -> SdfElement:
 
 
 def read_pose(holder: SdfElement, xml: XmlFile, options: Options) -> tuple[Rigid, str]:
-    """Read the pose of an element: x y z roll pitch yaw, or x y z qx qy qz qw; what is empty or missing is the identity.
+    """Read the pose of an element: x y z roll pitch yaw, or x y z qx qy qz qw.
 
-    Returns it with what it is relative to, "" for the default.
+    What is empty or missing is the identity.  Returns it with what it is relative to, "" for the default.
     Raises FormatError.
     """
     pose = holder.first("pose")

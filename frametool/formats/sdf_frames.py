@@ -41,7 +41,7 @@ class SdfFrame:
         self.kind = kind
         self.local = local
         self.scope = scope
-        self.name = local if scope is None or scope.kind == WORLD else f"{scope.name}::{local}"
+        self.name: str = local if scope is None or scope.kind == WORLD else f"{scope.name}::{local}"
         self.holder = holder
         self.pose = IDENTITY
         self.relative_to = scope

@@ -39,9 +39,22 @@ class SdfJoint(NamedTuple):
     child: SdfFrame
     motions: tuple[Joint, ...]
 
+    @property
+    def turned(self) -> bool:
+        """Tell whether the parent hangs on the child: on the world everything hangs."""
+        return self.child.kind == WORLD
+
+    @property
+    def hanging(self) -> SdfFrame:
+        """Return the body that hangs on the other one."""
+        return self.parent if self.turned else self.child
+
 
 class SdfJoints:
-    """All joints of a file, in its order; `names` are those under which they take values, short where that is enough."""
+    """All joints of a file, in its order.
+
+    names: those under which they take values, without scopes where that is enough
+    """
 
     def __init__(self, frames: SdfFrames) -> None:
         """Read them; raises FormatError."""
@@ -88,15 +101,12 @@ class SdfJoints:
         if kind not in KINDS:
             message = f"joint {shown(frame.local)} has the type {shown(kind)}{alternatives(kind, KINDS, 'types')}"
             raise self.xml.error(holder.element, message, "type")
-        ends = [self.body(self.frames.end(frame, which)) for which in ("parent", "child")]
-        if None in ends or ends[0] is ends[1]:
+        parent, child = (self.body(self.frames.end(frame, which)) for which in ("parent", "child"))
+        if parent is None or child is None or parent is child:
             raise self.xml.error(holder.element, f"joint {shown(frame.local)} does not connect two links")
         if kind in STILL:
             message = f"joint {shown(frame.local)} is a {kind}: it stands as in the file and takes no value"
             self.frames.options.tally.note_each(message, holder.element.line)
-        parent, child = ends
-        assert parent is not None
-        assert child is not None
         return SdfJoint(frame, parent, child, self._motions(frame, kind))
 
     def _motions(self, frame: SdfFrame, kind: str) -> tuple[Joint, ...]:
@@ -163,9 +173,8 @@ class SdfJoints:
         if leader.kind != "joint":
             raise self.xml.error(mimic.element, f"{shown(leader.name)} is a {leader.kind}, no joint", "joint")
         name = self.names[leader.name] + (":2" if mimic.attribute("axis") == "axis2" else "")
-        multiplier, offset, reference = (
-            self._number(mimic, tag, default) for tag, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
-        )
+        multiplier = self._number(mimic, "multiplier", 1.0)
+        offset, reference = self._number(mimic, "offset", 0.0), self._number(mimic, "reference", 0.0)
         return Mimic(name, multiplier, offset - multiplier * reference)
 
     def _number(self, holder: SdfElement, tag: str, default: float) -> float:
