@@ -163,6 +163,14 @@ FORMATS = {
         signs=(("xml", "sdf"),),
         states="parent<-child, metres, radians unless degrees; frames are model::link",
     ),
+    "mjcf": Format(
+        "MJCF of MuJoCo",
+        suffixes=(".mjcf",),
+        reads=("tree", "joints"),
+        reader="frametool.formats.mjcf",
+        signs=(("xml", "mujoco"),),
+        states="parent<-child, metres; sites and cameras (looking along -z) are site:NAME, camera:NAME",
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
         signs=(  # launch files have the same substitutions

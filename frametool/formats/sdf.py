@@ -16,9 +16,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.documents.xml_events import XmlFile
+from frametool.documents.xml_tree import read_nodes
 from frametool.errors import shown
 from frametool.formats.posture import Posture
-from frametool.formats.sdf_elements import IDENTITY, read_elements
+from frametool.formats.sdf_elements import HELD, IDENTITY
 from frametool.formats.sdf_frames import SdfFrames
 from frametool.formats.sdf_joints import SdfJoints
 from frametool.geometry import rigid
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a world or model, its joints as told, else where the file has them."""
     xml = XmlFile(file)
-    frames = SdfFrames(read_elements(xml), xml, options)
+    frames = SdfFrames(read_nodes(xml, HELD), xml, options)
     yield from _SdfTree(frames, SdfJoints(frames), options).edges()
 
 

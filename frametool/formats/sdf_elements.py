@@ -1,4 +1,4 @@
-"""The elements of SDF that place frames, as a tree: what only shapes, draws or simulates is left out while reading."""
+"""The elements of SDF that place frames, and how a pose is written in them."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from frametool.grammar.readers import INDICES, Reading
 from frametool.grammar.rotation import rotation_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from frametool.documents.xml_events import Element, XmlFile
+    from frametool.documents.xml_events import XmlFile
+    from frametool.documents.xml_tree import XmlNode
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options
 
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 _AXIS = frozenset(("xyz", "limit", "mimic", "use_parent_model_frame"))
-_HELD = {
+HELD = {
     "sdf": frozenset(("world", "model", "include")),
     "world": frozenset(("model", "frame", "joint", "include")),
     "model": frozenset(("model", "link", "joint", "frame", "pose", "include")),
@@ -36,69 +35,7 @@ _HELD = {
 }
 
 
-class SdfElement:
-    """One element: its attributes and place, its text, and those of the elements in it that are kept."""
-
-    __slots__ = ("children", "element", "text")
-
-    def __init__(self, element: Element) -> None:
-        """Create it as it begins."""
-        self.element = element
-        self.children: list[SdfElement] = []
-        self.text = ""
-
-    @property
-    def tag(self) -> str:
-        """Return what it is."""
-        return self.element.tag
-
-    def all(self, *tags: str) -> Iterator[SdfElement]:
-        """Yield the elements of some kinds that stand directly in it."""
-        return (child for child in self.children if child.tag in tags)
-
-    def first(self, tag: str) -> SdfElement | None:
-        """Return the first element of a kind, if there is one."""
-        return next(self.all(tag), None)
-
-    def text_of(self, tag: str, default: str = "") -> str:
-        """Return the text of the first element of a kind."""
-        found = self.first(tag)
-        return default if found is None else found.text
-
-    def attribute(self, name: str) -> str:
-        """Return an attribute; "" where it is missing."""
-        return self.element.attributes.get(name, "").strip()
-
-
-def read_elements(xml: XmlFile) -> SdfElement:
-    """Return the root element with what is kept below it.
-
-    Raises FormatError.
-    """
-    opened: list[SdfElement] = []
-    skipped = 0  # the depth below which nothing is kept
-    for element in xml.elements():
-        if skipped and element.depth > skipped:
-            continue
-        skipped = 0
-        if element.ends:
-            if opened and opened[-1].element.depth == element.depth:
-                ended = opened.pop()
-                ended.text = element.text.strip()
-                root = ended
-        elif not opened and element.tag != "sdf":
-            raise xml.error(element, f"SDF begins with <sdf>, found <{element.tag}>")
-        elif opened and element.tag not in _HELD.get(opened[-1].tag, ()):
-            skipped = element.depth
-        else:
-            made = SdfElement(element)
-            if opened:
-                opened[-1].children.append(made)
-            opened.append(made)
-    return root
-
-
-def read_pose(holder: SdfElement, xml: XmlFile, options: Options) -> tuple[Rigid, str]:
+def read_pose(holder: XmlNode, xml: XmlFile, options: Options) -> tuple[Rigid, str]:
     """Read the pose of an element: x y z roll pitch yaw, or x y z qx qy qz qw.
 
     What is empty or missing is the identity.  Returns it with what it is relative to, "" for the default.
@@ -129,7 +66,7 @@ def _is_true(text: str) -> bool:
     return text.lower() in ("true", "1")
 
 
-def _is_quaternion(pose: SdfElement, xml: XmlFile) -> bool:
+def _is_quaternion(pose: XmlNode, xml: XmlFile) -> bool:
     form = pose.attribute("rotation_format")
     if form not in ("", "euler_rpy", "quat_xyzw"):
         message = f"rotation_format {shown(form)}; expected euler_rpy or quat_xyzw"
@@ -137,7 +74,7 @@ def _is_quaternion(pose: SdfElement, xml: XmlFile) -> bool:
     return form == "quat_xyzw"
 
 
-def _quaternion(pose: SdfElement, xml: XmlFile, options: Options) -> tuple[float, float, float, float]:
+def _quaternion(pose: XmlNode, xml: XmlFile, options: Options) -> tuple[float, float, float, float]:
     reading = Reading(Source(xml.name, ""), normalize=options.normalize)
     try:
         rotation = rotation_of(notation("xyzw"), pose.text.split()[3:], INDICES, reading)

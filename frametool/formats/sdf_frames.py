@@ -11,13 +11,14 @@ from functools import reduce
 from typing import TYPE_CHECKING
 
 from frametool.errors import alternatives, did_you_mean, shown
-from frametool.formats.sdf_elements import IDENTITY, SdfElement, read_pose
+from frametool.formats.sdf_elements import IDENTITY, read_pose
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.documents.xml_events import XmlFile
+    from frametool.documents.xml_tree import XmlNode
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options
 
@@ -36,7 +37,7 @@ class SdfFrame:
 
     __slots__ = ("holder", "in_scope", "kind", "local", "name", "open", "placement", "pose", "relative_to", "scope")
 
-    def __init__(self, kind: str, local: str, scope: SdfFrame | None, holder: SdfElement) -> None:
+    def __init__(self, kind: str, local: str, scope: SdfFrame | None, holder: XmlNode) -> None:
         """Create a frame whose pose is not read yet."""
         self.kind = kind
         self.local = local
@@ -62,7 +63,7 @@ class SdfFrame:
 class SdfFrames:
     """All frames of a file by name."""
 
-    def __init__(self, root: SdfElement, xml: XmlFile, options: Options) -> None:
+    def __init__(self, root: XmlNode, xml: XmlFile, options: Options) -> None:
         """Read the frames and the poses; raises FormatError."""
         self.xml = xml
         self.options = options
@@ -72,7 +73,7 @@ class SdfFrames:
         self.top = SdfFrame(WORLD, WORLD, None, worlds[0] if worlds else root)
         self.all: dict[str, SdfFrame] = {WORLD: self.top}
         self.sensors: list[SdfFrame] = []
-        self.left_out: list[SdfElement] = []
+        self.left_out: list[XmlNode] = []
         self.version = _version(root)
         self._take([self.top])
         for frame in [*self.all.values(), *self.sensors]:
@@ -96,13 +97,13 @@ class SdfFrames:
                     for sensor in holder.all("sensor"):
                         self.sensors.append(SdfFrame("sensor", self._name(sensor), frame, sensor))
 
-    def _name(self, holder: SdfElement) -> str:
+    def _name(self, holder: XmlNode) -> str:
         name = holder.attribute("name")
         if not name:
             raise self.xml.error(holder.element, f"<{holder.tag}> has no name")
         return name
 
-    def _named(self, holder: SdfElement, scope: SdfFrame) -> SdfFrame:
+    def _named(self, holder: XmlNode, scope: SdfFrame) -> SdfFrame:
         """Register one element under its name."""
         frame = SdfFrame(holder.tag, self._name(holder), scope, holder)
         if frame.local in (WORLD, INSIDE):
@@ -119,7 +120,7 @@ class SdfFrames:
         self.all[frame.name] = frame
         return frame
 
-    def _leave_out(self, include: SdfElement) -> None:
+    def _leave_out(self, include: XmlNode) -> None:
         self.left_out.append(include)
         name = shown(include.text_of("name") or include.text_of("uri"))
         message = f"<include> {name} is left out, it needs other files; with them: gz sdf -p FILE > whole.sdf"
@@ -157,7 +158,7 @@ class SdfFrames:
             return self.top
         return self.find(holder.text, joint.scope or self.top, holder, "")
 
-    def find(self, told: str, scope: SdfFrame, holder: SdfElement, attribute: str) -> SdfFrame:
+    def find(self, told: str, scope: SdfFrame, holder: XmlNode, attribute: str) -> SdfFrame:
         """Return the frame that a name means in a scope.
 
         Raises FormatError with the names there are.
@@ -248,7 +249,7 @@ def _product(poses: Sequence[Rigid]) -> Rigid:
     return reduce(lambda outer, inner: rigid.compose(*outer, *inner), poses) if poses else IDENTITY
 
 
-def _version(root: SdfElement) -> tuple[int, ...]:
+def _version(root: XmlNode) -> tuple[int, ...]:
     """Return the version of SDF as numbers; what is none counts as the newest."""
     parts = root.attribute("version").split(".")
     return tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else (2,)

@@ -16,7 +16,7 @@ from frametool.geometry import floats, quaternion
 from frametool.geometry.quaternion import unit_vector
 
 if TYPE_CHECKING:
-    from frametool.formats.sdf_elements import SdfElement
+    from frametool.documents.xml_tree import XmlNode
     from frametool.formats.sdf_frames import SdfFrame, SdfFrames
     from frametool.grammar.readers import Vector
 
@@ -126,7 +126,7 @@ class SdfJoints:
         lower, upper = self._limits(axis)
         return Joint(name, kind, self._direction(frame, axis), lower, upper, self._mimic(frame, axis), line=line)
 
-    def _direction(self, frame: SdfFrame, axis: SdfElement) -> Vector:
+    def _direction(self, frame: SdfFrame, axis: XmlNode) -> Vector:
         """Return an axis as the joint's frame sees it."""
         xyz = axis.first("xyz")
         if xyz is None:
@@ -144,19 +144,19 @@ class SdfJoints:
             x, y, z = quaternion.rotate(*turned, x, y, z)
         return unit_vector(x, y, z, floats)
 
-    def _in_model(self, axis: SdfElement) -> bool:
+    def _in_model(self, axis: XmlNode) -> bool:
         """Tell whether an axis is seen from the model: in SDF before 1.5 always, until 1.6 where it says so."""
         version = self.frames.version
         flag = axis.text_of("use_parent_model_frame").lower() in ("true", "1")
         return version < (1, 5) or (flag and version < (1, 7))
 
-    def _limits(self, axis: SdfElement) -> tuple[float | None, float | None]:
+    def _limits(self, axis: XmlNode) -> tuple[float | None, float | None]:
         limit = axis.first("limit")
         lower = self._limit(limit, "lower")
         upper = self._limit(limit, "upper")
         return (None, None) if lower is None or upper is None or lower > upper else (lower, upper)
 
-    def _limit(self, limit: SdfElement | None, which: str) -> float | None:
+    def _limit(self, limit: XmlNode | None, which: str) -> float | None:
         """Read one limit; None for none, which SDF writes as 1e16 or inf."""
         held = limit.first(which) if limit is not None else None
         if held is None or held.text.lstrip("+-").lower() in ("inf", "infinity"):
@@ -164,7 +164,7 @@ class SdfJoints:
         (value,) = self.xml.numbers_in(held.text, held.element, "", 1)
         return value if isfinite(value) and abs(value) < UNLIMITED else None
 
-    def _mimic(self, frame: SdfFrame, axis: SdfElement) -> Mimic | None:
+    def _mimic(self, frame: SdfFrame, axis: XmlNode) -> Mimic | None:
         """Read what a joint follows: multiplier * (leader - reference) + offset, of either axis of the leader."""
         mimic = axis.first("mimic")
         if mimic is None:
@@ -177,6 +177,6 @@ class SdfJoints:
         offset, reference = self._number(mimic, "offset", 0.0), self._number(mimic, "reference", 0.0)
         return Mimic(name, multiplier, offset - multiplier * reference)
 
-    def _number(self, holder: SdfElement, tag: str, default: float) -> float:
+    def _number(self, holder: XmlNode, tag: str, default: float) -> float:
         held = holder.first(tag)
         return default if held is None else self.xml.numbers_in(held.text, held.element, "", 1)[0]

@@ -410,7 +410,7 @@ def test_what_has_no_frames_is_said(run: Callable[..., Any]) -> None:
         done = run("tree", "a.sdf", files={"a.sdf": text})
         assert (done.status, done.err) == (1, "frametool: a.sdf: no frames in it\n")
     done = run("tree", "a.xml", "--in", "sdf", files={"a.xml": "<robot/>"})
-    assert done.err.startswith("frametool: a.xml:1:1: SDF begins with <sdf>, found <robot>")
+    assert done.err.startswith("frametool: a.xml:1:1: expected <sdf>, found <robot>")
 
 
 @pytest.mark.parametrize("count", [20_000])
