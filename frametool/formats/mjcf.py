@@ -68,10 +68,10 @@ def _moved(placed: Placed, moved: Sequence[Rigid], posture: Posture) -> Rigid:
 
 def _about(anchor: tuple[float, float, float], motion: Rigid) -> Rigid:
     """Return a motion about a point: what turns leaves the point where it is."""
-    tx, ty, tz, *turn = motion
+    tx, ty, tz, qx, qy, qz, qw = motion
     px, py, pz = anchor
-    mx, my, mz = quaternion.rotate(*turn, px, py, pz)
-    return tx + px - mx, ty + py - my, tz + pz - mz, *motion[3:]
+    mx, my, mz = quaternion.rotate(qx, qy, qz, qw, px, py, pz)
+    return tx + px - mx, ty + py - my, tz + pz - mz, qx, qy, qz, qw
 
 
 def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
@@ -79,7 +79,10 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
 
     Raises FormatError.
     """
-    xml = XmlFile(file)
+    try:
+        xml = XmlFile(file)
+    finally:
+        file.close()
     root = read_nodes(xml, HELD)
     joints = MjcfModel(root, xml, Options(Tally(), Topics())).joints
     key = _key(root, xml, state)

@@ -160,7 +160,7 @@ class PoseReader:
         fromto = attributes["fromto"]
         if "pos" in attributes:
             raise self.error(fromto, "fromto", "pos and fromto in one site; keep one")
-        self.word({**attributes, "type": attributes.get("type", Attribute("sphere", fromto.element))}, "type", "", STRAIGHT)
+        self.word({"type": Attribute("sphere", fromto.element), **attributes}, "type", "", STRAIGHT)
         ax, ay, az, bx, by, bz = self.numbers(attributes, "fromto", 6, ())
         along = self._unit(attributes, "fromto", (ax - bx, ay - by, az - bz))
         return 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), *_turning_z(*along)

@@ -11,8 +11,6 @@ from frametool.geometry import quaternion, rigid
 from frametool.geometry.trig import DEGREE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from frametool.documents.xml_events import XmlFile
     from frametool.documents.xml_tree import XmlNode
     from frametool.formats.mjcf_attributes import Attributes
@@ -95,29 +93,31 @@ class MjcfModel:
             raise self.xml.error(child.element, message)
 
     def _walk(self, section: XmlNode) -> None:
-        """Read what stands in a world, depth first; a stack, for bodies may be deep."""
-        pending = [(section, _Inside(self.world, "", IDENTITY))]
+        """Read what stands in a world in the order of the file; a stack, for bodies may be deep."""
+        self._refuse(section)
+        pending = [(child, _Inside(self.world, "", IDENTITY)) for child in reversed(section.children)]
         while pending:
-            node, inside = pending.pop()
-            pending += reversed(list(self._within(node, inside)))
+            node, around = pending.pop()
+            if (inside := self._take(node, around)) is not None:
+                self._refuse(node)
+                pending += [(child, inside) for child in reversed(node.children)]
 
-    def _within(self, node: XmlNode, inside: _Inside) -> Iterator[tuple[XmlNode, _Inside]]:
-        """Read what stands directly in a body or frame; yield the bodies and frames in it with what surrounds them."""
-        self._refuse(node)
-        for child in node.children:
-            if child.tag in MADE:
-                message = f"<{child.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}"
-                self.options.tally.note_each(message, child.element.line)
-            elif child.tag == "frame":
-                pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(child.element)))
-                yield child, inside._replace(around=self._class(child, inside.around), frame=pose)
-            elif child.tag == "body":
-                body = self._place(child, inside, self.poses.pose(own_attributes(child.element)))
-                yield child, _Inside(body, self._class(child, inside.around), IDENTITY)
-            elif child.tag in JOINTS:
-                self._join(child, inside)
-            else:
-                self._mark(child, inside)
+    def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
+        """Read one element; of a body or frame return what surrounds that which it holds."""
+        if node.tag in MADE:
+            message = f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}"
+            self.options.tally.note_each(message, node.element.line)
+        elif node.tag == "frame":
+            pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node.element)))
+            return inside._replace(around=self._class(node, inside.around), frame=pose)
+        elif node.tag == "body":
+            body = self._place(node, inside, self.poses.pose(own_attributes(node.element)))
+            return _Inside(body, self._class(node, inside.around), IDENTITY)
+        elif node.tag in JOINTS:
+            self._join(node, inside)
+        else:
+            self._mark(node, inside)
+        return None
 
     def _class(self, node: XmlNode, around: str) -> str:
         """Return the class that a body or frame gives to what stands in it."""
@@ -165,9 +165,12 @@ class MjcfModel:
         name = node.attribute("name") or f"{body.name}/joint{len(body.joints) + 1}"
         if known := self.joint_names.get(name):
             raise self.xml.error(node.element, f"joint {shown(name)} twice; first in line {known.element.line}", "name")
-        if kind == "free" and (body.parent != WORLD or body.joints):
-            where = "a body directly in the world" if body.parent != WORLD else "a body without other joints"
-            raise self.xml.error(node.element, f"joint {shown(name)} is free: it belongs into {where}")
+        if kind == "free" and body.parent != WORLD:
+            message = f"joint {shown(name)} is free: it belongs into a body directly in the world"
+            raise self.xml.error(node.element, message)
+        if body.joints and "floating" in (body.joints[0].joint.kind, TYPES[kind]):
+            message = f"joint {shown(name)} beside others in body {shown(body.name)}, one of them free; keep that"
+            raise self.xml.error(node.element, message)
         self.joint_names[name] = node
         body.joints.append(self._anchored(node, name, kind, attributes, inside.frame))
 

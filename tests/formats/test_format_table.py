@@ -113,6 +113,8 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a launch file in Python": (b"import os\n\ndef generate_launch_description():\n    pass\n", "tree", "launch"),
     "a tree with a frame called launch": (b"frames:\n  launch:\n    a:\n", "tree", "yaml"),
     "a world of Gazebo": (b"<?xml version='1.0' ?>\n<sdf version='1.6'>\n<world name='a'>", "tree", "sdf"),
+    "a model of MuJoCo": (b"<mujoco model='a'>\n<compiler angle='radian'/>", "tree", "mjcf"),
+    "a model of MuJoCo whose joints are told": (b"<mujoco model='a'>\n<keyframe>", "joints records rows", "mjcf"),
     "rows": (b"x,y,z\n1,2,3\n", "rows records", "csv"),
     "rows whose first column ends in a colon": (b"a:,y\n1,2\n", "rows records", "csv"),
     "rows under a comment": (b"# t,x,y\n1,2,3\n", "rows records", "csv"),
