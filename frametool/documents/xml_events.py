@@ -7,6 +7,7 @@ are read too.
 from __future__ import annotations
 
 import re
+from math import inf, isfinite
 from typing import NamedTuple
 from xml.parsers import expat
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 DEEPEST_ELEMENT = 100_000
 _BLOCK = 1 << 16
+_DECIMALS = "0123456789.-+eE \t\r\n"
 
 
 class Element(NamedTuple):
@@ -153,6 +155,13 @@ class XmlFile:
     def numbers_in(self, text: str, element: Element, attribute: str, count: int) -> tuple[float, ...]:
         """Read a text of an element as so many finite numbers; the attribute, if any, is where it stands."""
         words = text.split()
+        if len(words) == count and not text.strip(_DECIMALS):  # plain decimals, nearly always
+            try:
+                numbers = tuple(map(float, words))
+            except ValueError:
+                numbers = (inf,)
+            if all(map(isfinite, numbers)):
+                return numbers
         if len(words) != count:
             found = f"found {len(words)} in {shown(text)}"
             expected = f"{count} number{'s' * (count != 1)}"

@@ -43,7 +43,11 @@ class Recording(InputFile):
         if not (form or folder) and os.path.isdir(path):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
-        self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+        try:
+            self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+        except BaseException:
+            self.close()
+            raise
         self.tally = Tally()
         self.topics = Topics(topics)
         self.answers = answers
@@ -89,6 +93,24 @@ class Recording(InputFile):
             report(FormatError(missing, source=self.name))
         for told in self.tally.told() if tell else ():
             warn(f"{self.name}:{told.line}: {told.message}")
+
+
+def opened_together(files: Iterable[Recording]) -> list[Recording]:
+    """Return files that are opened one after the other; where one cannot be, the others are closed again."""
+    found: list[Recording] = []
+    try:
+        found.extend(files)
+    except BaseException:
+        close_all(found)
+        raise
+    return found
+
+
+def close_all(files: Iterable[Source | Recording]) -> None:
+    """Let go of files, those among them that were not read."""
+    for file in files:
+        if isinstance(file, Recording):
+            file.close()
 
 
 def refuse_unknown_joints(files: Sequence[Recording]) -> None:

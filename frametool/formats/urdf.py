@@ -3,8 +3,9 @@
     <joint name="elbow" type="revolute"><origin xyz="0 0 1" rpy="0 0 0"/><parent link="arm"/><child link="tip"/>
       <axis xyz="0 1 0"/><limit lower="-2" upper="2"/><mimic joint="shoulder" multiplier="-1"/></joint>
 
-Metres and radians; rpy about fixed axes x, y, z, or quat_xyzw (URDF 1.2).  parent_from_child = origin * motion, the
-motion in the frame behind the origin, along or about the axis.  Links are the frames.  xacro is refused, not expanded.
+Metres and radians; rpy about fixed axes x, y, z, or quat_xyzw (URDF 1.1), or both where they agree.  Links are the
+frames.  parent_from_child = origin * motion, the motion in the frame behind the origin, along or about the axis.
+xacro is refused, not expanded.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import INDICES, Note, Reading
-from frametool.grammar.rotation import rotation_of
+from frametool.grammar.rotation import agreeing_rotation, rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -188,10 +189,10 @@ class _Reader:
         if kind not in KINDS:
             message = f"joint {shown(name)} has the type {shown(kind)}{alternatives(kind, KINDS, 'types')}"
             raise self.xml.error(element, message, "type")
-        for part in ("parent", "child"):
-            if part not in parts:
-                raise self.xml.error(element, f"joint {shown(name)} has no <{part}>")
-        parent, child = (self.bare(self._name(parts[part], "link")) for part in ("parent", "child"))
+        if "parent" not in parts or "child" not in parts:
+            missing = "child" if "parent" in parts else "parent"
+            raise self.xml.error(element, f"joint {shown(name)} has no <{missing}>")
+        parent, child = self.bare(self._name(parts["parent"], "link")), self.bare(self._name(parts["child"], "link"))
         origin = self._origin(parts["origin"]) if "origin" in parts else IDENTITY
         joint = None if kind == "fixed" else self._joint(name, kind, element, parts)
         return Hinge(name, parent, child, origin, joint, element)
@@ -200,19 +201,21 @@ class _Reader:
         """Read the pose of a joint in its parent: rpy, or a quaternion."""
         numbers = self.xml.numbers
         x, y, z = numbers(element, "xyz", 3, "0 0 0")
-        if "quat_xyzw" not in element.attributes:
-            roll, pitch, yaw = numbers(element, "rpy", 3, "0 0 0")
-            return x, y, z, *euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
-        if "rpy" in element.attributes:
-            raise self.xml.error(element, "rpy and quat_xyzw in one origin; keep one", "quat_xyzw")
-        numbers(element, "quat_xyzw", 4)
-        return x, y, z, *self._quaternion(element)
+        roll, pitch, yaw = numbers(element, "rpy", 3, "0 0 0")
+        rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
+        if "quat_xyzw" in element.attributes:
+            rotation = self._quaternion(element, rotation if "rpy" in element.attributes else None)
+        return x, y, z, *rotation
 
-    def _quaternion(self, element: Element) -> Quaternion:
+    def _quaternion(self, element: Element, other: Quaternion | None) -> Quaternion:
+        """Read quat_xyzw, which must agree with the angles if they stand beside it, and says more digits than they."""
+        self.xml.numbers(element, "quat_xyzw", 4)
         reading = Reading(Source(self.xml.name, ""), normalize=self.options.normalize)
         texts = element.attributes["quat_xyzw"].split()
         try:
             rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
+            if other is not None:
+                agreeing_rotation(rotation, other)
         except ValueInvalid as error:
             raise self.xml.error(element, str(error), "quat_xyzw", rule=error.rule) from None
         for note in reading.notes:
