@@ -202,6 +202,22 @@ FORMATS = {
         signs=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
         states="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
     ),
+    "mjcf": Format(
+        "MJCF of MuJoCo",
+        suffixes=(".mjcf",),
+        reads=("tree", "joints"),
+        reader="frametool.formats.mjcf",
+        signs=(("xml", "mujoco"),),
+        states="parent<-child, metres; sites and cameras (looking along -z) are site:NAME, camera:NAME",
+    ),
+    "sdf": Format(
+        "SDF of Gazebo",
+        suffixes=(".sdf", ".world"),
+        reads=("tree",),
+        reader="frametool.formats.sdf",
+        signs=(("xml", "sdf"),),
+        states="parent<-child, metres, radians unless degrees; frames are model::link",
+    ),
     "urdf": Format(
         "URDF robot",
         suffixes=(".urdf",),
