@@ -50,7 +50,7 @@ _DH = (
 )
 _KITTI = (
     r"\A(?:#[^\n]*\n)*(?:calib_time: *\d|"
-    r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|S_0\d|R|T):?(?: +[-+]?[\d.][\d.e+-]*){3})"
+    r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
 )
 
 FORMATS = {

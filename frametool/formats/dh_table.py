@@ -13,7 +13,7 @@ from frametool.documents.source import pointer
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.grammar.readers import kind
 from frametool.text.csv_line import LineCell, split_line
-from frametool.text.numbers import parse_angle, parse_length, parse_number
+from frametool.text.numbers import NotFinite, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -159,6 +159,8 @@ def _read(cell: Cell, read: Callable[[str, str], Amount]) -> Amount:
     text = cell.text
     try:
         return read(text, cell.unit)
+    except NotFinite as error:
+        raise cell.fail(str(error)) from None
     except ValueInvalid as error:
         try:
             if match := re.fullmatch(_STARRED, text):

@@ -20,6 +20,7 @@ from frametool.formats.document_edges import document_edges
 from frametool.formats.recordings import Recording
 from frametool.formats.stated_poses import Stated, edges_of
 from frametool.geometry.representations import notation
+from frametool.grammar.edges import Edge
 from frametool.grammar.pose import read_name
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, read_texts, within
 from frametool.grammar.rotation import rotation_of
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.input_file import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Edge, Options
+    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path, Quaternion, Reading
 
 TAGS = frozenset(("!Rpy", "!AngleAxis", "!Identity"))
@@ -55,7 +56,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         for index, entry in enumerate(listed):
             within(("directives", index), scene.take, entry, ("directives", index))
         options.tally.about = scene.about
-        return edges_of(scene.poses, reading)
+        # of directives that only add models something is known too: Drake's world is always there
+        return edges_of(scene.poses, reading) or [Edge(None, WORLD, _IDENTITY)]
 
     yield from document_edges(file, options, take, TAGS)
 
