@@ -12,7 +12,7 @@ from frametool.calc import frame_rules as rules
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.literals import Literals
 from frametool.calc.parser import RESERVED, parse_line, walk
-from frametool.calc.tokens import CalcError, NoTree, frames_of
+from frametool.calc.tokens import CalcError, NoTree
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POSE, UNITS, Term, Type
 from frametool.errors import FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
@@ -255,7 +255,7 @@ class _Walk:
         return rules.power(base, exponent)
 
     def _as(self, branch: Branch) -> Term:
-        target, source = map(self._bare, frames_of(branch.value))
+        target, source = map(self._bare, branch.value)
         return rules.as_frames(self._value(branch.parts[0]), target, source)
 
     def _in(self, branch: Branch) -> Term:
@@ -272,9 +272,9 @@ class _Walk:
         return name[1:]
 
     def _lookup(self, branch: Branch) -> Term:
-        text, named, when = branch.value
+        frames, named, when = branch.value
         tree = self._tree(named)
-        target, source = (self._bare(each, tree) for each in frames_of(text))
+        target, source = (self._bare(each, tree) for each in frames)
         type_ = Type(POSE, target, source)
         if when == "row":
             if self.scope.row is None:

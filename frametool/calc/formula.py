@@ -111,7 +111,7 @@ class RowExpressions:
     ) -> Components:
         """Return the components of the result and then the extras; of floats raises CalcError where none are."""
         bound = self._plainly(row)
-        values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp, {})
+        values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp)
         if self.kind(row):
             return bound.terms[0][1].at(values)
         numbers = [number for _, term in bound.terms for number in self._numbers(term, values)]

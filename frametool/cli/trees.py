@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.command import FILE, READING, TEXT, VERBOSE, Text, decorated, forms_told, in_option
-from frametool.cli.poses import is_inline, source_of
+from frametool.cli.pasted_input import is_inline
+from frametool.cli.poses import source_of
 from frametool.cli.stderr import say
 from frametool.errors import shown, warn
 from frametool.formats import FORMATS
-from frametool.formats.assembly import Rules
-from frametool.formats.load import load_sources
-from frametool.formats.recordings import Recording, opened_together
 from frametool.grammar.edges import CAMERA_AXES, DH, DIRECTIONS, Answers
 
 if TYPE_CHECKING:
@@ -24,7 +22,8 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from frametool.formats.assembly import Place
+    from frametool.formats.assembly import Place, Rules
+    from frametool.formats.recordings import Recording
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
@@ -73,6 +72,8 @@ def load_tree(
 
     streams: `--in` is about what is streamed wherever that can be
     """
+    from frametool.formats.load import load_sources  # not every command that may read trees does
+
     files = opened((argument, *more), streams=streams)
     tree = load_sources(files, rules)
     state(files)
@@ -87,6 +88,9 @@ def load_sides(
     places: are filled with where each frame of the one and the other was said to be
     """
     refuse_two_readers((*a, *b))
+    from frametool.formats.assembly import Rules
+    from frametool.formats.load import load_sources
+
     rules = Rules(normalize=normalize)
     trees = []
     for arguments, behind, found in ((a, 0, places[0]), (b, len(a), places[1])):
@@ -118,6 +122,8 @@ def opened(arguments: Sequence[str], *, streams: bool = False, behind: int = 0) 
     streams: as `load_tree` has it
     behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
     """
+    from frametool.formats.recordings import Recording, opened_together
+
     refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")

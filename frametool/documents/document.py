@@ -88,7 +88,7 @@ def format_error(
     source: Source, path: Path, message: str, *, key: bool = False, error: type[FormatError] = FormatError
 ) -> FormatError:
     """Make the error for a value, or its key, at a path: placed, with the source line and a caret."""
-    bare = Source(source.name, source.text.removeprefix(_BYTE_ORDER_MARK))
+    bare = source._replace(text=source.text.removeprefix(_BYTE_ORDER_MARK))
     (offset,) = _offsets(bare.text, [path], key=key)
     return error_at(bare, offset, message, error)
 

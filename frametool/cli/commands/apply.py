@@ -8,7 +8,8 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, one_pose, values_of
+from frametool.cli.pasted_input import is_inline, is_pasted
+from frametool.cli.poses import one_pose, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
@@ -88,7 +89,7 @@ def command(
     elif time_column is not None or at is not None:
         raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
-        way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
+        way, rest = _way_by_pose(one_pose(pose, stream.given, degrees=deg, normalize=normalize)), arguments
     if time_column is not None:
         _check_timed(rest, at)
     request = way.request(frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
@@ -214,14 +215,19 @@ def _settled(own: str | None, source: str | None) -> str | None:
 
 def _is_record(argument: str) -> bool:
     """Tell a record from a frame's name."""
-    return argument == "-" or is_inline(argument)
+    return argument == "-" or is_inline(argument) or "\n" in argument
+
+
+def _begins_number(argument: str) -> bool:
+    """Tell what is meant for one number of a point."""
+    return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
 def _sources(arguments: Sequence[str], kind: str | None) -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
     pending: list[str] = []
     for argument in (*arguments, ""):
-        if argument and not _is_record(argument):
+        if argument and not (_is_record(argument) or (not _begins_number(argument) and is_pasted(argument))):
             pending.append(argument)
             continue
         for x, y, z in _threes(pending, kind):

@@ -16,8 +16,8 @@ from frametool.errors import ValueInvalid, shown
 from frametool.formats.load import lines_of
 from frametool.lint.findings import github_command
 from frametool.lint.tree_diff import Tolerance, diff, entry
-from frametool.text.units import LENGTHS
 from frametool.text.numbers import parse_number, read_number_or_angle
+from frametool.text.units import LENGTHS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
