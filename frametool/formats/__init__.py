@@ -42,6 +42,17 @@ _SRDF = (
     "(?:disable|enable|disable_default)_collisions"
 )
 
+_AT_HEAD = r"(?=(?s:.{0,2000}?)"
+_LENGTH = r"""(?<!\w)%s(?:[_ ]?[({\[]*[ijkn](?: ?- ?1)?[)}\]]*)?["']?\s*(?:[,;:\t ]|[\[(_](?:m|mm|cm)\b|$)"""
+_DH = (
+    rf"(?im)\A(?!\s*<){_AT_HEAD}(?<![^\W_])(?:alpha|\u03b1|twist))"
+    rf"{_AT_HEAD}(?:{_LENGTH % '[ar]'}|link_length)){_AT_HEAD}(?:{_LENGTH % 'd'}|link_offset))"
+)
+_KITTI = (
+    r"\A(?:#[^\n]*\n)*(?:calib_time: *\d|"
+    r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
+)
+
 FORMATS = {
     "yaml": Format(
         "YAML: trees, poses, documents parted by ---",
@@ -130,9 +141,7 @@ FORMATS = {
         writes=("poses", "points", "tree"),
         writer="frametool.ros.echo_format",
     ),
-    "foxglove": Format(
-        "FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"
-    ),
+    "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
     "static1": Format(
         "static_transform_publisher of ROS 1", writes=("poses", "tree"), writer="frametool.ros.publisher"
     ),
@@ -183,6 +192,21 @@ FORMATS = {
         states="T_BS is body<-sensor, metres",
         asks=("frames",),
     ),
+    "kitti-calib": Format(
+        "KITTI calibration",
+        reads=("tree",),
+        reader="frametool.formats.kitti_calib",
+        signs=(("text", _KITTI),),
+        states="parent<-child, metres, optical axes of cameras",
+        asks=("frames",),
+    ),
+    "drake": Format(
+        "Drake model directives",
+        reads=("tree",),
+        reader="frametool.formats.drake",
+        signs=(("yaml key", "directives"),),
+        states="parent<-frame, metres, degrees, rpy about fixed axes",
+    ),
     "handeye": Format(
         "hand-eye calibration of easy_handeye",
         reads=("tree",),
@@ -191,6 +215,22 @@ FORMATS = {
         writer="frametool.formats.handeye",
         signs=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
         states="effector (base if not on the hand)<-tracking base, metres, x y z w",
+    ),
+    "nuscenes": Format(
+        "nuScenes table",
+        reads=("tree",),
+        reader="frametool.formats.nuscenes",
+        signs=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
+        states="ego<-sensor, global<-ego, metres, w first, microseconds",
+        asks=("frames",),
+    ),
+    "dh": Format(
+        "Denavit-Hartenberg table",
+        reads=("tree",),
+        reader="frametool.formats.dh",
+        signs=(("text", _DH),),
+        states="parent<-child, metres, radians unless their names say deg",
+        asks=("dh", "frames"),
     ),
     "launch": Format(
         "launch file",

@@ -93,13 +93,30 @@ class Recording(InputFile):
         """
         try:
             options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
-            yield from import_module(FORMATS[self.form].reader).read(self, options)
+            found = import_module(FORMATS[self.form].reader).read(self, options)
+            yield from self._scoped(found) if self.scopes else found
         finally:
             self.close()
         if missing := self.topics.missing():
             report(FormatError(missing, source=self.name))
         for told in self.tally.told() if tell else ():
             warn(f"{self.name}:{told.line}: {told.message}")
+
+    def _scoped(self, edges: Iterable[Edge]) -> Iterator[Edge]:
+        """Yield the edges under each of the scopes that another file gives them."""
+        for edge in edges:
+            for scope in self.scopes:
+                child, parent = (
+                    name and _in_scope(name, scope, has_own=self.form == "sdf") for name in (edge.child, edge.parent)
+                )
+                yield edge._replace(child=child or "", parent=parent)
+
+
+def _in_scope(name: str, scope: str, *, has_own: bool) -> str:
+    """Return a name in a scope, which takes the place of its own; the world is one for all."""
+    if name == "world":
+        return name
+    return f"{scope}::{(name.partition('::')[2] or '__model__') if has_own else name}"
 
 
 def opened_together(files: Iterable[Recording]) -> list[Recording]:
@@ -110,6 +127,8 @@ def opened_together(files: Iterable[Recording]) -> list[Recording]:
     except BaseException:
         close_all(found)
         raise
+    for file in found:
+        file.beside = found
     return found
 
 

@@ -103,11 +103,7 @@ class Tally:
         if note.rule == "rounded":
             self.rough.append(line)
         else:
-            self.remark(line, note.message, note.rule)
-
-    def remark(self, line: int, message: str, rule: str = "odd") -> None:
-        """Keep a sentence about one place."""
-        self.notes.setdefault(message, Remark(line, message, rule))
+            self.notes.setdefault(note.message, Remark(line, note.message, note.rule))
 
     def note_each(self, message: str, line: int, rule: str = "odd") -> None:
         """Keep a sentence about one line, also where it was said of other lines."""
