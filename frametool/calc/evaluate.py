@@ -157,8 +157,9 @@ class _Walk:
     def _number(self, branch: Branch) -> Term:
         text, unit = branch.value
         if unit and unit not in UNITS:
-            hint = f"; write {text} * {unit}" if unit in ("pi", *self.scope.names) else did_you_mean(unit, UNITS)
-            raise CalcError(f"unknown unit {shown(unit)}{hint or ';'} units: {' '.join(UNITS)}".replace("'; w", "; w"))
+            if unit in ("pi", *self.scope.names):
+                raise CalcError(f"{shown(unit)} is no unit; write {text} * {unit}")
+            raise CalcError(f"unknown unit {shown(unit)}{did_you_mean(unit, UNITS) or ';'} units: {' '.join(UNITS)}")
         value = float(text)
         if value == float("inf"):
             raise CalcError(f"{shown(text)} is not finite")
