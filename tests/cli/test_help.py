@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,7 +56,7 @@ def test_every_representation_convention_and_exit_code_is_explained() -> None:
     assert all(f" {name}" in topic("rotations") for name in REPRESENTATIONS)
     assert all(f"  {name} " in topic("axes") for name in AXES)
     codes = [code.split()[0] for code in EXIT_CODES.removeprefix("Exit codes: ").split(", ")]
-    assert all(f"\n  {code} " in topic("errors") for code in codes)
+    assert all(f"\n  {code} " in topic("errors") for code in (*codes, "130"))
 
 
 def test_help_lists_subjects_and_commands(run: Callable[..., Any]) -> None:
@@ -63,6 +64,13 @@ def test_help_lists_subjects_and_commands(run: Callable[..., Any]) -> None:
     assert all(f"  {name} " in done.out and about in done.out for name, about in TOPICS.items())
     assert all(name in done.out for name in COMMANDS)
     assert run("help", "axes").out == topic("axes")
+
+
+def test_the_version_can_tell_what_it_runs_on(run: Callable[..., Any]) -> None:
+    for order in (("--version", "-v"), ("-v", "--version")):
+        lines = run(*order).out.splitlines()
+        assert lines[0] == run("--version").out.strip()
+        assert [line.split()[0] for line in lines] == ["frametool", "Python", "numpy", "click", "rich", "pyyaml", "rosbags", "matplotlib"]
 
 
 def test_help_of_a_command_is_its_own(run: Callable[..., Any]) -> None:
@@ -73,3 +81,10 @@ def test_a_word_that_is_no_subject_names_the_nearest(run: Callable[..., Any]) ->
     done = run("help", "rotation")
     assert done.status == 2
     assert "no topic 'rotation'; did you mean 'rotations'?" in done.err
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_has_at_most_sixty_lines_and_no_group_that_is_empty(name: str, run: Callable[..., Any]) -> None:
+    lines = run(name, "--help").out.splitlines()
+    assert len(lines) <= (66 if name == "check" else 60)  # `check` lists its rules too
+    assert not [line for line, after in pairwise(lines) if line.endswith("):") and not after.startswith("  ")]

@@ -41,14 +41,15 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     if "-" not in given:
         if stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")
-        products = [reduce(product, each) for each in combinations(factors, degrees=deg, normalize=normalize)]
+        each_product = combinations(factors, stream.given, degrees=deg, normalize=normalize)
+        products = [reduce(product, each) for each in each_product]
         output.poses(Result(each) for each in products)
         return 0
     if given.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
     at = given.index("-")
     left, right = (
-        [each.of(one_pose(each.argument, degrees=deg, normalize=normalize)) for each in side]
+        [each.of(one_pose(each.argument, stream.given, degrees=deg, normalize=normalize)) for each in side]
         for side in (factors[:at], factors[at + 1 :])
     )
     rows = factors[at]
