@@ -93,6 +93,7 @@ def pointed(error: FrametoolError, text: str) -> FrametoolError:
 
         ((row, column),) = places_of(f"{text}.", [at]) if at < len(text) else [_end_of(text)]
         shown_line = pointer(line_of(text, row), column)
+        error.fields = {**error.fields, "column": column}
         error.snippet = "\n".join(f"  {each}" for each in shown_line.split("\n"))  # type: ignore[attr-defined]
     return error
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import yaml
 from scipy.linalg import expm
-from scipy.spatial.transform import Rotation as R
-from scipy.spatial.transform import Slerp
+from scipy.spatial.transform import Rotation, Slerp
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -20,11 +19,11 @@ def pose(xyz: Any = (0, 0, 0), **rotation: Any) -> Any:
     matrix[:3, 3] = xyz
     ((name, value),) = rotation.items() or [("rpy_deg", (0, 0, 0))]
     turn = {
-        "rpy_deg": lambda: R.from_euler("xyz", value, degrees=True),
-        "rpy": lambda: R.from_euler("xyz", value),
-        "quaternion": lambda: R.from_quat(value),
-        "rotvec": lambda: R.from_rotvec(value),
-        "rzyx_deg": lambda: R.from_euler("ZYX", value, degrees=True),
+        "rpy_deg": lambda: Rotation.from_euler("xyz", value, degrees=True),
+        "rpy": lambda: Rotation.from_euler("xyz", value),
+        "quaternion": lambda: Rotation.from_quat(value),
+        "rotvec": lambda: Rotation.from_rotvec(value),
+        "rzyx_deg": lambda: Rotation.from_euler("ZYX", value, degrees=True),
     }[name]()
     matrix[:3, :3] = turn.as_matrix()
     return matrix
@@ -98,12 +97,12 @@ def interpolated(a: Any, b: Any, fraction: float) -> Any:
     """Give the straight line and the slerp."""
     result = np.eye(4)
     result[:3, 3] = a[:3, 3] + fraction * (b[:3, 3] - a[:3, 3])
-    both = R.from_matrix([a[:3, :3], b[:3, :3]])
+    both = Rotation.from_matrix([a[:3, :3], b[:3, :3]])
     if 0 <= fraction <= 1:
         result[:3, :3] = Slerp([0, 1], both)([fraction]).as_matrix()[0]
     else:
         step = (both[0].inv() * both[1]).as_rotvec()
-        result[:3, :3] = (both[0] * R.from_rotvec(fraction * step)).as_matrix()
+        result[:3, :3] = (both[0] * Rotation.from_rotvec(fraction * step)).as_matrix()
     return result
 
 
@@ -120,7 +119,7 @@ def exponential(twist: Any) -> Any:
 
 def logarithm(matrix: Any) -> Any:
     """Give the twist: the rotation vector by SciPy, the linear part by solving with the exponential's left Jacobian."""
-    w = R.from_matrix(matrix[:3, :3]).as_rotvec()
+    w = Rotation.from_matrix(matrix[:3, :3]).as_rotvec()
     cross = twist_matrix([0, 0, 0, *w])[:3, :3]
     # t = J v with J the integral of exp(s [w]) over s: the upper right block of one larger exponential
     whole = np.zeros((6, 6))
@@ -130,12 +129,12 @@ def logarithm(matrix: Any) -> Any:
 
 def angle(matrix: Any) -> float:
     """Give the angle of a rotation."""
-    return float(R.from_matrix(matrix[:3, :3]).magnitude())
+    return float(Rotation.from_matrix(matrix[:3, :3]).magnitude())
 
 
 def mean(*poses: Any) -> Any:
     """Give the mean of translations and SciPy's of rotations."""
     result = np.eye(4)
     result[:3, 3] = np.mean([each[:3, 3] for each in poses], axis=0)
-    result[:3, :3] = R.from_matrix([each[:3, :3] for each in poses]).mean().as_matrix()
+    result[:3, :3] = Rotation.from_matrix([each[:3, :3] for each in poses]).mean().as_matrix()
     return result

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import independent as by
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation as R
+from scipy.spatial.transform import Rotation
 
 import frametool
 from frametool.calc.evaluate import Scope, evaluate
@@ -64,7 +64,7 @@ WORTH: list[tuple[str, Any, str]] = [
     ("log({xyz: [1, 2, 3], rpy_deg: [10, 20, 30]})", by.logarithm(by.pose([1, 2, 3], rpy_deg=[10, 20, 30])), "a twist"),
     ("exp([0.1, 0, 0, 0, 0, pi/2])", by.exponential([0.1, 0, 0, 0, 0, PI / 2]), "the pose ?<-?"),
     ("exp(log(map<-tool)) as map<-tool", look("map", "tool"), "the pose map<-tool"),
-    ("rpy(rot(map<-lidar))", R.from_matrix(look("map", "lidar")[:3, :3]).as_euler("xyz"), "angles in 'map'"),
+    ("rpy(rot(map<-lidar))", Rotation.from_matrix(look("map", "lidar")[:3, :3]).as_euler("xyz"), "angles in 'map'"),
     ("mean({rpy_deg: [0, 0, 10]}, {rpy_deg: [0, 0, 30]}, {xyz: [3, 0, 0], rpy_deg: [0, 0, 20]})",
      by.pose([1, 0, 0], rpy_deg=[0, 0, 20]), "the pose ?<-?"),
     ("2 * (atan(1) - 30deg)", PI / 6, "a number in rad"),
@@ -279,9 +279,11 @@ def test_what_does_not_fit_is_refused_with_its_place_and_what_to_write(sentence:
 ])  # fmt: skip
 def test_a_mistake_names_what_was_meant(text: str, hint: str) -> None:
     here = scope()
+    *lines, wrong = text.split(";")
+    for line in lines:
+        evaluate(line, here)
     with pytest.raises(FrametoolError) as caught:
-        for line in text.split(";"):
-            evaluate(line, here)
+        evaluate(wrong, here)
     assert hint.replace("ROBOT", str(by.EXAMPLES / "robot.yaml")) in str(caught.value)
 
 

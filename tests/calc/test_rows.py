@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import independent as by
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation as R
+from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 ROBOT, DRIVE = str(by.EXAMPLES / "robot.yaml"), str(by.EXAMPLES / "drive.yaml")
 COUNT = 300
 SEEDED = np.random.default_rng(5)
-XYZ, TURNS, K = SEEDED.normal(size=(COUNT, 3)) * 4, R.random(COUNT, rng=SEEDED), SEEDED.uniform(-1, 1, COUNT)
+XYZ, TURNS, K = SEEDED.normal(size=(COUNT, 3)) * 4, Rotation.random(COUNT, rng=SEEDED), SEEDED.uniform(-1, 1, COUNT)
 STAMPS = SEEDED.uniform(0, 3.9, COUNT).round(9)
 HEAD = "id,stamp,x,y,z,qx,qy,qz,qw,k"
 ROWS = [
@@ -39,7 +39,7 @@ def matrices(out: str) -> Any:
     """Give the poses of a table."""
     found = np.tile(np.eye(4), (len(out.splitlines()) - 1, 1, 1))
     found[:, :3, 3] = column(out, *"xyz")
-    found[:, :3, :3] = R.from_quat(column(out, "qx", "qy", "qz", "qw")).as_matrix()
+    found[:, :3, :3] = Rotation.from_quat(column(out, "qx", "qy", "qz", "qw")).as_matrix()
     return found
 
 
@@ -71,7 +71,7 @@ def test_named_results_stand_in_columns_of_their_own(run: Callable[..., Any]) ->
     assert np.abs(column(done.out, "d", "twice") - np.stack([far, 2 * far], axis=1)).max() < 1e-13
     assert np.abs(column(done.out, "p_x", "p_y", "p_z") - (XYZ @ X[:3, :3].T + X[:3, 3])).max() < 1e-13
     angles = column(done.out, "a_roll_deg", "a_pitch_deg", "a_yaw_deg")
-    assert np.abs(R.from_euler("xyz", angles, degrees=True).as_matrix() - POSES[:, :3, :3]).max() < 1e-12
+    assert np.abs(Rotation.from_euler("xyz", angles, degrees=True).as_matrix() - POSES[:, :3, :3]).max() < 1e-12
 
 
 def test_a_row_is_looked_up_at_its_own_time(run: Callable[..., Any]) -> None:

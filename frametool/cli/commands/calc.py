@@ -42,7 +42,7 @@ def _begins_with_minus(argument: str) -> bool:
     """Tell an expression with a sign from an option."""
     behind = argument[1:].lstrip("- ")
     name, bracket, _ = behind.partition("(")
-    return argument.startswith("-") and (behind[:1] in tuple("([{\"") or (bool(bracket) and name in FUNCTIONS))
+    return argument.startswith("-") and (behind[:1] in tuple('([{"') or (bool(bracket) and name in FUNCTIONS))
 
 
 @click.command(cls=CalcCommand, name="calc")
