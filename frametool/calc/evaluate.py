@@ -33,6 +33,7 @@ class Scope:
     """What an expression may name: values, trees, the tree of bare look-ups, the row of a stream.
 
     row: the type of a row; None outside of streams
+    seen: the frames of all that was evaluated
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Scope:
         self.names = {} if names is None else names
         self.literals = literals or Literals()
         self.row = row
+        self.seen: set[str | None] = {None}
 
     def with_row(self, row: Type) -> Scope:
         """Return the same scope for rows of a type, its names its own."""
@@ -144,6 +146,7 @@ class _Walk:
             if getattr(error, "at", None) is None:
                 error.at = branch.at  # type: ignore[attr-defined]
             raise
+        self.scope.seen.update((found.type.target, found.type.source))
         return found.written(self.text[branch.start : branch.end], atomic=branch.is_atom)
 
     def _value(self, branch: Branch) -> Term:

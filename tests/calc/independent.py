@@ -14,7 +14,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def pose(xyz: Any = (0, 0, 0), **rotation: Any) -> Any:
-    """Give the 4x4 matrix of a position and one rotation by name."""
+    """Return the 4x4 matrix of a position and one rotation by name."""
     matrix = np.eye(4)
     matrix[:3, 3] = xyz
     ((name, value),) = rotation.items() or [("rpy_deg", (0, 0, 0))]
@@ -30,7 +30,7 @@ def pose(xyz: Any = (0, 0, 0), **rotation: Any) -> Any:
 
 
 def robot() -> dict[tuple[str, str], Any]:
-    """Give the edges of robot.yaml, each as parent_from_child."""
+    """Return the edges of robot.yaml, each as parent_from_child."""
     edges: dict[tuple[str, str], Any] = {}
     for root, children in yaml.safe_load((EXAMPLES / "robot.yaml").read_text())["frames"].items():
         _walk(root, children, edges)
@@ -60,7 +60,7 @@ def _rotation(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def looked_up(edges: dict[tuple[str, str], Any], target: str, source: str) -> Any:
-    """Give target_from_source by way of the root."""
+    """Return target_from_source by way of the root."""
     parents = {child: (parent, matrix) for (parent, child), matrix in edges.items()}
 
     def to_root(frame: str) -> Any:
@@ -74,7 +74,7 @@ def looked_up(edges: dict[tuple[str, str], Any], target: str, source: str) -> An
 
 
 def drive_lidar(at: float) -> Any:
-    """Give map_from_lidar of drive.yaml at a time between two samples."""
+    """Return map_from_lidar of drive.yaml at a time between two samples."""
     entries = {entry["name"]: entry for entry in yaml.safe_load((EXAMPLES / "drive.yaml").read_text())["frames"]}
     samples = entries["base_link"]["samples"]
     lidar = entries["lidar"]
@@ -86,7 +86,7 @@ def drive_lidar(at: float) -> Any:
 
 
 def inverse(matrix: Any) -> Any:
-    """Give the inverse by transposition."""
+    """Return the inverse by transposition."""
     result = np.eye(4)
     result[:3, :3] = matrix[:3, :3].T
     result[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
@@ -94,7 +94,7 @@ def inverse(matrix: Any) -> Any:
 
 
 def interpolated(a: Any, b: Any, fraction: float) -> Any:
-    """Give the straight line and the slerp."""
+    """Return the straight line and the slerp."""
     result = np.eye(4)
     result[:3, 3] = a[:3, 3] + fraction * (b[:3, 3] - a[:3, 3])
     both = Rotation.from_matrix([a[:3, :3], b[:3, :3]])
@@ -107,18 +107,18 @@ def interpolated(a: Any, b: Any, fraction: float) -> Any:
 
 
 def twist_matrix(twist: Any) -> Any:
-    """Give the 4x4 generator of vx vy vz wx wy wz."""
+    """Return the 4x4 generator of vx vy vz wx wy wz."""
     v, w = twist[:3], twist[3:]
     return np.array([[0, -w[2], w[1], v[0]], [w[2], 0, -w[0], v[1]], [-w[1], w[0], 0, v[2]], [0, 0, 0, 0]])
 
 
 def exponential(twist: Any) -> Any:
-    """Give the matrix exponential."""
+    """Return the matrix exponential."""
     return expm(twist_matrix(np.asarray(twist, float)))
 
 
 def logarithm(matrix: Any) -> Any:
-    """Give the twist: the rotation vector by SciPy, the linear part by solving with the exponential's left Jacobian."""
+    """Return the twist: the rotation vector by SciPy, the linear part by solving with the exponential's left Jacobian."""
     w = Rotation.from_matrix(matrix[:3, :3]).as_rotvec()
     cross = twist_matrix([0, 0, 0, *w])[:3, :3]
     # t = J v with J the integral of exp(s [w]) over s: the upper right block of one larger exponential
@@ -128,12 +128,12 @@ def logarithm(matrix: Any) -> Any:
 
 
 def angle(matrix: Any) -> float:
-    """Give the angle of a rotation."""
+    """Return the angle of a rotation."""
     return float(Rotation.from_matrix(matrix[:3, :3]).magnitude())
 
 
 def mean(*poses: Any) -> Any:
-    """Give the mean of translations and SciPy's of rotations."""
+    """Return the mean of translations and SciPy's of rotations."""
     result = np.eye(4)
     result[:3, 3] = np.mean([each[:3, 3] for each in poses], axis=0)
     result[:3, :3] = Rotation.from_matrix([each[:3, :3] for each in poses]).mean().as_matrix()

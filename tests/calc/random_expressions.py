@@ -231,7 +231,7 @@ class World:
 
 
 def one(a: str | None, b: str | None) -> str | None:
-    """Give the one frame of two."""
+    """Return the one frame of two."""
     if a is not None and b is not None and a != b:
         raise Mismatch
     return b if a is None else a
@@ -269,7 +269,7 @@ PROPOSED = [
 
 
 def suggestions(message: str) -> list[tuple[str, str]]:
-    """Give the expressions that a message proposes, each with the frames it says they have, if it does."""
+    """Return the expressions that a message proposes, each with the frames it says they have, if it does."""
     _, found, tail = message.partition("frames that touch: ")
     products = re.findall(r"(?:^|, or )(.*?)  \(= (.*?)\)", tail) if found else []
     return products + [(match[1], "") for pattern in PROPOSED if (match := re.search(pattern, message))]

@@ -44,7 +44,7 @@ class Talk:
         self.read()
 
     def read(self) -> str:
-        """Give what is written up to the next prompt, or the end; the order of events decides, not the time."""
+        """Return what is written up to the next prompt, or the end; the order of events decides, not the time."""
         text = ""
         while not text.endswith(PROMPT):
             if not select.select([self.terminal], [], [], 60)[0]:

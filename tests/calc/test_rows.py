@@ -30,13 +30,13 @@ LITERAL = "{xyz: [1, 2, 3], rpy_deg: [10, 20, 30]}"
 
 
 def column(out: str, *names: str) -> Any:
-    """Give some columns of a table."""
+    """Return some columns of a table."""
     head, *rows = (line.split(",") for line in out.splitlines())
     return np.array([[float(row[head.index(name)]) for name in names] for row in rows])
 
 
 def matrices(out: str) -> Any:
-    """Give the poses of a table."""
+    """Return the poses of a table."""
     found = np.tile(np.eye(4), (len(out.splitlines()) - 1, 1, 1))
     found[:, :3, 3] = column(out, *"xyz")
     found[:, :3, :3] = Rotation.from_quat(column(out, "qx", "qy", "qz", "qw")).as_matrix()
