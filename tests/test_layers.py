@@ -13,7 +13,7 @@ import frametool
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
-    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "sim", "view", "cli",
+    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "calc", "sim", "view", "cli",
 ]  # fmt: skip
 HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}
 MODULES = sorted(path for path in ROOT.rglob("*.py") if path.parent != ROOT or path.stem == "errors")

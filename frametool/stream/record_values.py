@@ -130,11 +130,11 @@ def _edge(record: Record, request: Request, source: Source) -> Rigid | None:
     """Find the pose that moves a record, at the time its header says where that matters."""
     timed = request.timed
     if timed is not None and record.stamp and timed.moves(record.parent.text):
-        return timed.pose(record.parent.text, _stamp_ns(record, source))
+        return timed.pose(record.parent.text, stamp_of(record, source))
     return None if request.way is None else request.way(record.parent.text)
 
 
-def _stamp_ns(record: Record, source: Source) -> int:
+def stamp_of(record: Record, source: Source) -> int:
     """Return the stamp of a record's header."""
     values = {document.index: document.value for document in parse_documents(source.text, source.name)}
     seconds, below = (int(value_at(values, path)) for path in record.stamp)
