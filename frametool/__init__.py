@@ -13,6 +13,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from frametool.calc.explain.api import explain as explain
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.formats.load import load as load
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.sim.controllers import FollowController as FollowController
+    from frametool.sim.followed import follow_steps as follow_steps
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
     from frametool.sim.sweep import simulate_many as simulate_many
@@ -37,6 +39,8 @@ _HOMES = {
     "TransformBuffer": "frametool.frames.buffer",
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
+    "explain": "frametool.calc.explain.api",
+    "follow_steps": "frametool.sim.followed",
     "load": "frametool.formats.load",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
@@ -52,6 +56,8 @@ __all__ = [
     "Turtle",
     "Twist",
     "__version__",
+    "explain",
+    "follow_steps",
     "load",
     "simulate",
     "simulate_many",

@@ -36,14 +36,28 @@ class Command(WithHelp):
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Shield negative numbers, then parse."""
-        return super().parse_args(ctx, [f" {each}" if NEGATIVE.match(each) else each for each in args])
+        """Shield negative numbers, give a bare --explain its form, then parse."""
+        shielded = [f" {each}" if NEGATIVE.match(each) else each for each in args]
+        return super().parse_args(ctx, _with_form(shielded) if "--explain" in shielded else shielded)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """End every help with the exit codes."""
         super().format_epilog(ctx, formatter)
         formatter.write_paragraph()
         formatter.write_text(EXIT_CODES)
+
+
+def _with_form(args: list[str]) -> list[str]:
+    """Join --explain with the form behind it, or with `text`: click would take any argument there for its value."""
+    joined: list[str] = []
+    for each in args:
+        if joined and joined[-1] == "--explain":
+            is_form = each in ("text", "markdown", "latex")
+            joined[-1] = f"--explain={each if is_form else 'text'}"
+            if is_form:
+                continue
+        joined.append(each)
+    return [f"{each}=text" if each == "--explain" else each for each in joined]
 
 
 class Text(click.ParamType[str]):

@@ -11,7 +11,7 @@ from frametool.documents.source import Source, read_text
 from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
-from frametool.grammar.rotation import read_spelled, rotation_of
+from frametool.grammar.rotation import read_spelled, rotation_of, spelled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -93,11 +93,11 @@ def combinations(arguments: Sequence[str | Source], *, degrees: bool, normalize:
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 
 
-def one_pose(argument: str, *, degrees: bool, normalize: bool) -> Pose:
+def one_pose(argument: str | Source, *, degrees: bool, normalize: bool) -> Pose:
     """Read the one pose of an argument."""
     poses = poses_from(argument, degrees=degrees, normalize=normalize)
     if len(poses) != 1:
-        raise click.UsageError(f"one pose is wanted here, {argument} holds {len(poses)}")
+        raise click.UsageError(f"one pose is wanted here, {argument if isinstance(argument, str) else argument.name} holds {len(poses)}")
     return poses[0]
 
 
@@ -130,6 +130,21 @@ def pose_from_numbers(
     for note in reading.notes:
         warn(note.message)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
+
+
+def source_from_numbers(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Source:
+    """Write bare numbers, read by `pose_from_numbers` before, as the mapping that says the same."""
+    from frametool.documents.json_writer import Verbatim, dump
+
+    form = _form_of(texts, given)
+    size = len(form.representation.columns)
+    whole = form.representation.whole
+    own = texts if whole and len(texts) == len(whole.columns) else texts[-size:]
+    unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
+    # the texts stand in the places of numbers, and are read as such
+    mapping = {"xyz": list(map(Verbatim, texts[: len(texts) - len(own)]))} if len(texts) > len(own) else {}
+    mapping[form.representation.name + unit] = spelled(form, list(map(Verbatim, own)))  # type: ignore[arg-type]
+    return Source(INLINE, dump(mapping))
 
 
 def _form_of(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Notation:

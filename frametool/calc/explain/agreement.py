@@ -144,5 +144,7 @@ def _rotation_rows(own: Result, form: Notation, style: Style) -> list[Row]:
     unit = (DEGREES if style.in_degrees(form) else RADIANS) if angles else ""
     if len(angles) == len(numbers):
         return [row(label, form.names, numbers, unit)]
-    rows = [row(label, form.names, numbers)]
-    return [rows[0]._replace(unit=f"(angle in {unit})")] if unit else rows
+    if not angles:
+        return [row(label, form.names, numbers)]
+    size = angles[0]  # the axis comes first, then the angle
+    return [row(label, form.names[:size], numbers[:size]), row("", form.names[size:], numbers[size:], unit)]

@@ -42,7 +42,8 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
     sheet.say(" <- ".join(map(printable, frames.path(target, source, at_ns))))
     first, second = _names(frames, down, at_ns), _names(frames, [*reversed(up)], at_ns)
     sheet.say(_sentence(first, second))
-    sheet.say(f"{to}_from_{of} = {_formula(first, second)}")
+    if len(tracks) > 1 or first:
+        sheet.say(f"{to}_from_{of} = {_formula(first, second)}")
     sheet.caveat(STORED)
     moving = [track for track in tracks.values() if track is not None and not track.standing]
     if moving and at_ns is not None:

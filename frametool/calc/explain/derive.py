@@ -182,8 +182,10 @@ def derive_lookup(
         if fixed is None:
             pose = chain(sheet, frames, target, source, at_ns)
         else:
-            first = chain(sheet, frames, target, fixed, at_ns)
-            second = chain(sheet, frames, fixed, source, source_at_ns)
+            with sheet.about("where the target was"):
+                first = chain(sheet, frames, target, fixed, at_ns)
+            with sheet.about("where the source was"):
+                second = chain(sheet, frames, fixed, source, source_at_ns)
             pose = joined_across(sheet, first, second, (printable(target), printable(fixed), printable(source)))
         end_with_pose(sheet, pose, own, plan)
 

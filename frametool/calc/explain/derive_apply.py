@@ -42,9 +42,11 @@ class ByTree(NamedTuple):
 
     def names(self, own: str | None) -> tuple[str, str]:
         """Return target and source for a record given in a frame."""
-        if own and self.source is not None and own != self.source:
-            raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(self.source)}")
+        if own and own.startswith("/") and own not in self.frames.frames:
+            own = own[1:]
         source = own or self.source
+        if self.source is not None and source != self.source:
+            raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(self.source)}")
         if source is None:
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
         return self.target, source

@@ -126,9 +126,9 @@ class Sheet:
     @contextmanager
     def about(self, what: str) -> Iterator[None]:
         """Name in the headings of a block what they are about."""
-        self._about = what
+        outer, self._about = self._about, f"{self._about}: {what}" if self._about else what
         yield
-        self._about = ""
+        self._about = outer
 
     def reached(self, position: Sequence[float]) -> None:
         """Remember how large positions are."""
