@@ -89,8 +89,8 @@ def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: 
     """
     degrees = plan.style.in_degrees(form)
     target = quaternion.unit(*own.pose.components[3:], floats)
-    found = quaternion.normalized(*form.to_quaternion(tuple(numbers), floats, degrees=degrees), floats)
-    off = quaternion.distance(*found, *target, floats)
+    found = form.to_quaternion(tuple(numbers), floats, degrees=degrees)
+    off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
     if not off <= CLOSE:
         raise DerivationWrong(f"the derivation is off by {off:.3g} rad from the result in {form.spec}; please report it")
     final = form.from_quaternion(*target, floats, degrees=degrees, keep_sign=plan.style.keep_sign)

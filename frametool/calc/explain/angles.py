@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from frametool.calc.explain.sheet import DEGREES, RADIANS
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from frametool.calc.explain.sheet import Sheet, Values
 
 TINY, HUGE = 1e-140, 1e140  # beyond, squares leave the range of a double
+TWO_TURNS = 720.0  # degrees: the half angle inside has turned once
 UNIT = 8.9e-16  # 4 eps: a length this near 1 is 1
 ROOTS = ("sqrt(0)/2", "sqrt(2)/2", "sqrt(4)/2", "sqrt(2)/2", "sqrt(0)/2", "-sqrt(2)/2", "-sqrt(4)/2", "-sqrt(2)/2")
 EXACT = "Multiples of 90 deg are exact: no rounded pi comes into their sines and cosines."
@@ -21,7 +23,9 @@ HALF = "Half the angle stands inside: a quaternion acts twice (q v q*), so w = c
 def angle(sheet: Sheet, values: Values, name: str, given: float, *, degrees: bool) -> None:
     """Take an angle as it is given; one in degrees becomes radians."""
     if degrees:
-        values[f"{name}_deg"] = given
+        values[f"{name}_deg"] = rest = math.fmod(given, TWO_TURNS)
+        if rest != given:
+            sheet.say(f"{name}: {given!r} deg less whole double turns of 720 deg is {rest!r} deg, exactly.")
         sheet.step(values, name, f"{name}_deg*pi/180", RADIANS)
     else:
         values[name] = given
@@ -50,7 +54,7 @@ def direction(
     else:
         sheet.say("Squares of these numbers leave the range of a double; they are divided by the largest first.")
         sheet.step(values, "m", f"max({', '.join(f'abs({name})' for name in given)})", measure)
-        divided, by = [f"k{name[-1]}" for name in given], "k"
+        divided, by = [f"k{letter}" for letter in "xyzw"[: len(given)]], "k"
         for scaled, name in zip(divided, given, strict=True):
             sheet.step(values, scaled, f"{name}/m")
         sheet.step(values, by, norm(divided))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from frametool.calc.explain.agreement import Plan
@@ -50,13 +52,13 @@ def explain(
         raise ValueInvalid(f"precision counts significant digits, 1 or more; found {precision}")
     chosen = tuple(form for spec in to.split(",") for form in notations(spec.strip()))
     plan = Plan(Style("text", chosen, degrees=degrees, keep_sign=keep_sign), precision, full)
-    if operation in POSES:
-        operands = (*(given_pose(each, degrees=degrees) for each in operands[: POSES[operation]]),
-                    *operands[POSES[operation] :])  # fmt: skip
     try:
-        return OPERATIONS[operation](plan, *operands, **options)
+        signature(OPERATIONS[operation]).bind(plan, *operands, **options)
     except TypeError as error:
         raise ValueInvalid(f"explain {operation}: {error}") from None
+    poses = POSES.get(operation, 0)
+    given = [given_pose(each, degrees=degrees) for each in operands[:poses]]
+    return OPERATIONS[operation](plan, *given, *operands[poses:], **options)
 
 
 def _convert(plan: Plan, pose: Any) -> Explanation:
@@ -101,7 +103,7 @@ def _follow(plan: Plan, steps: Any) -> Explanation:
     return derive_follow([steps] if isinstance(steps, FollowStep) else list(steps), plan)
 
 
-POSES: dict[str, int | None] = {"convert": None, "compose": None, "invert": None, "relative": None, "interpolate": 2}
+POSES = {"convert": 1, "compose": sys.maxsize, "invert": 1, "relative": 2, "interpolate": 2}  # operands that are poses
 OPERATIONS: dict[str, Callable[..., Explanation]] = {
     "convert": _convert,
     "compose": _compose,

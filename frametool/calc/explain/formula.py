@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     Leaf = Callable[[str], str]
 
 NOISE = 2e-15  # of the largest term: what the rounding of a few terms leaves where they cancel
+FAR = 16.0  # radians: a larger angle is as it was given, no multiple of a rounded pi
 SUM, PRODUCT, SIGN, POWER = 1, 2, 3, 4  # how tightly an operator binds
 BINDS = {ast.Add: SUM, ast.Sub: SUM, ast.Mult: PRODUCT, ast.Div: PRODUCT, ast.Pow: POWER}
 TEXT = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: "·", ast.Div: "/", ast.Pow: "^"}
@@ -82,6 +83,8 @@ def _called(name: str, arguments: list[Value]) -> Value:
     """Call a function; the size follows from its derivative."""
     number = float(FUNCTIONS[name](*(each.number for each in arguments)))
     x, size = arguments[0]
+    if name in ("sin", "cos"):
+        size = min(size, FAR)
     if name == "cos":
         return Value(number, max(abs(number), abs(math.sin(x)) * size))
     if name == "sqrt":
@@ -90,6 +93,8 @@ def _called(name: str, arguments: list[Value]) -> Value:
         other, other_size = arguments[1]
         squared = x * x + other * other
         return Value(number, max(abs(number), (abs(other) * size + abs(x) * other_size) / squared if squared else 0.0))
+    if name == "sin":
+        return Value(number, max(abs(number), abs(math.cos(x)) * size))
     return Value(number, max(abs(number), *(each.size for each in arguments)))
 
 

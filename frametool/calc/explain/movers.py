@@ -90,7 +90,7 @@ def pose_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequ
 def twist_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
     """Turn the 6x6 covariance C into A C A^T."""
     sheet.heading("The covariance of the twist: A C A^T")
-    sheet.say("A is what the move does to the six numbers: rows R | [t]x R, and 0 | R.")
+    sheet.say("A is what the move does to the six numbers: rows R | t x R, and 0 | R.")
     turn = of_quaternion(sheet, pose[3:])
     tx, ty, tz = pose[:3]
     arm = sheet.product([[0.0, -tz, ty], [tz, 0.0, -tx], [-ty, tx, 0.0]], turn)

@@ -85,7 +85,7 @@ def axis_angle_to_matrix(
     """Apply Rodrigues' formula."""
     values = dict(zip(("ax", "ay", "az"), numbers, strict=False))
     sheet.heading("Axis and angle to matrix (Rodrigues)")
-    sheet.say("R = c 1 + k v v^T + s [v]x, v a unit axis, k = 1 - c.")
+    sheet.say("R = c 1 + k v v^T + s (v x ..), v a unit axis, k = 1 - c.")
     unit_axis(sheet, values)
     angle(sheet, values, "angle", numbers[3], degrees=degrees)
     sine_and_cosine(sheet, values, "angle", "s", "c", half=False)

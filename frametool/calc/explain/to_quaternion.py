@@ -209,7 +209,7 @@ def six_d(sheet: Sheet, numbers: Sequence[float], _axes: str, _degrees: bool) ->
     for name, a, b in (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y")):
         sheet.step(values, f"w{name}", f"u{a}*{second}{b} - u{b}*{second}{a}")
     columns = [[values[f"{letter}{name}"] for name in XYZ] for letter in ("u", second, "w")]
-    sheet.grid("R", "[u v w]", r"(u\ v\ w)", [[list(row) for row in zip(*columns, strict=True)]])
+    sheet.grid("R", "(u v w)", r"(u\ v\ w)", [[list(row) for row in zip(*columns, strict=True)]])
     sheet.heading("Matrix to quaternion")
     entries = [part for row in zip(*columns, strict=True) for part in row]
     return _shepperd(sheet, dict(zip(ENTRIES, entries, strict=True)))
