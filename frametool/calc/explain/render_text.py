@@ -115,8 +115,8 @@ def _grid(grid: Grid) -> list[str]:
     blocks = [[part] if isinstance(part, str) else _block(part) for part in grid.parts]
     for block, after in zip(blocks, [*blocks[1:], [""]], strict=True):
         size = len(block[0]) + 1
-        needed = size + (len(after[0]) + 1) * (block[0] in ("=", "+", ")"))
-        if used + needed > WIDTH and groups[-1]:
+        needed = size + (len(after[0]) + 1) * (len(block) == 1)  # a sign stays with what it is before
+        if used + needed > WIDTH and any(len(each) > 1 for each in groups[-1]):
             groups.append([])
             used = len(head)
         groups[-1].append(block)

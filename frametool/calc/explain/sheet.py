@@ -103,7 +103,10 @@ class Sheet:
         if self.digits is None:
             return repr(value)
         short = f"{value:.{self.digits}g}"
-        return short if float(short) == value else f"{value:#.{self.digits}g}".rstrip(".")
+        if float(short) == value:
+            return short
+        rounded = f"{value:#.{self.digits}g}"
+        return f"{value:.{self.digits - 1}e}" if rounded.endswith(".") else rounded
 
     def numbers(self, values: Sequence[float]) -> str:
         """Write numbers with blanks between them."""

@@ -113,7 +113,7 @@ def _parts(rows: list[str]) -> list[Any]:
     parts: list[Any] = []
     for match in re.finditer(r"\[[^\]]*\]|[^\[\]\s][^\[\]]*", middle):
         if match[0][0] != "[":
-            parts += [match[0].strip()]
+            parts += match[0].split()
             continue
         cells = [row[match.start() + 1 : match.end() - 1].split() for row in rows]
         parts.append([[float(cell) for cell in row] for row in cells])
