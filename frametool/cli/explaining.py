@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
     from frametool.documents.source import Source
-    from frametool.grammar.result import Style
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -97,7 +97,8 @@ def one_pose(argument: str | Source, *, degrees: bool, normalize: bool) -> Pose:
     """Read the one pose of an argument."""
     poses = poses_from(argument, degrees=degrees, normalize=normalize)
     if len(poses) != 1:
-        raise click.UsageError(f"one pose is wanted here, {argument if isinstance(argument, str) else argument.name} holds {len(poses)}")
+        name = argument if isinstance(argument, str) else argument.name
+        raise click.UsageError(f"one pose is wanted here, {name} holds {len(poses)}")
     return poses[0]
 
 

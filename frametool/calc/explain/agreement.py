@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 CLOSE = 1e-12  # radians; and of positions, relative to the largest of them or a metre
 TWO_NAMES = "Half a turn has two names: +180 and -180 deg are the same angle; the result shows the other one."
+REPORT = "this is a mistake in frametool, please report it"
 UNITS = {"distance": METRES, "angle": RADIANS, "angle_deg": DEGREES}
 
 
@@ -92,7 +93,7 @@ def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: 
     found = form.to_quaternion(tuple(numbers), floats, degrees=degrees)
     off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
     if not off <= CLOSE:
-        raise DerivationWrong(f"the derivation is off by {off:.3g} rad from the result in {form.spec}; please report it")
+        raise DerivationWrong(f"the derivation in {form.spec} is off by {off:.3g} rad from the result; {REPORT}")
     final = form.from_quaternion(*target, floats, degrees=degrees, keep_sign=plan.style.keep_sign)
     turn = 180.0 if degrees else math.pi
     if any(abs(numbers[at] - final[at]) > turn for at in form.representation.angles):
@@ -104,7 +105,7 @@ def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -
     sheet.reached(own)
     off = max(abs(a - b) for a, b in zip(derived, own, strict=True))
     if not off <= CLOSE * sheet.reach:
-        raise DerivationWrong(f"the derivation is off by {off:.3g} from the result; please report it")
+        raise DerivationWrong(f"the derivation is off by {off:.3g} from the result; {REPORT}")
 
 
 def end(sheet: Sheet, own: Result, plan: Plan) -> None:

@@ -14,7 +14,7 @@ from frametool.geometry import floats, rigid
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.calc.explain.sheet import Sheet
+    from frametool.calc.explain.sheet import Matrix, Sheet
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack, Track
     from frametool.geometry.types import Rigid
@@ -57,7 +57,9 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
     return _joined(sheet, [edges[each] for each in down], [edges[each] for each in reversed(up)], brief=brief)
 
 
-def joined_across(sheet: Sheet, target_from_fixed: Rigid, fixed_from_source: Rigid, frames: tuple[str, str, str]) -> Rigid:
+def joined_across(
+    sheet: Sheet, target_from_fixed: Rigid, fixed_from_source: Rigid, frames: tuple[str, str, str]
+) -> Rigid:
     """Join the two halves of a lookup across time."""
     sheet.say("The fixed frame counts as standing between the two times.")
     return compose(sheet, target_from_fixed, fixed_from_source, frames)
@@ -122,8 +124,10 @@ def _edge(sheet: Sheet, track: Track, at_ns: int, *, brief: bool) -> Edge:
         sheet.say(f"{parent}_from_{child}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}")
         return parent, child, before[2]
     if after[1] != before[1]:
-        sheet.say(f"{parent}_from_{child}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}: the "
-                  f"next, at {format_stamp(after[0])}, has another parent, {printable(after[1])}; until it this one holds.")  # fmt: skip
+        sheet.say(
+            f"{parent}_from_{child}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}. The next, at "
+            f"{format_stamp(after[0])}, has another parent, {printable(after[1])}: until then this one holds."
+        )
         return parent, child, before[2]
     sheet.reached(after[2][:3])
     with sheet.about(f"{parent}_from_{child}"):
@@ -163,7 +167,8 @@ def _interpolated(sheet: Sheet, before: Sample, after: Sample, at_ns: int, *, br
         return between(sheet, a, b, f)
     found = rigid.interpolate(*a, *b, f, floats)
     x, y, z = (sheet.inner((1.0 - f, f), pair) for pair in zip(a[:3], b[:3], strict=True))
-    parts = [f"{sheet.number(1.0 - f)}·", upright(a[:3]), "+", f"{sheet.number(f)}·", upright(b[:3]), "=", upright((x, y, z))]
+    weights = f"{sheet.number(1.0 - f)}·", f"{sheet.number(f)}·"
+    parts: list[str | Matrix] = [weights[0], upright(a[:3]), "+", weights[1], upright(b[:3]), "=", upright((x, y, z))]
     sheet.grid("t", "(1 - f) ta + f tb", r"(1 - f)\,t_a + f\,t_b", parts, "m")
     sheet.slerped(a[3:], b[3:], f, found[3:])
     return x, y, z, *found[3:]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from frametool.calc.explain.agreement import (
     CLOSE,
+    REPORT,
     DerivationWrong,
     Plan,
     check_rotation,
@@ -23,7 +25,6 @@ from frametool.calc.explain.short_ways import SHORT
 from frametool.errors import printable
 from frametool.grammar import pose_algebra
 from frametool.grammar.looked_up import looked_up, looked_up_across
-from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
+    from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Quaternion
 
 
@@ -104,7 +106,7 @@ def derive_compose(given: Sequence[Given], plan: Plan) -> Explanation:
     poses = [each.pose for each in given]
     own = Result(reduce(pose_algebra.product, poses))
     names = frames_of(len(poses) + 1, poses)
-    labels = list(zip(names[:-1], names[1:], strict=True))
+    labels = list(itertools.pairwise(names))
 
     def write(sheet: Sheet) -> None:
         brief = len(given) > MOST_SHOWN and not sheet.every
@@ -148,7 +150,7 @@ def derive_relative(a: Given, b: Given, plan: Plan) -> Explanation:
         found = extent(sheet, pose, first)
         for name, value in zip(pose_algebra.RELATIVE_EXTRAS, found, strict=True):
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
-                raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; please report it")
+                raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")
         end_with_pose(sheet, pose, own, plan)
 
     return explained(f"{first}_from_{second}", write, plan)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.calc.explain.agreement import CLOSE, DerivationWrong, Plan, explained, row
+from frametool.calc.explain.agreement import CLOSE, REPORT, DerivationWrong, Plan, explained, row
 from frametool.calc.explain.chain import fraction
 from frametool.calc.explain.sheet import METRES, RADIANS
 from frametool.errors import printable
@@ -172,8 +172,10 @@ def _text(value: float) -> str:
 
 def _compare(step: FollowStep, distance: float, linear: float, angular: float) -> None:
     """Compare with what the follower did; raises DerivationWrong."""
-    pairs = ((distance, step.distance, 1.0), (linear, step.linear, step.gains[0]), (angular, step.angular, step.gains[1]))
-    for found, own, gain in pairs:
-        slack = CLOSE * (1.0 + step.distance + 1.0 / max(step.distance, 1e-6)) * max(1.0, abs(gain))
+    near = CLOSE * (1.0 + step.distance + 1.0 / max(step.distance, step.arrived))  # a bearing is the worse, the nearer
+    for found, own, gain in zip(
+        (distance, linear, angular), (step.distance, step.linear, step.angular), (1.0, *step.gains), strict=True
+    ):
+        slack = near * max(1.0, abs(gain))
         if not abs(found - own) <= slack:
-            raise DerivationWrong(f"the derivation of {step.follower} gives {found!r}, not {own!r}; please report it")
+            raise DerivationWrong(f"the derivation of {step.follower} gives {found!r}, not {own!r}; {REPORT}")

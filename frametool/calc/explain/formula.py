@@ -111,7 +111,7 @@ def as_text(node: ast.expr, leaf: Leaf, outer: int = 0, *, right: bool = False) 
     if isinstance(node, ast.Call):
         return f"{_name(node)}({', '.join(as_text(each, leaf) for each in node.args)})"
     if not isinstance(node, ast.BinOp):
-        raise ValueError(ast.dump(node))
+        raise TypeError(ast.dump(node))
     binds = BINDS[type(node.op)]
     first, second = as_text(node.left, leaf, binds), as_text(node.right, leaf, binds + 1, right=True)
     text = first + TEXT[type(node.op)] + second
@@ -133,7 +133,7 @@ def as_latex(node: ast.expr, leaf: Leaf, outer: int = 0, *, right: bool = False)
     if isinstance(node, ast.Call):
         return _latex_call(_name(node), [as_latex(each, leaf) for each in node.args])
     if not isinstance(node, ast.BinOp):
-        raise ValueError(ast.dump(node))
+        raise TypeError(ast.dump(node))
     if isinstance(node.op, ast.Div):
         text = rf"\frac{{{as_latex(node.left, leaf)}}}{{{as_latex(node.right, leaf)}}}"
         return rf"\left({text}\right)" if outer > PRODUCT + 1 else text

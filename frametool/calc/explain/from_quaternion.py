@@ -182,7 +182,6 @@ def axis_angle(
 
 def _axis(sheet: Sheet, values: Values) -> bool:
     """Add s, the angle and the unit axis; return whether there is one."""
-
     if not any(values[name] for name in XYZ):
         return False
     direction(sheet, values, XYZ, ("vx", "vy", "vz"), "s")

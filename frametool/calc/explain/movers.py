@@ -65,10 +65,9 @@ def _with_arm(
     a, b, c = names
     values = {f"{letter}{axis}": part for letter, vector in ((a, own), ("t", pose[:3]), (b, other))
               for axis, part in zip(XYZ, vector, strict=True)}  # fmt: skip
-    after = {"x": "yz", "y": "zx", "z": "xy"}
     return [
-        sheet.step(values, f"{c}{axis}", f"{a}{axis} + t{j}*{b}{k} - t{k}*{b}{j}", unit)
-        for axis, (j, k) in after.items()
+        sheet.step(values, f"{c}{i}", f"{a}{i} + t{j}*{b}{k} - t{k}*{b}{j}", unit)
+        for i, j, k in (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y"))
     ]
 
 

@@ -12,9 +12,11 @@ from frametool.calc.explain.to_quaternion import XYZ, XYZW
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.calc.explain.sheet import Sheet
+    from frametool.calc.explain.sheet import Matrix, Sheet
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Quaternion, Vector
+
+    Parts = list[str | Matrix]
 
 TOUCH = "Frames that touch cancel. The second position is first turned into the first frame, then the first is added."
 ORDER = (
@@ -62,7 +64,7 @@ def moved(
     """Move a point: turn it, then shift it."""
     matrix = of_quaternion(sheet, pose[3:])
     x, y, z = (sheet.inner(row, point, shift) for row, shift in zip(matrix, pose[:3], strict=True))
-    parts = [matrix, upright(point), "+", upright(pose[:3]), "=", upright((x, y, z))]
+    parts: Parts = [matrix, upright(point), "+", upright(pose[:3]), "=", upright((x, y, z))]
     sheet.grid(name, *formula, parts, unit)
     return x, y, z
 
@@ -83,7 +85,7 @@ def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
     sheet.say("The axis turns round: q* = (-x, -y, -z, w), and its matrix is R^T.")
     back = transposed(of_quaternion(sheet, pose[3:]))
     x, y, z = (0.0 - sheet.inner(row, pose[:3]) for row in back)
-    parts = ["-", back, upright(pose[:3]), "=", upright((x, y, z))]
+    parts: Parts = ["-", back, upright(pose[:3]), "=", upright((x, y, z))]
     sheet.grid("t'", "-R^T t", r"-R^{\mathsf T}\,t", parts, METRES)
     sheet.caveat(INVERSE)
     return x, y, z, *conjugate(sheet, pose[3:])
@@ -111,8 +113,9 @@ def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> 
     sheet.grid("t", "R(A)^T d", r"R(A)^{\mathsf T}\,d", [back, upright(apart), "=", upright((x, y, z))], METRES)
     sheet.caveat(INVERSE)
     sheet.say("a = q(A)*, b = q(B); the axis of A turns round: q* = (-x, -y, -z, w).")
-    ax, ay, az, aw = a[3:]
-    return x, y, z, *product(sheet, (0.0 - ax, 0.0 - ay, 0.0 - az, aw), b[3:])
+    _, _, _, ax, ay, az, aw = a
+    qx, qy, qz, qw = product(sheet, (0.0 - ax, 0.0 - ay, 0.0 - az, aw), b[3:])
+    return x, y, z, qx, qy, qz, qw
 
 
 def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
@@ -123,7 +126,7 @@ def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
     sheet.step(values, "s", norm(XYZ))
     angle = sheet.step(values, "angle", "2*atan2(s, abs(w))", RADIANS)
     sheet.caveat(f"The distance does not depend on the frame; the position does: it is written in {frame}.")
-    return distance, angle, *to_degrees(sheet, values, "angle")
+    return distance, angle, to_degrees(sheet, values, "angle")[0]
 
 
 def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:

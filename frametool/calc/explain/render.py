@@ -119,7 +119,7 @@ def _aligned(item: Item) -> Iterator[str]:
 
 def _matrix(part: str | Sequence[Sequence[str]]) -> str:
     if isinstance(part, str):
-        return f"{latex_number(part[:-1])} \\cdot" if part.endswith("·") and part[0] in "-0123456789" else part.replace("·", r"\cdot ")
+        return rf"{latex_number(part[:-1])} \cdot" if part.endswith("·") else part.replace("·", r" \cdot ")
     rows = r" \\ ".join(" & ".join(map(latex_number, row)) for row in part)
     return rf"\begin{{bmatrix}} {rows} \end{{bmatrix}}"
 

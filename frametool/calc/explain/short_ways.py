@@ -114,7 +114,8 @@ def matrix_to_axis_angle(
     direction(sheet, values, ("dx", "dy", "dz"), ("vx", "vy", "vz"), "s")
     sheet.step(values, "angle", "atan2(s, tr - 1)", RADIANS)
     sheet.caveat(NOT_ACOS)
-    return *(values[f"v{name}"] for name in "xyz"), (to_degrees(sheet, values, "angle")[0] if wanted else values["angle"])
+    found = to_degrees(sheet, values, "angle")[0] if wanted else values["angle"]
+    return values["vx"], values["vy"], values["vz"], found
 
 
 def _near_half_turn(

@@ -7,7 +7,8 @@ import re
 SYMBOLS = {
     "roll": r"\phi", "pitch": r"\theta", "yaw": r"\psi", "angle": r"\vartheta", "arc": r"\Omega", "pi": r"\pi",
     "bearing": r"\beta", "det": r"\det R", "norm": r"\lVert q \rVert", "tr": r"\operatorname{tr} R",
-    "dot": r"a \cdot b", "ww": "4 w^2", "xx": "4 x^2", "yy": "4 y^2", "zz": "4 z^2", "pp": r"\lvert p \rvert^2", "a1": r"\alpha_1", "a2": r"\alpha_2", "a3": r"\alpha_3",
+    "dot": r"a \cdot b", "ww": "4 w^2", "xx": "4 x^2", "yy": "4 y^2", "zz": "4 z^2", "pp": r"\lvert p \rvert^2",
+    "a1": r"\alpha_1", "a2": r"\alpha_2", "a3": r"\alpha_3",
 }  # fmt: skip
 INDEXED = re.compile(r"([a-zA-Z])([0-9]{1,2}|[a-zA-Z][0-9]?)")
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from frametool.calc.explain.angles import HALF, UNIT, angle, direction, norm, sine_and_cosine
 from frametool.calc.explain.matrices import nearest_rotation
-from frametool.calc.explain.sheet import METRES, RADIANS
-from frametool.geometry import euler as kernel
+from frametool.calc.explain.sheet import RADIANS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

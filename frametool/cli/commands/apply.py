@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
-from frametool.cli.explaining import Explaining, ONE_RECORD, explain_options, given as given_as_written
+from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options
+from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline, values_of
 from frametool.cli.streaming import Stream, stream_options

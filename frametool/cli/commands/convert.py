@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
-from frametool.cli.explaining import Explaining, explain_options, given as given_as_written, one_argument
+from frametool.cli.explaining import Explaining, explain_options, one_argument
+from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, pose_from_numbers, source_from_numbers, source_of, values_of
 from frametool.cli.streaming import Stream, one_notation, stream_options

@@ -40,8 +40,8 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
             raise click.UsageError(f"--explain derives one fraction, found {len(fractions)}")
         from frametool.calc.explain.derive import derive_interpolate
 
-        pair = all_given((a, b), degrees=deg, normalize=normalize)
-        explaining.write(derive_interpolate(*pair, fractions[0], plan), output)
+        first, last = all_given((a, b), degrees=deg, normalize=normalize)
+        explaining.write(derive_interpolate(first, last, fractions[0], plan), output)
         return
     pairs = combinations((a, b), degrees=deg, normalize=normalize)
     output.poses([Result(interpolated(first, last, each)) for first, last in pairs for each in fractions])

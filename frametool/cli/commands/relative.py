@@ -47,8 +47,9 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
             raise click.UsageError("--consecutive is about the rows of a stream; leave it or --explain out")
         from frametool.calc.explain.derive import derive_relative
 
-        pair = all_given([str(one_argument(each)) for each in (a, b)], degrees=deg, normalize=normalize)
-        return explaining.write(derive_relative(*pair, plan), output)
+        arguments = [str(one_argument(each)) for each in (a, b)]
+        first, second = all_given(arguments, degrees=deg, normalize=normalize)
+        return explaining.write(derive_relative(first, second, plan), output)
     given = [each for each in (a, b) if each is not None]
     if consecutive and given not in ([], ["-"]):
         raise click.UsageError("--consecutive is about the rows of a stream; leave A and B out")

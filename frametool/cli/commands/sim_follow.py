@@ -29,7 +29,7 @@ SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim
 @LEADER
 @follow_options("20")
 @output_options
-@click.option("--explain-step", type=click.IntRange(0), metavar="N", help="derive the command of control step N, from 0")
+@click.option("--explain-step", type=click.IntRange(0), metavar="N", help="derive the command of step N, from 0")
 @EXPLAIN
 def command(leader: str, explain_step: int | None, explain: str | None, **options: Any) -> None:
     """Let turtle2 follow turtle1 by tf, as the tutorial does, and print its velocity commands.
