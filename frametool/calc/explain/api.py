@@ -84,23 +84,30 @@ def _interpolate(plan: Plan, a: Any, b: Any, fraction: float) -> Explanation:
 
 
 def _lookup(plan: Plan, tree: Frames, target: str, source: str, **options: Any) -> Explanation:
+    if not isinstance(tree, Frames):
+        raise ValueInvalid(f"expected a tree as frametool.load returns it, found {shown(tree)}")
     return derive_lookup(tree, target, source, plan, **options)
 
 
 def _apply(plan: Plan, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:
-    *way, record = operands
-    source = record_source(record, kind)
+    by_tree = bool(operands) and isinstance(operands[0], Frames)
+    if len(operands) not in ((3, 4) if by_tree else (2,)):
+        raise ValueInvalid("apply takes TREE TARGET [SOURCE] RECORD, or POSE RECORD")
     degrees = plan.style.degrees
-    if way and isinstance(way[0], Frames):
-        tree, target, *more = way
-        return derive_apply(ByTree(tree, target, more[0] if more else None, at_ns), source, plan, kind=kind,
-                            degrees=degrees)  # fmt: skip
-    (pose,) = way
-    return derive_apply(ByPose(given_pose(pose, degrees=degrees)), source, plan, kind=kind, degrees=degrees)
+    if by_tree:
+        tree, target, *source, record = operands
+        way: ByTree | ByPose = ByTree(tree, target, source[0] if source else None, at_ns)
+    else:
+        pose, record = operands
+        way = ByPose(given_pose(pose, degrees=degrees))
+    return derive_apply(way, record_source(record, kind), plan, kind=kind, degrees=degrees)
 
 
 def _follow(plan: Plan, steps: Any) -> Explanation:
-    return derive_follow([steps] if isinstance(steps, FollowStep) else list(steps), plan)
+    found = [steps] if isinstance(steps, FollowStep) else list(steps) if isinstance(steps, (list, tuple)) else []
+    if not found or not all(isinstance(each, FollowStep) for each in found):
+        raise ValueInvalid(f"expected the steps of follow_steps, found {shown(steps)}")
+    return derive_follow(found, plan)
 
 
 POSES = {"convert": 1, "compose": sys.maxsize, "invert": 1, "relative": 2, "interpolate": 2}  # operands that are poses

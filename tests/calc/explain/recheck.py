@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from itertools import pairwise
 from typing import Any
 
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]\d+)?")
@@ -151,7 +150,3 @@ def _compare_matrices(found: Any, wanted: Any, digits: int | None, parts: list[A
     for a, b in zip(found, wanted, strict=True):
         assert all(abs(x - y) <= slack for x, y in zip(a, b, strict=True)), (found, wanted)
 
-
-def rising(values: list[float]) -> bool:
-    """Tell whether values rise."""
-    return all(a < b for a, b in pairwise(values))
