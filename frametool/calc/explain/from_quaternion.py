@@ -9,6 +9,7 @@ from frametool.calc.explain.matrices import rows
 from frametool.calc.explain.sheet import RADIANS, Sheet
 from frametool.calc.explain.to_quaternion import ENTRIES, XYZ, XYZW
 from frametool.geometry import euler as kernel
+from frametool.geometry import floats
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -147,17 +148,34 @@ def _by_halves(
         sheet.step(values, middle, "2*atan2(sqrt(c**2 + d**2), sqrt(a**2 + b**2))", RADIANS)
     else:
         sheet.step(values, "h", "sqrt((a**2 + b**2)*(c**2 + d**2))")
-        sheet.step(values, middle, f"atan2(2*(w*{vj} {plus} {vi}*{vk}), h)", RADIANS)
+        sheet.step(values, "k", f"2*(w*{vj} {plus} {vi}*{vk})")
+        sheet.step(values, middle, "atan2(k, h)", RADIANS)
     if locked:
         by_sum = values["a"] ** 2 + values["b"] ** 2 > values["c"] ** 2 + values["d"] ** 2
         sheet.step(values, first, _at_lock(by_sum=by_sum, static=static), RADIANS)
         sheet.chosen(values, third, 0.0, RADIANS)
         sheet.caveat(LOCK)
     else:
-        outer, inner = "atan2(b*c + a*d, a*c - b*d)", "atan2(b*c - a*d, a*c + b*d)"
-        sheet.step(values, first, inner if static else outer, RADIANS)
-        sheet.step(values, third, outer if static else inner, RADIANS)
+        sums, differences = ("b*c + a*d", "a*c - b*d"), ("b*c - a*d", "a*c + b*d")
+        for number, (name, (rise, run)) in enumerate(
+            zip((first, third), (differences, sums) if static else (sums, differences), strict=True), 1
+        ):
+            sheet.step(values, f"y{number}", rise)
+            sheet.step(values, f"x{number}", run)
+            sheet.step(values, name, f"atan2(y{number}, x{number})", RADIANS)
+        _warn_beside_lock(sheet, values, names)
     return to_degrees(sheet, values, *names) if degrees else [values[name] for name in names]
+
+
+def _warn_beside_lock(sheet: Sheet, values: Values, names: tuple[str, str, str]) -> None:
+    """Say how much of the outer angles is rounding where the axes nearly coincide."""
+    a, b, c, d = (values[name] for name in "abcd")
+    level = floats.sqrt((a * a + b * b) * (c * c + d * d))
+    if 0.0 < level < NEAR_LOCK:
+        sheet.caveat(
+            f"Beside lock: {names[0]} and {names[2]} each are known only to about {4e-16 / level:.0e} rad, and so far the "
+            "result may differ; one sum of them is known to all digits."
+        )
 
 
 def _at_lock(*, by_sum: bool, static: bool) -> str:

@@ -23,9 +23,11 @@ ORDER = (
     "a b read left to right turns about the axes as they turn along; right to left, about axes that stand still. "
     "b a would be another rotation."
 )
-INVERSE = "The position is not just negated: it is also seen from the other frame, t' = -R^T t."
+INVERSE = "The position is not just negated but also turned into the other frame: -R^T t."
+HALF_TURN = "Half a turn apart both ways round are equally short; the sign of b decides, as in tf2."
 VECTOR = "A direction (vector, axis, velocity) is only turned: R v, without + t. A point moves by R p + t."
 FROM_Q = "R(q) is the matrix of q: r11 = 1 - 2 (y^2 + z^2), r12 = 2 (x y - z w), and so on."
+NEARLY_ZERO = 1e-15
 HAMILTON = {
     "x": "aw*bx + ax*bw + ay*bz - az*by",
     "y": "aw*by - ax*bz + ay*bw + az*bx",
@@ -157,6 +159,8 @@ def slerp(sheet: Sheet, a: Quaternion, b: Quaternion, fraction: float) -> Quater
             sheet.step(values, f"n{name}", f"-b{name}")
     else:
         sheet.say("dot >= 0: the arc to b is not longer than that to -b (double cover).")
+    if abs(values["dot"]) < NEARLY_ZERO:
+        sheet.caveat(HALF_TURN)
     for letter, sign in (("m", "-"), ("p", "+")):
         for name in XYZW:
             sheet.step(values, f"{letter}{name}", f"{other}{name} {sign} a{name}")

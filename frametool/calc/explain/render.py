@@ -20,11 +20,9 @@ MARKDOWN_SPECIAL = frozenset("\\`*_{}[]<>#|~$&")
 LATEX_SPECIAL = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_",
     "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "<": r"\textless{}", ">": r"\textgreater{}",
-    "|": r"\textbar{}", '"': r"\textquotedbl{}", "-": "-{}", "`": r"\textasciigrave{}", "'": r"\textquotesingle{}",
+    "|": r"\textbar{}", '"': "''", "`": r"\char96{}", "-": "-{}",
 }  # fmt: skip
 PREAMBLE = r"""\documentclass{article}
-\usepackage[T1]{fontenc}
-\usepackage{textcomp}
 \usepackage{amsmath}
 \usepackage[a4paper,landscape,margin=2cm]{geometry}
 \setlength{\parindent}{0pt}
@@ -169,7 +167,5 @@ def _markdown_text(text: str) -> str:
 
 
 def _latex_text(text: str) -> str:
-    """Escape text; letters beyond Latin-1 are named, because not every TeX has them."""
-    return "".join(
-        LATEX_SPECIAL.get(each, each) if each < "\u0100" else f"[U+{ord(each):04X}]" for each in text
-    )
+    """Escape text; letters beyond ASCII are named, because not every TeX has them."""
+    return "".join(LATEX_SPECIAL.get(each, each) if each.isascii() else f"[U+{ord(each):04X}]" for each in text)

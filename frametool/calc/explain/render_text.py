@@ -1,4 +1,4 @@
-"""A derivation as text of 80 columns. A line that begins with = + or - goes on with the one before."""
+"""A derivation as text of 80 columns. A line that begins with = + - or · goes on with the one before."""
 
 from __future__ import annotations
 
@@ -87,23 +87,19 @@ def _broken(head: str, formula: str) -> Iterator[str]:
 
 
 def _pieces(formula: str) -> list[str]:
-    """Cut a formula before each plus and minus between terms; the outermost ones, or those in its one root."""
-    depth, cuts = 0, []
-    level = 0 if _has_terms(formula, 0) else 1
-    for at, letter in enumerate(formula):
-        depth += (letter == "(") - (letter == ")")
-        if depth == level and formula[at : at + 3] in (" + ", " - "):
-            cuts.append(at)
+    """Cut a formula before the signs between its terms, else between its factors, else between terms inside of one."""
+    cuts = _places(formula, 0, (" + ", " - ")) or _places(formula, 0, ("·(",)) or _places(formula, 1, (" + ", " - "))
     return [formula[begin:end] for begin, end in zip([0, *cuts], [*cuts, len(formula)], strict=True)]
 
 
-def _has_terms(formula: str, level: int) -> bool:
-    depth = 0
+def _places(formula: str, level: int, signs: tuple[str, ...]) -> list[int]:
+    """Return where signs stand within so many parentheses."""
+    depth, places = 0, []
     for at, letter in enumerate(formula):
+        if depth == level and formula.startswith(signs, at):
+            places.append(at)
         depth += (letter == "(") - (letter == ")")
-        if depth == level and formula[at : at + 3] in (" + ", " - "):
-            return True
-    return False
+    return places
 
 
 def _grid(grid: Grid) -> list[str]:

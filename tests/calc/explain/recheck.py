@@ -14,7 +14,7 @@ NAMES = {name: getattr(math, name) for name in ("sin", "cos", "sqrt", "atan2", "
 
 def recheck(text: str, digits: int | None) -> int:
     """Recompute the steps and the matrices of a sheet; return how many there were."""
-    lines = re.sub(r"\n +(?=[=+-] [^\[\n]*$)", " ", text.split("\nResult", maxsplit=1)[0], flags=re.MULTILINE).splitlines()
+    lines = re.sub(r"\n +(?=[=+·-] ?[^\[\n]*$)", " ", text.split("\nResult", maxsplit=1)[0], flags=re.MULTILINE).splitlines()
     steps = [match[1].split(" = ") for line in lines if (match := re.fullmatch(r"   \w+ += ([^\[]+)", line))]
     numeric = [parts for parts in steps if len(parts) > 1 and not re.search("[A-Za-z]", _without_functions(parts[-2]))]
     for *_, shown, value in numeric:
