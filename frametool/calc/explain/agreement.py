@@ -92,7 +92,7 @@ def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: 
     target = quaternion.unit(*own.pose.components[3:], floats)
     found = form.to_quaternion(tuple(numbers), floats, degrees=degrees)
     off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
-    if not off <= CLOSE:
+    if not off <= CLOSE * sheet.stretch:
         raise DerivationWrong(f"the derivation in {form.spec} is off by {off:.3g} rad from the result; {REPORT}")
     final = form.from_quaternion(*target, floats, degrees=degrees, keep_sign=plan.style.keep_sign)
     turn = 180.0 if degrees else math.pi
@@ -104,7 +104,7 @@ def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -
     """Compare positions or other vectors; raises DerivationWrong."""
     sheet.reached(own)
     off = max(abs(a - b) for a, b in zip(derived, own, strict=True))
-    if not off <= CLOSE * sheet.reach:
+    if not off <= CLOSE * sheet.reach * sheet.stretch:
         raise DerivationWrong(f"the derivation is off by {off:.3g} from the result; {REPORT}")
 
 

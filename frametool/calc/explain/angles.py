@@ -44,24 +44,32 @@ def sine_and_cosine(sheet: Sheet, values: Values, name: str, sine: str, cosine: 
 
 
 def direction(
-    sheet: Sheet, values: Values, given: Sequence[str], unit: Sequence[str], length: str, measure: str = ""
+    sheet: Sheet, values: Values, given: Sequence[str], unit: Sequence[str], name: str, measure: str = ""
 ) -> float:
-    """Add the length of a non-zero vector and its direction; one whose squares leave the range is scaled first."""
-    most = max(abs(values[name]) for name in given)
-    if TINY < most < HUGE:
-        found = sheet.step(values, length, norm(given), measure)
-        divided, by = given, length
-    else:
-        sheet.say("Squares of these numbers leave the range of a double; they are divided by the largest first.")
-        sheet.step(values, "m", f"max({', '.join(f'abs({name})' for name in given)})", measure)
-        divided, by = [f"k{letter}" for letter in "xyzw"[: len(given)]], "k"
-        for scaled, name in zip(divided, given, strict=True):
-            sheet.step(values, scaled, f"{name}/m")
-        sheet.step(values, by, norm(divided))
-        found = sheet.step(values, length, "m*k", measure)
-    for name, part in zip(unit, divided, strict=True):
-        sheet.step(values, name, f"{part}/{by}")
+    """Add the length of a non-zero vector and its direction."""
+    found, divided, by = length(sheet, values, given, name, measure)
+    for each, part in zip(unit, divided, strict=True):
+        sheet.step(values, each, f"{part}/{by}")
     return found
+
+
+def length(
+    sheet: Sheet, values: Values, given: Sequence[str], name: str, measure: str = ""
+) -> tuple[float, Sequence[str], str]:
+    """Add the length of a vector; one whose squares leave the range of a double is scaled first.
+
+    Returns it, and the names of numbers whose quotients are the direction.
+    """
+    most = max(abs(values[each]) for each in given)
+    if most == 0.0 or TINY < most < HUGE:
+        return sheet.step(values, name, norm(given), measure), given, name
+    sheet.say("Squares of these numbers leave the range of a double; they are divided by the largest first.")
+    sheet.step(values, "m", f"max({', '.join(f'abs({each})' for each in given)})", measure)
+    scaled = [f"k{letter}" for letter in "xyzw"[: len(given)]]
+    for each, part in zip(scaled, given, strict=True):
+        sheet.step(values, each, f"{part}/m")
+    sheet.step(values, "k", norm(scaled))
+    return sheet.step(values, name, "m*k", measure), scaled, "k"
 
 
 def norm(names: Sequence[str]) -> str:

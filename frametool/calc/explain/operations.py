@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.calc.explain.angles import norm, to_degrees
+from frametool.calc.explain.angles import length, norm, to_degrees
 from frametool.calc.explain.matrices import of_quaternion
 from frametool.calc.explain.sheet import METRES, RADIANS, transposed, upright
 from frametool.calc.explain.to_quaternion import XYZ, XYZW
@@ -124,8 +124,8 @@ def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
     """Measure a transform: distance, angle in radians and in degrees."""
     sheet.heading("How far apart")
     values = _named("t", pose[:3], XYZ) | _named("", pose[3:], XYZW)
-    distance = sheet.step(values, "d", norm(("tx", "ty", "tz")), METRES)
-    sheet.step(values, "s", norm(XYZ))
+    distance, _, _ = length(sheet, values, ("tx", "ty", "tz"), "d", METRES)
+    length(sheet, values, XYZ, "s")
     angle = sheet.step(values, "angle", "2*atan2(s, abs(w))", RADIANS)
     sheet.caveat(f"The distance does not depend on the frame; the position does: it is written in {frame}.")
     return distance, angle, to_degrees(sheet, values, "angle")[0]
@@ -133,6 +133,7 @@ def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
 
 def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
     """Go a fraction of the way between two poses: straight line and slerp."""
+    sheet.stretch = max(sheet.stretch, abs(fraction))
     position = line(sheet, a[:3], b[:3], fraction)
     return *position, *slerp(sheet, a[3:], b[3:], fraction)
 

@@ -85,6 +85,7 @@ class Sheet:
     clean: what rounding leaves of terms that cancel becomes 0 and stays 0 in what follows
     every: all products of long chains are shown
     reach: the largest of the positions, in metres: rounding is measured by it
+    stretch: how many times rounding grows where poses are extrapolated
     """
 
     def __init__(self, digits: int | None = DIGITS, *, clean: bool | None = None, every: bool = False) -> None:
@@ -94,6 +95,7 @@ class Sheet:
         self.every = every
         self.items: list[Item] = []
         self.reach = 1.0
+        self.stretch = 1.0
         self._about = ""
         self._warned: set[str] = set()
 
