@@ -145,7 +145,9 @@ def _by_halves(
     x, y, z, w = (values[name] for name in XYZW)
     locked = bool(kernel.locked(x, y, z, w, axes))
     if symmetric:
-        sheet.step(values, middle, "2*atan2(sqrt(c**2 + d**2), sqrt(a**2 + b**2))", RADIANS)
+        sheet.step(values, "k", "sqrt(c**2 + d**2)")
+        sheet.step(values, "h", "sqrt(a**2 + b**2)")
+        sheet.step(values, middle, "2*atan2(k, h)", RADIANS)
     else:
         sheet.step(values, "h", "sqrt((a**2 + b**2)*(c**2 + d**2))")
         sheet.step(values, "k", f"2*(w*{vj} {plus} {vi}*{vk})")
@@ -173,8 +175,8 @@ def _warn_beside_lock(sheet: Sheet, values: Values, names: tuple[str, str, str])
     level = floats.sqrt((a * a + b * b) * (c * c + d * d))
     if 0.0 < level < NEAR_LOCK:
         sheet.caveat(
-            f"Beside lock: {names[0]} and {names[2]} each are known only to about {4e-16 / level:.0e} rad, and so far the "
-            "result may differ; one sum of them is known to all digits."
+            f"Beside lock: {names[0]} and {names[2]} each are known only to about {4e-16 / level:.0e} rad, and by so "
+            "much the result may differ; one sum of them is known to all digits."
         )
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from random import Random
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from recheck import recheck
-from written import ALL, HOSTILE, ROTATIONS, SPECS, pose, record, rotation
+from written import ALL, HOSTILE, ROTATIONS, SPECS, pose, record, rotation, seeded
 
 import frametool
 from frametool import TransformBuffer, explain
@@ -15,12 +14,15 @@ from frametool.calc.explain.from_quaternion import FROM_QUATERNION
 from frametool.calc.explain.to_quaternion import TO_QUATERNION
 from frametool.geometry.representations import REPRESENTATIONS
 
+if TYPE_CHECKING:
+    from random import Random
+
 DIGITS = (4, 6, None)
 
 
 @pytest.mark.parametrize("spec", SPECS)
 def test_each_line_of_a_conversion_recomputes(spec: str) -> None:
-    random = Random(spec)
+    random = seeded(spec)
     for xyzw in (random.choice(ROTATIONS), random.choice(HOSTILE), random.choice(ALL)):
         written = rotation(spec, xyzw)
         for digits in DIGITS:
@@ -61,11 +63,11 @@ def operands(operation: str, random: Random) -> tuple[list[Any], dict[str, Any]]
 @pytest.mark.parametrize("digits", DIGITS)
 @pytest.mark.parametrize("operation", ["compose", "invert", "relative", "interpolate", "lookup", "lookup across", "apply"])
 def test_each_line_of_an_operation_recomputes(operation: str, digits: int | None) -> None:
-    random = Random(f"{operation}{digits}")
+    random = seeded(f"{operation}{digits}")
     for _ in range(10):
         given, options = operands(operation, random)
         to = ",".join(random.sample(("quaternion", "rpy_deg", "matrix", "axis_angle", "euler:rzxz"), 2))
-        sheet = explain(operation.split()[0], *given, to=to, precision=digits, full=random.random() < 0.5, **options)
+        sheet = explain(operation.split(maxsplit=1)[0], *given, to=to, precision=digits, full=random.random() < 0.5, **options)
         recheck(str(sheet), digits)
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from random import Random
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from written import HOSTILE, ROTATIONS, SPECS, rotation
+from written import HOSTILE, ROTATIONS, SPECS, rotation, seeded
 
 import frametool
 from frametool.calc.explain import derive, operations
@@ -56,7 +55,7 @@ def numbers_in(value: Any) -> list[float]:
 
 @pytest.mark.parametrize("spec", SPECS)
 def test_the_last_block_of_a_conversion_is_the_result_of_the_command(spec: str, run: Callable[..., Outcome]) -> None:
-    random = Random(spec)
+    random = seeded(spec)
     for xyzw in (random.choice(ROTATIONS), random.choice(HOSTILE)):
         pose = json.dumps(rotation(spec, xyzw))
         for to in random.sample(SPECS, 4):

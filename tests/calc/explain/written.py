@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from random import Random
+from typing import Any
 
 from samples import LATTICE, quaternions, random_quaternions, turned
 
 from frametool.geometry import euler, floats
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.rotation import spelled
-
-if TYPE_CHECKING:
-    from random import Random
 
 ROTATIONS = random_quaternions(12, seed=12)
 HOSTILE = [
@@ -27,7 +25,12 @@ SPECS = [
 ]
 
 
-def rotation(spec: str, xyzw: tuple[float, ...]) -> dict[str, Any]:
+def seeded(seed: str) -> Random:
+    """Return a generator that draws the same for the same seed."""
+    return Random(seed)  # noqa: S311 - draws samples
+
+
+def rotation(spec: str, xyzw: tuple[float, float, float, float]) -> dict[str, Any]:
     """Write a rotation in a notation, as a member of a pose."""
     form = notation(spec)
     numbers = list(form.from_quaternion(*xyzw, floats))
