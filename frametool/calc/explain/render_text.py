@@ -109,8 +109,8 @@ def _grid(grid: Grid) -> list[str]:
     groups: list[list[list[str]]] = [[]]
     used = len(head)
     blocks = [[part] if isinstance(part, str) else _block(part) for part in grid.parts]
-    for block, after in zip(blocks, [*blocks[1:], [""]], strict=True):
-        size = len(block[0]) + 1
+    for block, after in zip(blocks, [*blocks[1:], [grid.unit]], strict=True):
+        size = len(block[0]) + 1 + (len(grid.unit) + 1) * (block is blocks[-1] and bool(grid.unit))
         needed = size + (len(after[0]) + 1) * (len(block) == 1)  # a sign stays with what it is before
         if used + needed > WIDTH and any(len(each) > 1 for each in groups[-1]):
             groups.append([])

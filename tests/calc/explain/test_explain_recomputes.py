@@ -23,7 +23,7 @@ DIGITS = (4, 6, None)
 @pytest.mark.parametrize("spec", SPECS)
 def test_each_line_of_a_conversion_recomputes(spec: str) -> None:
     random = seeded(spec)
-    for xyzw in (random.choice(ROTATIONS), random.choice(HOSTILE), random.choice(ALL)):
+    for xyzw in (random.choice(HOSTILE), random.choice(ALL)):
         written = rotation(spec, xyzw)
         for digits in DIGITS:
             sheet = explain("convert", written, to=",".join(random.sample(SPECS, 2)), precision=digits)
@@ -64,7 +64,7 @@ def operands(operation: str, random: Random) -> tuple[list[Any], dict[str, Any]]
 @pytest.mark.parametrize("operation", ["compose", "invert", "relative", "interpolate", "lookup", "lookup across", "apply"])
 def test_each_line_of_an_operation_recomputes(operation: str, digits: int | None) -> None:
     random = seeded(f"{operation}{digits}")
-    for _ in range(10):
+    for _ in range(6):
         given, options = operands(operation, random)
         to = ",".join(random.sample(("quaternion", "rpy_deg", "matrix", "axis_angle", "euler:rzxz"), 2))
         sheet = explain(operation.split(maxsplit=1)[0], *given, to=to, precision=digits, full=random.random() < 0.5, **options)

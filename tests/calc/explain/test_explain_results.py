@@ -58,7 +58,7 @@ def test_the_last_block_of_a_conversion_is_the_result_of_the_command(spec: str, 
     random = seeded(spec)
     for xyzw in (random.choice(ROTATIONS), random.choice(HOSTILE)):
         pose = json.dumps(rotation(spec, xyzw))
-        for to in random.sample(SPECS, 4):
+        for to in random.sample(SPECS, 2):
             machine, derived = run("convert", pose, "--to", to, "--format", "json"), run("convert", pose, "--to", to, "--explain")
             assert last_numbers(derived.out) == pytest.approx(numbers_in(json.loads(machine.out)), rel=1e-12, abs=1e-12)
 
@@ -66,7 +66,7 @@ def test_the_last_block_of_a_conversion_is_the_result_of_the_command(spec: str, 
 @pytest.mark.parametrize("axes", euler.AXES)
 @pytest.mark.parametrize("degrees", ["", "_deg"])
 def test_all_conventions_of_euler_lead_to_the_result_at_lock_and_elsewhere(axes: str, degrees: str) -> None:
-    for xyzw in (*ROTATIONS[:3], *HOSTILE):
+    for xyzw in (*ROTATIONS[:2], *HOSTILE[::2], *HOSTILE[-3:]):
         frametool.explain("convert", {"xyzw": list(xyzw)}, to=f"euler{degrees}:{axes}")
         frametool.explain("convert", rotation(f"euler{degrees}:{axes}", xyzw), to="quaternion,matrix")
 
