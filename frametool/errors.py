@@ -4,6 +4,8 @@
       ValueInvalid     a number or name that cannot be               1
       FormatError      text that is not what it should be, with      1
                        its source, line and column
+      Unanswered       a form that leaves open what an option says   2
+      BadAnswer        an option that does not fit the file          2
       BadTopology      cycle, two parents, a frame in itself         1
       LookupFailed                                                   4
         UnknownFrame   NotConnected
@@ -101,6 +103,18 @@ class FormatError(FrametoolError, ValueError):
     def details(self) -> dict[str, object]:
         """Return the place as far as it is known."""
         return {key: value for key in ("source", "line", "column") if (value := getattr(self, key))}
+
+
+class Unanswered(FormatError):
+    """Report a file whose form leaves something open, with the options that say it."""
+
+    exit_code = 2
+
+
+class BadAnswer(FormatError):
+    """Report an option about a file that does not fit it, as a joint that the robot does not have."""
+
+    exit_code = 2
 
 
 class BadTopology(FormatError):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
     from frametool.documents.source import Source
+    from frametool.geometry.representations import Notation
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -82,13 +83,19 @@ def one_argument(argument: str | Source | None) -> str | Source:
     return argument or ""
 
 
-def given(argument: str | Source | None, *, degrees: bool, normalize: bool, told: bool = True) -> Given:
-    """Read the one pose of an argument as it is written; `told`: with its warnings, else they were told already."""
-    from frametool.calc.explain.given import given_poses
-    from frametool.cli.poses import source_of, usage_if_inline
+def given(
+    argument: str | Source | None, notation: Notation | None = None, *, degrees: bool, normalize: bool,
+    told: bool = True,
+) -> Given:  # fmt: skip
+    """Read the one pose of an argument as it is written.
 
-    source = source_of(one_argument(argument))
+    notation: of numbers that do not say theirs.  told: with its warnings, else they were told already.
+    """
+    from frametool.calc.explain.given import given_poses
+    from frametool.cli.poses import pose_source, usage_if_inline
+
     try:
+        source = pose_source(one_argument(argument), notation, normalize=normalize)
         if told:
             found = given_poses(source, degrees=degrees, normalize=normalize)
         else:
@@ -101,6 +108,8 @@ def given(argument: str | Source | None, *, degrees: bool, normalize: bool, told
     return found[0]
 
 
-def all_given(arguments: Sequence[str], *, degrees: bool, normalize: bool) -> list[Given]:
+def all_given(
+    arguments: Sequence[str], notation: Notation | None = None, *, degrees: bool, normalize: bool
+) -> list[Given]:
     """Read one pose from each argument, as they are written."""
-    return [given(each, degrees=degrees, normalize=normalize) for each in arguments]
+    return [given(each, notation, degrees=degrees, normalize=normalize) for each in arguments]

@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, UTF8, Notations, decorated, say_if_verbose, verbose_option
+from frametool.cli.command import (
+    FILE,
+    READING,
+    TEXT,
+    UTF8,
+    Notations,
+    decorated,
+    forms_told,
+    in_option,
+    say_if_verbose,
+    verbose_option,
+)
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
@@ -23,6 +34,7 @@ if TYPE_CHECKING:
     from typing import TypeVar
 
     from frametool.cli.output import Output
+    from frametool.documents.source import Source
     from frametool.stream.request import Request
     from frametool.stream.run import Outcome
 
@@ -33,46 +45,42 @@ STREAMED = ("records", "rows")
 RECORDS = readers("records")
 OPTIONS = {
     "input_path": click.option(
-        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream from this file instead of standard input"
-    ),
-    "input_form": click.option(
-        "--in", "input_form", type=click.Choice(readers(*STREAMED)),
-        help="form of the stream  [default: by suffix or first line]",
+        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
     ),
     "given": click.option(
         "--from", "given", type=Notations(), metavar="REP",
-        help="what the rotations of VALUES or of a stream's columns are",
+        help="what unnamed numbers are",
     ),
     "columns": click.option(
         "--columns", type=TEXT, metavar="NAME,..", multiple=True,
         help="our columns, by name or number; once for each pose",
     ),
-    "keep": click.option("--keep", is_flag=True, help="add the result's columns instead of replacing ours"),
+    "keep": click.option("--keep", is_flag=True, help="add the result's columns, leave ours"),
     "prefix": click.option(
-        "--prefix", type=UTF8, default="", metavar="TEXT", help="put this before the names of the result's columns"
+        "--prefix", type=UTF8, default="", metavar="TEXT", help="begin the names of the result's columns so"
     ),
     "header": click.option(
         "--no-header", "header", is_flag=True, flag_value=False, default=True,
         help="a table without names; columns are numbered",
     ),
     "on_error": click.option(
-        "--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="how to treat bad rows"
+        "--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="bad rows"
     ),
     "max_errors": click.option(
         "--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N",
-        help="report at most N bad rows; all are counted",
+        help="report at most N bad rows, count all",
     ),
     "jobs": click.option(
         "--jobs", type=click.IntRange(1, MOST_JOBS), default=1, show_default=True, metavar="N",
         help="processes for a large stream",
     ),
-    "quiet": click.option("--quiet", is_flag=True, help="no progress on stderr"),
+    "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
 }  # fmt: skip
 
 
 def stream_options(function: Function) -> Function:
     """Add to a command the options of streams; `Stream` takes them."""
-    return decorated(function, [*OPTIONS.values(), verbose_option])
+    return decorated(function, [OPTIONS["input_path"], in_option, *list(OPTIONS.values())[1:], verbose_option])
 
 
 class Stream:
@@ -104,15 +112,39 @@ class Stream:
             raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
         return self.path is not None or argument in (None, "-")
 
+    def takes_rows(self, path: str) -> bool:
+        """Stream a file that an argument names if it is a table; one of records, or none known, is not touched."""
+        if path == "-" or (self.told_form() or _form_of(path)) in ("", *RECORDS):
+            return False
+        self.path = path
+        return True
+
+    @staticmethod
+    def told_form() -> str:
+        """Return the form that --in names for the stream, "" if it names none."""
+        told = forms_told()
+        streamed = [form for form in told if not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
+        if len(streamed) > 1:
+            raise click.UsageError(f"--in {streamed[0]} and --in {streamed[1]}: there is one stream")
+        context = click.get_current_context(silent=True)
+        if told and not streamed and READING not in (context.meta if context else {}):
+            raise click.UsageError(f"--in {told[0]} is not streamed; streams are {', '.join(readers(*STREAMED))}")
+        return streamed[0] if streamed else ""
+
     def run(
         self, request: Request, output: Output, *, tables_only: bool = False
     ) -> int:
         """Run the stream and return its exit status."""
         name = self.path or "stdin"
-        with self.opened() as stream:
+        with self.opened() as given:
+            stream = given
+            form, known_by = self.told_form(), ""
+            if not (form or tables_only or self._says_columns()):
+                pasted, stream = self._pasted(stream, name, request)
+                if pasted is not None:
+                    return self._run_pasted(pasted, request, output)
             begin = stream.peek()
-            form, known_by = self.options["input_form"], ""
-            if form is None:
+            if not form:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
                 say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
@@ -127,6 +159,26 @@ class Stream:
                     f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
                 )
             return self._run(stream, form, request, output)
+
+    def _says_columns(self) -> bool:
+        """Tell whether an option says that the stream is a table."""
+        options = self.options
+        return bool(options["columns"] or options["keep"] or options["prefix"] or not options["header"])
+
+    def _pasted(self, stream: BufferedReader, name: str, request: Request) -> tuple[Source | None, BufferedReader]:
+        """Look for what was pasted; the stream is then another, with the same in it."""
+        from frametool.cli.pasted_input import pasted_stream
+
+        return pasted_stream(stream, name, request._replace(given=request.given or self.given))
+
+    @staticmethod
+    def _run_pasted(source: Source, request: Request, output: Output) -> int:
+        """Write the results of a text that was pasted."""
+        from frametool.stream.record_values import results
+
+        request = request._replace(notations=request.notations or output.notations)
+        output.values(results(source, request, output.style))
+        return 0
 
     def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of records in another form than theirs."""
@@ -143,7 +195,8 @@ class Stream:
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
         options = self.options
-        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or options["prefix"])):
+        prefix = options["prefix"] and not request.operation.only_adds
+        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or prefix)):
             raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
         return request._replace(
             given=request.given or self.given,
@@ -194,6 +247,15 @@ def _opened(path: str | None) -> BufferedReader:
         return BufferedReader(FileIO(path), HEAD)
     except OSError as error:
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def _form_of(path: str) -> str:
+    """Return the form of a file by what is in it; "" where nothing tells, or it cannot be read."""
+    try:
+        with open(path, "rb") as file:
+            return detect(file.read(HEAD), *STREAMED, name=path)[0]
+    except (OSError, ValueError):
+        return ""
 
 
 def one_notation(given: Any) -> Any:

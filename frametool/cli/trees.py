@@ -8,57 +8,176 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import TEXT, Text, say_if_verbose
-from frametool.cli.poses import is_inline, source_of
+from frametool.cli.command import FILE, READING, TEXT, VERBOSE, Text, decorated, forms_told, in_option
+from frametool.cli.pasted_input import is_inline
+from frametool.cli.poses import source_of
+from frametool.cli.stderr import say
 from frametool.errors import shown, warn
-from frametool.formats.load import load_sources
-from frametool.formats.recordings import Recording
+from frametool.formats import FORMATS
+from frametool.grammar.edges import CAMERA_AXES, DH, DIRECTIONS, Answers
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+    from typing import Any, TypeVar
 
     from click.shell_completion import CompletionItem
 
-    from frametool.formats.assembly import Rules
+    from frametool.formats.assembly import Place, Rules
+    from frametool.formats.recordings import Recording
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
+    Function = TypeVar("Function", bound=Callable[..., Any])
 
-def load_tree(argument: str, more: Sequence[str] = (), rules: Rules | None = None) -> FrameTree | TransformBuffer:
-    """Read the tree of an argument and merge further files into it."""
-    return load_sources(opened((argument, *more)), rules)
+def _keep(context: click.Context, option: click.Parameter, chosen: Any) -> None:
+    context.meta.setdefault(READING, {})[option.name] = chosen
 
 
-def opened(arguments: Sequence[str]) -> list[Recording]:
-    """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline."""
-    if list(arguments).count("-") > 1:
-        raise click.UsageError("standard input can be read once; only one argument may be -")
+def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
+    """Add to a command the options that say how files of frames are read; `opened` heeds them.
+
+    streams: the command has those of streams too, `--in` and `--quiet` among them
+    """
+    own = () if streams else (in_option, _quiet_option)
+    return lambda function: decorated(function, (*own, *_READING_OPTIONS))
+
+
+def _option(*names: str, **rest: Any) -> Callable[[Any], Any]:
+    return click.option(*names, expose_value=False, callback=_keep, **rest)
+
+
+_quiet_option = _option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+_READING_OPTIONS = (
+    _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
+            help="read only this topic; may be repeated"),
+    _option("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
+            help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
+    _option("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
+            help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
+    _option("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
+            help="names of frames that a form does not name; may be repeated, in the order of the files"),
+    _option("--direction", "direction", type=click.Choice(DIRECTIONS),
+            help="of matrices whose key does not say which frame they are seen from"),
+    _option("--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
+            help="what the axes of a file's cameras are  [default: as its form has them]"),
+    _option("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
+    _option("--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"),
+)  # fmt: skip
+
+
+def load_tree(
+    argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False
+) -> FrameTree | TransformBuffer:
+    """Read the tree of an argument and merge further files into it; say what files of other forms were taken for.
+
+    streams: `--in` is about what is streamed wherever that can be
+    """
+    from frametool.formats.load import load_sources  # not every command that may read trees does
+
+    files = opened((argument, *more), streams=streams)
+    tree = load_sources(files, rules)
+    state(files)
+    return tree
+
+
+def load_sides(
+    a: Sequence[str], b: Sequence[str], *, normalize: bool, places: Sequence[dict[str, Place]]
+) -> list[FrameTree | TransformBuffer]:
+    """Read two trees that will be compared, each of several files, as `load_tree` does.
+
+    places: are filled with where each frame of the one and the other was said to be
+    """
+    refuse_two_readers((*a, *b))
+    from frametool.formats.assembly import Rules
+    from frametool.formats.load import load_sources
+
+    rules = Rules(normalize=normalize)
+    trees = []
+    for arguments, behind, found in ((a, 0, places[0]), (b, len(a), places[1])):
+        files = opened(arguments, behind=behind)
+        trees.append(load_sources(files, rules, found))
+        state(files)
+    return trees
+
+
+def state(files: Sequence[Recording]) -> None:
+    """Say on stderr what files that were read were taken for: those of other forms than ours, with -v all."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return
+    for file in files:
+        if said := ("" if is_quiet() else file.stated) or (file.described if context.meta.get(VERBOSE) else ""):
+            say(said)
+
+
+def is_quiet() -> bool:
+    """Return whether the command was called with --quiet."""
+    context = click.get_current_context()
+    return bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
+
+
+def opened(arguments: Sequence[str], *, streams: bool = False, behind: int = 0) -> list[Recording]:
+    """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
+
+    streams: as `load_tree` has it
+    behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
+    """
+    from frametool.formats.recordings import Recording, opened_together
+
+    refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
-    return [
-        Recording.inline(source_of(each)) if is_inline(each) else _opened(tree_file(each)) for each in arguments
-    ]
-
-
-def _opened(path: str) -> Recording:
-    """Open one file, of a recording the topics chosen; say what it was taken for, if the command was asked to."""
+    forms = [form for form in forms_told() if _reads_trees(form, streams=streams)]
+    told = iter(forms[behind:] or forms)
     context = click.get_current_context(silent=True)
-    file = Recording(path, topics=() if context is None else context.meta.get(TOPICS, ()))
-    say_if_verbose(file.described)
-    return file
+    chosen = dict(context.meta.get(READING, {})) if context is not None else {}
+    chosen.pop("quiet", None)
+    topics = chosen.pop("topics", ())
+    named = chosen.pop("named_frames", ())
+    frames = iter(named[behind:] or named)
+    chosen["joints"] = dict(map(_joint, chosen.pop("joints", ())))
+    general = Answers(**{name: value for name, value in chosen.items() if value})
+    return opened_together(
+        Recording.inline(source_of(each))
+        if is_inline(each)
+        else Recording(
+            tree_file(each),
+            form=next(told, None),
+            topics=topics,
+            answers=general._replace(frames=_frame_names(next(frames, ""))),
+        )
+        for each in arguments
+    )
 
 
-TOPICS = "frametool.topics"  # where a command's context keeps those of --topic
+def refuse_two_readers(arguments: Sequence[str]) -> None:
+    """Raise a usage error where two arguments stand for standard input."""
+    if list(arguments).count("-") > 1:
+        raise click.UsageError("standard input can be read once; only one argument may be -")
 
 
-def _keep_topics(context: click.Context, _: click.Parameter, chosen: Sequence[str]) -> None:
-    context.meta[TOPICS] = chosen
+def _reads_trees(form: str, *, streams: bool) -> bool:
+    """Tell whether `--in` is about a file of frames, and not about a stream."""
+    reads = FORMATS[form].reads
+    if "tree" not in reads and not streams:
+        raise click.UsageError(f"--in {form}: no frames are read from that; `frametool formats` lists what is")
+    return "tree" in reads and not (streams and {"rows", "records"} & {*reads})
 
 
-topic_option = click.option(
-    "--topic", type=TEXT, multiple=True, metavar="NAME", expose_value=False, callback=_keep_topics,
-    help="read only this topic of a recording; may be repeated",
-)  # fmt: skip
+def _joint(text: str) -> tuple[str, str]:
+    """Take NAME=VALUE apart."""
+    name, equals, value = text.partition("=")
+    if not (name and equals and value):
+        raise click.UsageError(f"--joint takes NAME=VALUE, found {shown(text)}")
+    return name, value
+
+
+def _frame_names(text: str) -> tuple[str, ...]:
+    """Take WORLD,BODY apart."""
+    names = tuple(name.strip() for name in text.split(",")) if text else ()
+    if not all(names):
+        raise click.UsageError(f"--frames takes names with commas between them, found {shown(text)}")
+    return names
 
 
 def tree_file(argument: str) -> str:
@@ -81,7 +200,7 @@ class Frame(Text):
 
         from frametool.errors import FrametoolError
 
-        named = ctx.params.get("tree") or next(iter(ctx.params.get("arguments") or ()), None)
+        named = ctx.params.get("tree") or ctx.params.get("a") or next(iter(ctx.params.get("arguments") or ()), None)
         if named is None and "arguments" in ctx.params:
             return [CompletionItem(incomplete, type="file")]
         try:

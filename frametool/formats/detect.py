@@ -4,10 +4,17 @@ Kinds of signs in the table, the strongest first.  Above the suffix, a sign belo
 
     magic      a pattern of the first bytes
     folder     a file that the folder holds
+    xml text   a pattern found in XML, outside its comments
+    xml child  the root element, a slash, and a pattern of the first element in it
     xml        the root element
+    json path  the way to a key that is not outermost: keys with slashes between them, * for any; lists do not count
     json key   a key of the outermost object, or of the objects in the outermost list
-    yaml key   a key at the beginning of a line
+    yaml key   a pattern of a key at the beginning of a line
+    yaml inner a pattern of a key that stands deeper
+    text       a pattern found in the first characters
     line       a pattern of the first line of data, behind blank lines, comments and what tools print
+    leaves     a pattern of the keys that have a number beside them, behind a slash for each key above them; of five
+               one may be another, so that a misspelt one is told where it stands
 
 Below it, the first form that looks so is taken:
 
@@ -24,7 +31,7 @@ from functools import cached_property
 
 from frametool.documents.source import LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, shown
-from frametool.formats import FORMATS, by_suffix, readers
+from frametool.formats import FORMATS, by_suffix, readers, unread
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -64,32 +71,80 @@ class Beginning:
         return plain or "".join(lines[:1])
 
     @cached_property
-    def json_keys(self) -> set[str]:
-        """Return the outermost keys of JSON."""
+    def json_paths(self) -> set[tuple[str, ...]]:
+        """Return the ways to the keys of JSON; lists on the way do not count."""
         from frametool.documents.json_reader import json_events, looks_like_json
-        from frametool.documents.marks import END, LEAF
+        from frametool.documents.marks import END, LEAF, MAP
 
         text = self.text[:LOOKED_AT].lstrip()
-        keys, depth = set(), 0
+        paths: set[tuple[str, ...]] = set()
+        path: tuple[str, ...] = ()
+        outer: list[tuple[str, ...]] = []
         if looks_like_json(text):
-            outermost = 1 + text.startswith("[")
-            with suppress(ValueError):  # JSON up to a word with a backslash that JSON does not know
+            with suppress(ValueError, IndexError):  # JSON up to a word with a backslash that JSON does not know
                 for kind, word, _, end, *_ in json_events(text):
-                    depth += (kind != LEAF) - 2 * (kind == END)
-                    if kind == LEAF and depth == outermost and text[end:].lstrip().startswith(":"):
-                        keys.add(word)
-        return keys
+                    if kind == END:
+                        path = outer.pop()
+                    elif kind != LEAF:
+                        outer.append(path)
+                        path = (*path, "") if kind == MAP else path
+                    elif text[end:].lstrip().startswith(":"):
+                        path = (*path[:-1], word)
+                        paths.add(path)
+        return paths
 
     @cached_property
     def yaml_keys(self) -> set[str]:
         """Return the words at the beginnings of lines that a colon follows."""
-        return {found[2] for found in re.finditer(r"""(?m)^(["']?)([A-Za-z_][\w./-]*)\1[ \t]*:(?=\s|$)""", self.text)}
+        return {found[2] for found in re.finditer(rf"(?m)^{_YAML_KEY}(?=\s|$)", self.text)}
 
     @cached_property
-    def root(self) -> str:
-        """Return the name of the root element of XML."""
-        found = re.match(r"\s*(?:<[?!](?:--.*?--|[^>]*)>\s*)*<([\w.:-]+)", self.text, re.DOTALL)
-        return found[1] if found else ""
+    def yaml_inner_keys(self) -> set[str]:
+        """Return the words behind the blanks or dashes of a line, and a brace, that a colon follows."""
+        return {found[2] for found in re.finditer(rf"(?m)^[ -]+\{{? *{_YAML_KEY}", self.text)}
+
+    @cached_property
+    def leaves(self) -> set[str]:
+        """Return the keys of YAML's maps with a number beside them, behind a slash for each key above them.
+
+        A list in between is a `[`.
+        """
+        from frametool.documents.marks import END, LEAF, LIST, MAP
+        from frametool.documents.yaml_events import yaml_events
+
+        found: set[str] = set()
+        outer: list[tuple[str, str | None]] = []
+        way, key = "", None  # what leads to the keys of a map; the key whose value comes next
+        for kind, word, *_ in yaml_events(self.text[:LOOKED_AT]):
+            if kind == END:
+                way, key = outer.pop()
+            elif kind == LEAF and outer and not way.endswith("[") and key is None:
+                key = word
+            elif kind == LEAF:
+                if key is not None and re.match(r"[-+]?\.?\d", word):
+                    found.add(way + key)
+                key = None
+            else:
+                outer.append((way, None))
+                way += "[" if kind == LIST else "/" if len(outer) > 1 and kind == MAP else ""
+                key = None
+        return found
+
+    @cached_property
+    def xml(self) -> str:
+        """Return the text of XML from its root element on, without comments; "" for what is no XML."""
+        if not self.text.lstrip().startswith("<"):
+            return ""
+        text = re.sub(r"(?s)<!--.*?(?:-->|\Z)", "", self.text)
+        return re.sub(r"(?s)\A\s*(?:<[?!][^>]*>\s*)*", "", text)
+
+    @cached_property
+    def elements(self) -> list[str]:
+        """Return the names of the root element of XML and of the first one in it."""
+        return re.findall(r"<([\w.:-]+)", self.xml[:LOOKED_AT])[:2]
+
+
+_YAML_KEY = r"""(["']?)([A-Za-z_][\w./-]*)\1[ \t]*:"""
 
 
 def _has_delimiter(line: str) -> bool:
@@ -99,15 +154,33 @@ def _has_delimiter(line: str) -> bool:
 # kind -> whether a beginning shows what a row says, the strongest first
 _STRONG: dict[str, Shows] = {
     "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
-    "xml": lambda begin, what: begin.root == what,
-    "json key": lambda begin, what: what in begin.json_keys,
-    "yaml key": lambda begin, what: what in begin.yaml_keys,
+    "xml text": lambda begin, what: re.search(what, begin.xml) is not None,
+    "xml child": lambda begin, what: re.fullmatch(what, "/".join(begin.elements)) is not None,
+    "xml": lambda begin, what: begin.elements[:1] == [what],
+    "json path": lambda begin, what: any(_leads(path, what.split("/")) for path in begin.json_paths),
+    "json key": lambda begin, what: (what,) in begin.json_paths,
+    "yaml key": lambda begin, what: _any_is(begin.yaml_keys, what),
+    "yaml inner": lambda begin, what: _any_is(begin.yaml_inner_keys, what),
+    "text": lambda begin, what: re.search(what, begin.text) is not None,
     "line": lambda begin, what: re.match(what, begin.data_line) is not None,
+    "leaves": lambda begin, what: 5 * _count(begin.leaves, what) >= 4 * max(1, len(begin.leaves)),
 }
 _WEAK: dict[str, Shows] = {
     "begin": lambda begin, what: re.match(what, begin.text) is not None,
     "header": lambda begin, what: re.match(what, begin.first_line) is not None,
 }
+
+
+def _leads(path: tuple[str, ...], way: list[str]) -> bool:
+    return len(path) == len(way) and all(step in (key, "*") for key, step in zip(path, way, strict=True))
+
+
+def _count(keys: set[str], pattern: str) -> int:
+    return sum(re.fullmatch(pattern, key) is not None for key in keys)
+
+
+def _any_is(keys: set[str], pattern: str) -> bool:
+    return any(re.fullmatch(pattern, key) for key in keys)
 
 
 def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> list[str]:
@@ -123,11 +196,13 @@ def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) 
 def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
     """Return the form, among those from which `reads` is read, whose sign the first bytes show; None if none does.
 
-    Raises FormatError if two forms fit.
+    Raises FormatError if two forms fit, or one that is known and not read.
     """
-    found = _fitting(Beginning(head), _STRONG, readers(*reads))
+    found = _fitting(Beginning(head), _STRONG, (*readers(*reads), *unread()))
     if len(found) > 1:
         raise FormatError(f"fits {' and '.join(found)}; give --in {'|'.join(found)}", source=name or "stdin")
+    if found and (instead := FORMATS[found[0]].instead):
+        raise FormatError(f"{FORMATS[found[0]].summary}: {instead}", source=name or "stdin")
     return found[0] if found else None
 
 

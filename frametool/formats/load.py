@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.collector import paused_collector
-from frametool.documents.document import format_error, locate
+from frametool.documents.document import format_error, locate, locate_many
 from frametool.documents.source import Source
-from frametool.errors import FormatError
+from frametool.errors import FormatError, ValueInvalid, alternatives
+from frametool.formats import readers
 from frametool.formats.assembly import Assembly, Rules
-from frametool.formats.recordings import Recording
+from frametool.formats.recordings import Recording, close_all, opened_together, refuse_unknown_joints
+from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from os import PathLike
+    from collections.abc import Iterable, Mapping, Sequence
 
     from frametool.formats.assembly import Place
     from frametool.frames.buffer import TransformBuffer
@@ -47,27 +49,64 @@ def load(
     keep_ns: int | None = None,
     normalize: bool = False,
     topics: Iterable[str] = (),
+    format: str | None = None,  # noqa: A002 - what it is
+    joints: Mapping[str, float | str] | str | PathLike[str] | None = None,
+    frames: Sequence[str] = (),
+    **answers: str,
 ) -> FrameTree | TransformBuffer:
     """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 
-    paths: files in any form that `frametool.formats.FORMATS` reads a tree from; `-` is standard input.
+    paths: files in any form that `frametool.FORMATS` reads a tree from; `-` is standard input.  format: its name there.
     moving: an edge with a single stamp answers only that instant; otherwise it counts as standing.
     policy, keep_ns: as TransformBuffer has them.  topics: those of a recording that are read  [default: all].
     normalize: take any non-zero quaternion and any matrix near a rotation.
-    Raises FormatError and BadTopology with file, line and column; FileProblem.
+    joints: values by name (radians, metres, or text with a unit), or a file of them.  frames: names of those that a
+    form does not name, as (world, body).  answers: direction, camera_axes, dh, stamps as in `frametool.formats`.
+    Raises FormatError, Unanswered and BadTopology with file, line and column; FileProblem.
     """
     rules = Rules(moving=moving, policy=policy, keep_ns=keep_ns, normalize=normalize)
     chosen = tuple(topics)
-    return load_sources([Recording(path, topics=chosen) for path in paths], rules)
+    if format is not None and format not in readers("tree"):
+        raise ValueInvalid(f"no trees are read from {format!r}{alternatives(format, readers('tree'), 'forms')}")
+    given = {} if joints is None or isinstance(joints, str | PathLike) else joints
+    values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in given.items()}
+    joint_files = () if joints is None or given is joints else (str(joints),)
+    known = Answers(tuple(frames), joints=values, joint_files=joint_files, **answers)
+    files = (Recording(path, form=format, topics=chosen, answers=known) for path in paths)
+    return load_sources(opened_together(files), rules)
 
 
-def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = None) -> FrameTree | TransformBuffer:
-    """Merge the frames of several texts and files; otherwise as `load`."""
+def load_sources(
+    sources: Sequence[Source | Recording], rules: Rules | None = None, places: dict[str, Place] | None = None
+) -> FrameTree | TransformBuffer:
+    """Merge the frames of several texts and files; otherwise as `load`.
+
+    places: is filled with where each frame was first said to hang from its parent
+    """
     assembly = Assembly(", ".join(source.name for source in sources), rules)
-    with paused_collector():
-        for source in sources:
-            _add(assembly, Recording.inline(source) if isinstance(source, Source) else source)
-        return assembly.finish()
+    try:
+        with paused_collector():
+            files = [Recording.inline(source) if isinstance(source, Source) else source for source in sources]
+            for file in files:
+                _add(assembly, file)
+            refuse_unknown_joints(files)
+            tree = assembly.finish()
+    finally:
+        close_all(sources)
+    if places is not None:
+        places |= assembly.places
+    return tree
+
+
+def lines_of(places: Sequence[Place]) -> list[tuple[str, int]]:
+    """Return file and line of many places, each file walked once; 0 where a line says nothing."""
+    edges = [place for place in places if isinstance(place, EdgePlace)]
+    lines: dict[int, int] = {}
+    for file in {id(each.file): each.file for each in edges}.values():
+        inside = [each for each in edges if each.file is file and each.edge.path]
+        found = locate_many(file.text, [each.edge.path for each in inside]) if inside else []
+        lines |= {id(each): line for each, (line, _) in zip(inside, found, strict=True)}
+    return [(each.file.name, lines.get(id(each), each.edge.line)) for each in edges]
 
 
 def _add(assembly: Assembly, file: Recording) -> None:

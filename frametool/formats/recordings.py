@@ -8,13 +8,13 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from frametool.documents.input_file import InputFile
-from frametool.errors import FileProblem, FormatError, warn
+from frametool.errors import BadAnswer, FileProblem, FormatError, warn
 from frametool.formats import BAG, FORMATS
 from frametool.formats.detect import detect, of_folder
-from frametool.grammar.edges import Edge, Options, Tally, Topics, stop
+from frametool.grammar.edges import Answers, Edge, Options, Tally, Topics, stop
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
     from os import PathLike
     from typing import BinaryIO
 
@@ -31,19 +31,26 @@ class Recording(InputFile):
         stream: BinaryIO | None = None,
         form: str | None = None,
         topics: Iterable[str] = (),
+        answers: Answers = Answers(),  # noqa: B008 - it is frozen
     ) -> None:
         """Open a file, a bag's folder, or standard input for `-`, and find its form, unless it is told.
 
         stream: what was opened already, with nothing of it read.  topics: those of a recording that are read.
+        answers: what the form may leave open.
         Raises FileProblem.
         """
         folder = None if form else of_folder(str(path))
         if not (form or folder) and os.path.isdir(path):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
-        self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+        try:
+            self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+        except BaseException:
+            self.close()
+            raise
         self.tally = Tally()
         self.topics = Topics(topics)
+        self.answers = answers
 
     @classmethod
     def inline(cls, source: Source) -> Recording:
@@ -62,6 +69,12 @@ class Recording(InputFile):
         """Say what the file was taken for."""
         return f"{self.name}: {FORMATS[self.form].summary}"
 
+    @property
+    def stated(self) -> str:
+        """Say what a file that was read means, if its form is not one of ours: directions, units, what was assumed."""
+        states = FORMATS[self.form].states
+        return f"{self.described}{', ' if self.tally.about else ''}{self.tally.about}; {states}" if states else ""
+
     def edges(
         self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
     ) -> Iterator[Edge]:
@@ -72,7 +85,7 @@ class Recording(InputFile):
         normalize: take any non-zero quaternion and any matrix near a rotation.
         """
         try:
-            options = Options(self.tally, self.topics, report, raw, normalize)
+            options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
             yield from import_module(FORMATS[self.form].reader).read(self, options)
         finally:
             self.close()
@@ -80,6 +93,36 @@ class Recording(InputFile):
             report(FormatError(missing, source=self.name))
         for told in self.tally.told() if tell else ():
             warn(f"{self.name}:{told.line}: {told.message}")
+
+
+def opened_together(files: Iterable[Recording]) -> list[Recording]:
+    """Return files that are opened one after the other; where one cannot be, the others are closed again."""
+    found: list[Recording] = []
+    try:
+        found.extend(files)
+    except BaseException:
+        close_all(found)
+        raise
+    return found
+
+
+def close_all(files: Iterable[Source | Recording]) -> None:
+    """Let go of files, those among them that were not read."""
+    for file in files:
+        if isinstance(file, Recording):
+            file.close()
+
+
+def refuse_unknown_joints(files: Sequence[Recording]) -> None:
+    """Raise the error for a joint that options or files told of and that none of the files has, once all were read."""
+    told = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
+    robots = [file.tally for file in files if file.tally.has_joints]
+    if told and not robots:
+        option = "--joint" if told[0].joints else "--joints"
+        raise BadAnswer(f"{option}: there are no joints in {', '.join(file.name for file in files)}")
+    for name, error in robots[0].unknown_joints.items() if robots else ():
+        if all(name in robot.unknown_joints for robot in robots):
+            raise error
 
 
 def _about_folder(path: str) -> str:

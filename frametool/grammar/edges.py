@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import NamedTuple
 
 from frametool.errors import shown
@@ -9,7 +10,7 @@ from frametool.grammar.readers import slash_note
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from frametool.errors import FormatError
     from frametool.geometry.types import Rigid
@@ -79,10 +80,18 @@ class Remark(NamedTuple):
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
-    __slots__ = ("names", "noise", "notes", "others", "rough")
+    __slots__ = ("about", "has_joints", "names", "noise", "notes", "others", "rough", "unknown_joints")
 
     def __init__(self) -> None:
-        """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic."""
+        """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic.
+
+        about: what this file holds and what was taken for granted, told beside what its form means
+        has_joints: whether values of joints are about this file; unknown_joints: those told of that it does not have,
+        each with the error that says so, for another file may have them
+        """
+        self.about = ""
+        self.has_joints = False
+        self.unknown_joints: dict[str, FormatError] = {}
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
         self.rough: list[int] = []
@@ -94,7 +103,15 @@ class Tally:
         if note.rule == "rounded":
             self.rough.append(line)
         else:
-            self.notes.setdefault(note.message, Remark(line, note.message, note.rule))
+            self.remark(line, note.message, note.rule)
+
+    def remark(self, line: int, message: str, rule: str = "odd") -> None:
+        """Keep a sentence about one place."""
+        self.notes.setdefault(message, Remark(line, message, rule))
+
+    def note_each(self, message: str, line: int, rule: str = "odd") -> None:
+        """Keep a sentence about one line, also where it was said of other lines."""
+        self.notes.setdefault(f"{line}: {message}", Remark(line, message, rule))
 
     def told(self) -> Iterator[Remark]:
         """Yield one sentence for each kind of oddity."""
@@ -148,6 +165,36 @@ def _source_of(topic: str) -> str:
     return topic.removesuffix("_static") if topic.endswith("/tf_static") or topic == "tf_static" else topic
 
 
+class Answers(NamedTuple):
+    """What options say about files whose form leaves it open.
+
+    frames: names of the frames that a form does not name, in its order: the world, then what is seen from it
+    direction: of matrices whose key does not say it, `parent-from-child` or `child-from-parent`
+    camera_axes: of cameras, `optical` (x right, y down, z forward) or `opengl` (x right, y up, z back)
+    dh: `standard` or `modified` Denavit-Hartenberg parameters
+    stamps: a file with a time for each pose, one a line
+    joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
+    joint_files: files with values of joints, over time or for good
+    """
+
+    frames: tuple[str, ...] = ()
+    direction: str = ""
+    camera_axes: str = ""
+    dh: str = ""
+    stamps: str = ""
+    joints: Mapping[str, str] = MappingProxyType({})
+    joint_files: tuple[str, ...] = ()
+
+    def names(self, *defaults: str) -> tuple[str, ...]:
+        """Return the names of a form's frames: as told, then its own."""
+        return (*self.frames[: len(defaults)], *defaults[len(self.frames) :])
+
+
+DIRECTIONS = ("parent-from-child", "child-from-parent")
+CAMERA_AXES = ("optical", "opengl")
+DH = ("standard", "modified")
+
+
 class Options(NamedTuple):
     """How a file of frames is read.
 
@@ -156,6 +203,7 @@ class Options(NamedTuple):
     report: takes the errors, and reading goes on behind them
     raw: messages are taken as tf2 receives them, unchecked
     normalize: any non-zero quaternion and any matrix near a rotation is taken
+    answers: what the form leaves open
     """
 
     tally: Tally
@@ -163,3 +211,4 @@ class Options(NamedTuple):
     report: Report = stop
     raw: bool = False
     normalize: bool = False
+    answers: Answers = Answers()

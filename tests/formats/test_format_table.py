@@ -107,6 +107,11 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a bag": (b"#ROSBAG V2.0\n", "tree", "bag1"),
     "sqlite": (b"SQLite format 3\0..", "tree", "bag2"),
     "mcap": (b"\x89MCAP0\r\n", "tree", "mcap"),
+    "a launch file": (b"<!-- -*- mode: XML -*- -->\n<launch><arg name='x'/>", "tree", "launch"),
+    "a launch file with substitutions": (b"<launch><node if='$(arg x)' args='$(find y) ${z}'/>", "tree", "launch"),
+    "a launch file in YAML": (b"%YAML 1.2\n---\nlaunch:\n- node: {pkg: x}\n", "tree", "launch"),
+    "a launch file in Python": (b"import os\n\ndef generate_launch_description():\n    pass\n", "tree", "launch"),
+    "a tree with a frame called launch": (b"frames:\n  launch:\n    a:\n", "tree", "yaml"),
     "rows": (b"x,y,z\n1,2,3\n", "rows records", "csv"),
     "rows whose first column ends in a colon": (b"a:,y\n1,2\n", "rows records", "csv"),
     "rows under a comment": (b"# t,x,y\n1,2,3\n", "rows records", "csv"),
@@ -118,6 +123,21 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "documents": (b"# c\n- {x: 1}\n", "rows records", "yaml"),
     "a document in braces": (b"{x: 1, y: 2}\n", "rows records", "yaml"),
     "documents behind dashes": (b"---\nx: 1\n", "rows records", "yaml"),
+    "Autoware's poses": (b"# kit\nbase/x:\n  kit:\n    x: 0\n    y: -.5\n    roll: 1e-3\n    yaw: 0.0\n", "tree", "autoware"),
+    "Autoware's poses in braces": (b"base: {kit: {x: 0, y: 1, z: 2, roll: 0, pitch: 0, yaw: 0}}\n", "tree", "autoware"),
+    "one level of numbers, as robot_calibration has it": (b"a_initial_values:\n  x: 0\n  roll: 0\n", "tree", "yaml"),
+    "three levels of numbers": (b"a:\n  b:\n    c:\n      x: 0\n      roll: 0\n", "tree", "yaml"),
+    "a tree of ours with two levels": (b"frames:\n  a:\n    b:\n      x: 0\n", "tree", "yaml"),
+    "a chain of Kalibr": (b"cam0:\n  T_cam_imu:\n  - [1, 0]\n  distortion_model: radtan\n", "tree", "camchain"),
+    "a chain of OpenVINS": (b"%YAML:1.0\n\ncam0:\n  T_imu_cam: # c\n    - [1]\n", "tree", "camchain"),
+    "a configuration of okvis": (b"%YAML:1.0\ncameras:\n     - {T_SC:\n        [ 1.0", "tree", "camchain"),
+    "a configuration of VINS": (b"%YAML:1.0\n\nimu: 1\nbody_T_cam0: !!opencv-matrix\n   rows: 4\n", "tree", "opencv"),
+    "a matrix of OpenCV without its head": (b"body_T_cam0: !!opencv-matrix\n   rows: 4\n", "tree", "opencv"),
+    "OpenCV's XML": (b'<?xml version="1.0"?>\n<opencv_storage>\n<a type_id="opencv-matrix">', "tree", "opencv"),
+    "OpenCV's JSON": (b'{"a": {"type_id": "opencv-matrix", "rows": 4}}', "tree", "opencv"),
+    "a sensor of EuRoC": (b"#Default\nsensor_type: camera\nT_BS:\n  cols: 4\n", "tree", "euroc-sensor"),
+    "a hand-eye calibration": (b"parameters:\n  eye_on_hand: true\ntransformation: {x: 1}\n", "tree", "handeye"),
+    "a second hand-eye calibration": (b"parameters:\n  tracking_base_frame: a\n", "tree", "handeye"),
 }
 
 
@@ -147,10 +167,10 @@ def test_two_forms_that_fit_are_both_named(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_the_root_element_of_xml_is_a_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "robot"),)))
-    for head in (b"<robot name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<robot>", b"\xef\xbb\xbf<robot/>"):
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "toys"),)))
+    for head in (b"<toys name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<toys>", b"\xef\xbb\xbf<toys/>"):
         assert by_sign(head, "tree") == "toy"
-    assert by_sign(b"<robots>", "tree") is None
+    assert by_sign(b"<toy>", "tree") is None
 
 
 @pytest.mark.parametrize("name", FORMATS)

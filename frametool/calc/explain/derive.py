@@ -97,8 +97,7 @@ def _say_given(sheet: Sheet, given: Sequence[Given], labels: Sequence[tuple[str,
     """List the poses as they are written."""
     sheet.heading("Given")
     for each, (target, source) in zip(given, labels, strict=True):
-        sheet.reached(each.position)
-        sheet.say(f"{target}_from_{source}: {each.line(sheet)}")
+        each.say(sheet, target, source)
 
 
 def derive_compose(given: Sequence[Given], plan: Plan) -> Explanation:

@@ -83,8 +83,7 @@ class ByPose(NamedTuple):
         """Add the way from what is written to the pose."""
         target, source = map(printable, names)
         sheet.heading("Given")
-        sheet.reached(self.given.position)
-        sheet.say(f"{target}_from_{source}: {self.given.line(sheet)}")
+        self.given.say(sheet, target, source)
         return self.given.components(sheet, target, source)
 
 
@@ -156,10 +155,9 @@ def _move_pose(
     """Move a pose, and end with the result."""
     target, origin = map(printable, names)
     name = printable(given.pose.name or "it")
-    sheet.reached(given.position)
     own = Result(Pose.of(Operation().pose([given.pose.components], mover, floats), given.pose.name, names[0]))
     sheet.heading("The record")
-    sheet.say(f"{origin}_from_{name}: {given.line(sheet)}")
+    given.say(sheet, origin, name)
     moved = compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
     shape = record.shape
     if shape.covariance:

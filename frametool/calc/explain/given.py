@@ -8,6 +8,7 @@ from frametool.calc.explain.operations import inverse
 from frametool.calc.explain.to_quaternion import TO_QUATERNION
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, printable
+from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.stream.record_values import documents, pose_of
 from frametool.stream.request import Request
@@ -61,11 +62,15 @@ class Given(NamedTuple):
             x, y, z, w = self.numbers
             q = x, y, z, w
         else:
-            with sheet.about(f"{target}_from_{source}"):
+            with sheet.about(f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"):
                 q = self.quaternion(sheet)
         x, y, z = self.position
         found: Rigid = (x, y, z, *q)
         return inverse(sheet, found, source, target) if self.inverse else found
+
+    def turned(self) -> Given:
+        """Return the inverse: what is written stays, the pose and its frames are turned around."""
+        return self._replace(pose=pose_algebra.inverse(self.pose), inverse=not self.inverse)
 
     @property
     def is_plain(self) -> bool:
@@ -74,16 +79,20 @@ class Given(NamedTuple):
             return True
         return self.notation.representation.name in PLAIN and abs(sum(x * x for x in self.numbers) - 1.0) <= 1e-12
 
-    def line(self, sheet: Sheet) -> str:
-        """Return the pose as it is written, on a line."""
+    def say(self, sheet: Sheet, target: str, source: str) -> None:
+        """List the pose of target_from_source as it is written."""
+        sheet.reached(self.position)
+        written = f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"
+        sheet.say(f"{written}: {self._line(sheet)}{f'; its inverse is {target}_from_{source}' if self.inverse else ''}")
+
+    def _line(self, sheet: Sheet) -> str:
         position = f"xyz {sheet.numbers(self.position)} m"
         if self.notation is None:
             return position
         name = self.notation.representation.name
         if self.notation.representation.angles:
             name += ("_deg" if self.degrees else "_rad") + (f":{self.notation.axes}" if self.notation.axes else "")
-        flag = ", inverted" if self.inverse else ""
-        return f"{position}, {'xyzw' if name == 'quaternion' else name} {sheet.numbers(self.numbers)}{flag}"
+        return f"{position}, {'xyzw' if name == 'quaternion' else name} {sheet.numbers(self.numbers)}"
 
 
 def given_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Given]:

@@ -10,10 +10,11 @@ from frametool.cli.command import FILE, TEXT, Command, pose_options, result_opti
 from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options
 from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, one_pose, source_of, usage_if_inline, values_of
+from frametool.cli.pasted_input import is_inline, is_pasted
+from frametool.cli.poses import one_pose, pose_source, usage_if_inline, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
+from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.text.numbers import NotFinite, parse_number
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from frametool.calc.explain.derive_apply import ByPose, ByTree
     from frametool.formats.assembly import Rules
+    from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.request import Request
 
@@ -31,7 +33,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 
 @click.command(cls=Command, name="apply")
 @click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
-@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
+@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose, not by a lookup")
 @click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
@@ -43,18 +45,18 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
     "frame_column",
     type=TEXT,
     metavar="NAME",
-    help="without SOURCE, the column that names each row's frame",
+    help="column with each row's frame, without SOURCE",
 )
 @click.option(
     "--time-column",
     "time_column",
     type=TEXT,
     metavar="NAME",
-    help="move each row at its own time: the column or key of its stamp, seconds; nanoseconds where it ends in _ns",
+    help="column or key of each row's own time",
 )
-@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest; messages: their own]")
+@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
-@topic_option
+@reading_options(streams=True)
 @stream_options
 def command(
     arguments: tuple[str, ...],
@@ -77,24 +79,12 @@ def command(
       frametool apply robot.yaml map camera_optical 0 0 1
       frametool apply --transform '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' 1 0 0
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
+      ros2 topic echo /clicked_point | frametool apply tf.txt map
 
     A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
     each record says its own frame; without records standard input is read.
 
-    \b
-      ros2 topic echo /clicked_point | frametool apply tf.txt map
-
-    Records may be ROS messages, as the echo tools print them or as JSON lines: PointStamped, Vector3Stamped,
-    PoseStamped, PoseWithCovarianceStamped, WrenchStamped, TwistStamped, TransformStamped. Frame and stamp are those
-    of each header; the stamp and all other fields stay. Each 3x3 block C of a pose's covariance becomes R C R^T. A
-    wrench is that about TARGET's origin: force R f, torque R m + t x R f. A twist is the velocity of the same rigid
-    body at TARGET's origin: angular R w, linear R v + t x R w.
-
-    \b
-      printf 'stamp,x,y,z\\n0.5,1,0,0\\n2,1,0,0\\n' | frametool apply examples/drive.yaml map lidar --time-column stamp
-
-    Stamps are decimal seconds (12.5) or nanoseconds (12500000000ns, or a name like stamp_ns), exact to the nanosecond.
-    A row at a time without data is a bad row, as --on-error says.
+    Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
     """
     stream, explaining = Stream(options), Explaining(options)
     output = Output("points", deg=deg, **options)
@@ -104,7 +94,7 @@ def command(
     elif time_column is not None or at is not None:
         raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
-        way, rest = _way_by_pose(pose, degrees=deg, normalize=normalize), arguments
+        way, rest = _way_by_pose(pose, stream.given, degrees=deg, normalize=normalize), arguments
     if time_column is not None:
         _check_timed(rest, at)
     if plan is not None:
@@ -114,8 +104,9 @@ def command(
         try:
             from frametool.calc.explain.derive_apply import derive_apply
 
-            made = derive_apply(way.explained(), source_of(records[0]), plan, kind=kind or "", degrees=deg,
-                                normalize=normalize, counters=way.counters, timeless=at is not None)  # fmt: skip
+            source = pose_source(records[0], stream.given, normalize=normalize, points=True)
+            made = derive_apply(way.explained(), source, plan, kind=kind or "", degrees=deg, normalize=normalize,
+                                counters=way.counters, timeless=at is not None)  # fmt: skip
         except FormatError as error:
             raise usage_if_inline(error) from None
         return explaining.write(made, output)
@@ -190,7 +181,7 @@ def _way_by_tree(
     """
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
-    tree = load_tree(arguments[0], more, chosen_rules)
+    tree = load_tree(arguments[0], more, chosen_rules, streams=True)
     target, rest = frame_name(arguments[1], tree), arguments[2:]
     source = None
     if rest and not _is_record(rest[0]):
@@ -227,10 +218,10 @@ def _way_by_tree(
     return Way(target, from_frame, in_time, moves, explained, source is not None, counters), rest
 
 
-def _way_by_pose(argument: str, *, degrees: bool, normalize: bool) -> Way:
+def _way_by_pose(argument: str, given: Notation | None, *, degrees: bool, normalize: bool) -> Way:
     """Move everything by one pose; where it names its frames, records must be given in its name."""
-    source = source_of(argument)
-    pose = one_pose(source, degrees=degrees, normalize=normalize)
+    source = pose_source(argument, given, normalize=normalize)
+    pose = one_pose(source, given, degrees=degrees, normalize=normalize)
 
     def from_frame(own: str | None, _own_ns: int | None = None) -> Rigid:
         _settled(own, pose.name)
@@ -239,7 +230,7 @@ def _way_by_pose(argument: str, *, degrees: bool, normalize: bool) -> Way:
     def explained() -> ByPose:
         from frametool.calc.explain.derive_apply import ByPose
 
-        return ByPose(given_as_written(source, degrees=degrees, normalize=normalize, told=False))
+        return ByPose(given_as_written(source, given, degrees=degrees, normalize=normalize, told=False))
 
     return Way(pose.parent, from_frame, None, lambda _own: False, explained, has_source=True)
 
@@ -256,14 +247,19 @@ def _settled(own: str | None, source: str | None) -> str | None:
 
 def _is_record(argument: str) -> bool:
     """Tell a record from a frame's name."""
-    return argument == "-" or is_inline(argument)
+    return argument == "-" or is_inline(argument) or "\n" in argument
+
+
+def _begins_number(argument: str) -> bool:
+    """Tell what is meant for one number of a point."""
+    return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
 def _sources(arguments: Sequence[str], kind: str | None) -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
     pending: list[str] = []
     for argument in (*arguments, ""):
-        if argument and not _is_record(argument):
+        if argument and not (_is_record(argument) or (not _begins_number(argument) and is_pasted(argument))):
             pending.append(argument)
             continue
         for x, y, z in _threes(pending, kind):

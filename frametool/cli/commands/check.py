@@ -9,7 +9,7 @@ import click
 from frametool.cli.command import FILE, Command, pose_options, verbose_option
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import opened, topic_option
+from frametool.cli.trees import opened, reading_options, state
 from frametool.lint.findings import RULES, WRITERS
 from frametool.lint.rules import check
 
@@ -36,7 +36,7 @@ class CheckCommand(Command):
 @click.option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
               help="how findings are written")  # fmt: skip
 @click.option("--strict", is_flag=True, help="let warnings fail too")
-@topic_option
+@reading_options()
 @verbose_option
 @pose_options
 def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> int:
@@ -51,7 +51,9 @@ def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> i
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
     --strict also if there is a warning; notes never fail. - is standard input.
     """
-    findings = check(opened(files), normalize=normalize)
+    recordings = opened(files)
+    findings = check(recordings, normalize=normalize)
+    state(recordings)
     with writing(None) as write:
         write(WRITERS[form](findings))
     return FAILED if _fails(findings, strict=strict) else 0

@@ -19,7 +19,7 @@ from frametool.cli.command import (
 )
 from frametool.cli.output import Output
 from frametool.cli.times import Skipped, Time, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
+from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.errors import NoDataAt, ValueInvalid
 from frametool.frames.replay import checked_rate
 from frametool.grammar.looked_up import result_at
@@ -57,7 +57,7 @@ class Rate(Number):
 @click.option("-l", "--limit", type=click.IntRange(1), metavar="N", help="at most so many blocks")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this file too; may be repeated")
 @rules_options
-@topic_option
+@reading_options()
 @verbose_option
 @pose_options
 @rotation_options

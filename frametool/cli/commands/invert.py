@@ -35,11 +35,16 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
         plan = explaining.plan(output, stream)
         from frametool.calc.explain.derive import derive_invert
 
-        return explaining.write(derive_invert(given(pose, degrees=deg, normalize=normalize), plan), output)
+        written = given(pose, stream.given, degrees=deg, normalize=normalize)
+        return explaining.write(derive_invert(written, plan), output)
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
     request = Request(
-        Operation(inverse=True), degrees=deg, normalize=normalize, rename=lambda parent, name: (name, parent)
+        Operation(inverse=True),
+        given=stream.given,
+        degrees=deg,
+        normalize=normalize,
+        rename=lambda parent, name: (name, parent),
     )
     return write_results(pose, stream, request, output)

@@ -12,7 +12,7 @@ from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, Skipped, at_ns, read_times, rules, rules_options, times_option
-from frametool.cli.trees import FRAME, frame_name, load_tree, topic_option
+from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.grammar.edges import stop
 from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, why_missing
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 @click.argument("target", type=FRAME, required=False, metavar="TARGET")
 @click.argument("source", type=FRAME, required=False, metavar="SOURCE")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns, or latest  [default: latest]")
-@click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE, where --at is that at TARGET")
-@click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")
+@click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest]")
+@click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE; --at is that at TARGET")
+@click.option("--fixed", type=FRAME, metavar="FRAME", help="what stands still between the two times: map")
 @times_option
 @rules_options
-@topic_option
+@reading_options(streams=True)
 @pose_options
 @rotation_options
 @result_options("poses")
@@ -51,12 +51,11 @@ def command(
       frametool lookup robot.yaml base_link lidar --to rpy_deg --format json
       frametool lookup drive.yaml map base_link --at 2.5
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
-      frametool lookup drive.yaml base_link base_link --at 4 --source-at 2.5 --fixed map
+      frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. --deg is about the angles of
-    the result; the tree's own are what its file says. Between two samples of a moving frame positions are interpolated
-    along the line and rotations by slerp, edge by edge, as tf2 does; nothing is extrapolated. With --times, --on-error
-    is stop (the default) or skip: times without data are left out; null is for tables.
+    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. Between two samples of a moving
+    frame positions go along the line and rotations by slerp, edge by edge, as in tf2; nothing is extrapolated. With
+    --times and --on-error skip, times without data are left out.
     """
     by_row, stream, explaining = RowFrames(options), Stream(options), Explaining(options)
     output = Output("poses", **options)
@@ -68,7 +67,8 @@ def command(
     _check(at, source_at, fixed, times)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
-    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize))
+    chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize)
+    frames = load_tree(tree, more, chosen, streams=bool(by_row))
     if by_row or target is None or source is None:
         return by_row.run(stream, output, frames, target=target, source=source, at=at_ns(at))
     if tf2 is None:

@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, verbose_option
 from frametool.cli.output import Output
-from frametool.cli.trees import opened, topic_option
+from frametool.cli.trees import opened, reading_options, state
 from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.argument("recording", type=TEXT)
 @click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
-@topic_option
+@reading_options()
 @verbose_option
 @pose_options
 @result_options("report")
@@ -40,4 +40,7 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], normaliz
     if len(frames) not in (0, 2):
         raise click.UsageError(f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
     output = Output("report", **options)
-    output.report(monitor(opened((recording, *more)), *frames, normalize=normalize))
+    files = opened((recording, *more))
+    report = monitor(files, *frames, normalize=normalize)
+    state(files)
+    output.report(report)

@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.trees import load_tree
+from frametool.cli.trees import load_tree, reading_options
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames.tree import FrameTree
@@ -33,6 +33,7 @@ def _flag_options(function: Callable[..., None]) -> Callable[..., None]:
 @click.command(cls=Command, name="static")
 @click.argument("arguments", nargs=-1, type=TEXT, metavar="[TREE | X Y Z .. PARENT CHILD]")
 @_flag_options
+@reading_options()
 @rotation_options
 @pose_options
 @result_options("tree")

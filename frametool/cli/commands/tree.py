@@ -9,7 +9,7 @@ import click
 from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options, verbose_option
 from frametool.cli.output import Output
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import load_tree, topic_option
+from frametool.cli.trees import load_tree, reading_options
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
               help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
 @rules_options
-@topic_option
+@reading_options()
 @verbose_option
 @pose_options
 @rotation_options

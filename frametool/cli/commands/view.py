@@ -14,7 +14,7 @@ from frametool.cli.pictures import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import parse_angle
 
@@ -82,6 +82,7 @@ def scene_options(function: Any) -> Any:
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @scene_options
 @rules_options
+@reading_options()
 @verbose_option
 @click.option("-f", "--format", "form", type=click.Choice(FORMS),
               help="form of the picture  [default: by the suffix of --output, else text]")

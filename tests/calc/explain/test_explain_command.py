@@ -78,12 +78,6 @@ def test_a_warning_is_told_once(run: Callable[..., Outcome]) -> None:
         assert run(*arguments, "--explain").err.count("normalised") == 1
 
 
-def test_what_comes_by_a_pipe_of_the_shell_is_read_once() -> None:
-    command = f"{sys.executable} -m frametool convert <(echo '{POSE}') --to matrix --explain"
-    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=console.ROOT, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 def loaded(*arguments: str) -> set[str]:
     """Name the modules that a command loads."""
     code = f"import sys; from frametool.cli import run; run({list(arguments)!r}); print(*sys.modules, file=sys.stderr)"
