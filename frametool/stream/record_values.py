@@ -136,7 +136,7 @@ def _edge(record: Record, request: Request, source: Source) -> Rigid | None:
     """Find the pose that moves a record, at the time its header says where that matters."""
     timed = request.timed
     if timed is not None and record.stamp and timed.moves(record.parent.text):
-        return timed.pose(record.parent.text, _stamp_ns(record, source))
+        return timed.pose(record.parent.text, stamp_of(record, source))
     return None if request.way is None else request.way(record.parent.text)
 
 
@@ -146,7 +146,7 @@ def _asked_time(record: Record, request: Request, source: Source) -> int | None:
     if timed is None:
         return None
     if record.stamp and not timed.name:
-        return _stamp_ns(record, source)
+        return stamp_of(record, source)
     document = next(each for each in parse_documents(source.text, source.name) if each.index == record.path[0])
     path = record.path[1:]
     found = key_path(document.value, path, timed.name) if timed.name else stamp_keys(document.value, path)
@@ -154,7 +154,7 @@ def _asked_time(record: Record, request: Request, source: Source) -> int | None:
     return read_stamp(value_at(document.value, found), in_ns=timed._replace(name=key).in_ns)
 
 
-def _stamp_ns(record: Record, source: Source) -> int:
+def stamp_of(record: Record, source: Source) -> int:
     """Return the stamp of a record's header."""
     values = {document.index: document.value for document in parse_documents(source.text, source.name)}
     seconds, below = (int(value_at(values, path)) for path in record.stamp)

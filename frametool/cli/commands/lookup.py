@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, explain_options
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 @pose_options
 @rotation_options
 @result_options("poses")
+@explain_options
 @column_options
 @stream_options
 def command(
@@ -55,8 +57,11 @@ def command(
     frame positions go along the line and rotations by slerp, edge by edge, as in tf2; nothing is extrapolated. With
     --times and --on-error skip, times without data are left out.
     """
-    by_row, stream = RowFrames(options), Stream(options)
+    by_row, stream, explaining = RowFrames(options), Stream(options), Explaining(options)
     output = Output("poses", **options)
+    if explaining and (by_row or times is not None):
+        raise click.UsageError("--explain derives one lookup; name TARGET and SOURCE, and --at TIME if it matters")
+    plan = explaining.plan(output, stream) if explaining else None
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
@@ -69,6 +74,11 @@ def command(
     if tf2 is None:
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
+    if plan is not None:
+        from frametool.calc.explain.derive import derive_lookup
+
+        found = derive_lookup(frames, target, source, plan, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
+        return explaining.write(found, output)
     if times is not None:
         skip = stream.options["on_error"] == "skip"
         return _many(output, frames, target, source, times, skip=skip)
