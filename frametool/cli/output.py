@@ -11,7 +11,7 @@ from frametool.cli.command import FULL
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.errors import printable
-from frametool.formats import FORMATS, by_suffix, writers
+from frametool.formats import FORMATS, by_name, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
@@ -45,7 +45,7 @@ class Output:
         """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
         self.path = output
         self.force = force
-        self.told = format_name or by_suffix(output, writers(what))
+        self.told = format_name or by_name(output, writers(what))
         self.notations = notations or ()
         form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for

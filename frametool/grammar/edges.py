@@ -10,7 +10,7 @@ from frametool.grammar.readers import slash_note
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from frametool.errors import FormatError
     from frametool.geometry.types import Rigid
@@ -39,6 +39,27 @@ class Edge(NamedTuple):
     received_ns: int | None = None
     path: Path = ()
     topic: str = ""
+
+
+class Samples(NamedTuple):
+    """Many poses of one frame that moves, in one piece: what as many edges would say.
+
+    stamps_ns, components, lines: of each pose, in the order they were written
+    """
+
+    parent: str
+    child: str
+    stamps_ns: Sequence[int]
+    components: Sequence[Rigid]
+    lines: Sequence[int]
+
+    def edge(self, at: int) -> Edge:
+        """Return one of the poses as an edge."""
+        return Edge(self.parent, self.child, self.components[at], self.stamps_ns[at], self.lines[at])
+
+    def edges(self) -> Iterator[Edge]:
+        """Yield the poses as edges."""
+        return map(self.edge, range(len(self.stamps_ns)))
 
 
 def stop(error: FormatError) -> None:
@@ -80,16 +101,20 @@ class Remark(NamedTuple):
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
-    __slots__ = ("about", "names", "noise", "notes", "others", "rough")
+    __slots__ = ("about", "axes", "names", "noise", "notes", "others", "projected", "rough")
 
     def __init__(self) -> None:
         """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic.
 
         about: what this file holds and what was taken for granted, told beside what its form means
+        axes: frame -> the axes of the camera it is, `optical` or `opengl`
+        projected: how far the worst matrix was from a rotation, in forms that round them
         """
         self.about = ""
+        self.axes: dict[str, str] = {}
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
+        self.projected = 0.0
         self.rough: list[int] = []
         self.others: dict[str, int] = {}
         self.notes: dict[str, Remark] = {}
@@ -106,6 +131,8 @@ class Tally:
         if self.rough:
             count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
             yield Remark(self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised", "rounded")
+        if self.projected > PROJECTED_IN_SILENCE:
+            yield Remark(1, projection(self.projected), "rounded")
         if self.noise:
             line, text = self.noise[0]
             count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
@@ -116,6 +143,14 @@ class Tally:
         for name in self.names.slashed:
             self.notes.setdefault(slash_note(name), Remark(1, slash_note(name), "slash"))
         yield from self.notes.values()
+
+
+PROJECTED_IN_SILENCE = 1e-9  # what seventeen digits and some products leave of orthonormal rows
+
+
+def projection(off: float) -> str:
+    """Say that matrices were replaced by rotations."""
+    return f"the matrices are orthonormal only to {off:.2g}; the nearest rotation of each was taken"
 
 
 class Topics:

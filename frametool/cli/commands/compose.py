@@ -11,6 +11,7 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 from frametool.grammar.result import Result
@@ -22,6 +23,7 @@ from frametool.grammar.result import Result
 @pose_options
 @result_options("poses")
 @stream_options
+@pose_reading_options
 def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 

@@ -11,6 +11,7 @@ from frametool.cli.command import TEXT, Command, Number, pose_options, result_op
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, pose_from_numbers, values_of
 from frametool.cli.streaming import Stream, one_notation, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
 from frametool.geometry.representations import notation
@@ -52,6 +53,7 @@ AXES = 3
 @result_options("poses")
 @click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
 @stream_options
+@pose_reading_options
 def command(
     values: tuple[str, ...],
     given: tuple[Notation, ...] | None,

@@ -10,6 +10,7 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.output import Output
 from frametool.cli.poses import write_results
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 
 
 @click.command(cls=Command, name="invert")
@@ -18,6 +19,7 @@ from frametool.cli.streaming import Stream, stream_options
 @pose_options
 @result_options("poses")
 @stream_options
+@pose_reading_options
 def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.
 

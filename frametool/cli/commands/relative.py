@@ -10,6 +10,7 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     "--consecutive", is_flag=True, help="of a stream, each row seen from the row before; the first is the identity"
 )
 @stream_options
+@pose_reading_options
 def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutive: bool, **options: Any) -> int:
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
