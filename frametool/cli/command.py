@@ -196,14 +196,14 @@ def say_if_verbose(text: str) -> None:
         say(text)
 
 
-def result_options(what: str) -> Callable[[Function], Function]:
+def result_options(*what: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     options = [
         click.option(
             "-f",
             "--format",
             "format_name",
-            type=click.Choice(("text", *writers(what))),
+            type=click.Choice(("text", *writers(*what))),
             help="form of the result  [default: text on a terminal, yaml otherwise]",
         ),
         click.option(

@@ -10,8 +10,10 @@ class Format(NamedTuple):
 
     summary: what it is, in a line
     suffixes: of files in this form; names: what files are called to which it is written
-    reads: what is read from it: `tree` by `read` of `reader`; `records` and `rows` by the streams
-    writes: what is written in it, by `write_poses`, `write_points` (also for a `report`), `write_tree` of `writer`
+    reads: what is read from it: `tree` by `read` of `reader`; `records` and `rows` by the streams; `trajectory`: it
+        holds one frame that moves
+    writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
+        `write_points` (also for a `report`), `write_tree` of `writer`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
     asks: the options that say what it leaves open
@@ -69,7 +71,7 @@ FORMATS = {
         suffixes=(".csv",),
         reads=("tree", "rows"),
         reader=_TABLE,
-        writes=("poses", "points", "report"),
+        writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.csv_format",
         signs=(("header", r"[^\t]*,[^\t]*$"),),
     ),
@@ -89,7 +91,7 @@ FORMATS = {
         suffixes=(".tum",),
         reads=("tree", "trajectory", "rows"),
         reader=_TABLE,
-        writes=("poses",),
+        writes=("poses", "trajectory"),
         writer="frametool.formats.tum",
         signs=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
         states="world<-body, seconds, metres, quaternion x y z w",
@@ -158,7 +160,7 @@ FORMATS = {
         "EuRoC ground truth",
         reads=("tree", "trajectory", "rows"),
         reader=_TABLE,
-        writes=("poses",),
+        writes=("poses", "trajectory"),
         writer="frametool.formats.euroc",
         signs=(
             ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
@@ -170,7 +172,7 @@ FORMATS = {
         "COLMAP images.txt",
         reads=("tree", "trajectory", "rows"),
         reader="frametool.formats.colmap",
-        writes=("poses",),
+        writes=("poses", "trajectory"),
         writer="frametool.formats.colmap",
         names=("images.txt",),
         signs=(
@@ -183,7 +185,7 @@ FORMATS = {
         "NeRF transforms.json",
         reads=("tree", "trajectory", "rows"),
         reader="frametool.formats.nerf",
-        writes=("poses",),
+        writes=("poses", "trajectory"),
         writer="frametool.formats.nerf",
         names=("transforms.json",),
         signs=(("json path", "frames/transform_matrix"),),
@@ -193,7 +195,7 @@ FORMATS = {
         "KITTI poses",
         reads=("tree", "trajectory", "rows"),
         reader=_TABLE,
-        writes=("poses",),
+        writes=("poses", "trajectory"),
         writer="frametool.formats.kitti",
         signs=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),),
         states="world<-cam0, metres",
@@ -203,7 +205,7 @@ FORMATS = {
         suffixes=(".g2o",),
         reads=("tree", "trajectory", "rows"),
         reader="frametool.formats.g2o",
-        writes=("poses",),
+        writes=("poses", "trajectory"),
         writer="frametool.formats.g2o",
         signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
         states="vertices, world<-body, quaternion x y z w; edges are not read",
@@ -213,7 +215,7 @@ FORMATS = {
         suffixes=(".log",),
         reads=("tree", "trajectory", "rows"),
         reader="frametool.formats.open3d",
-        writes=("poses",),
+        writes=("poses", "trajectory"),
         writer="frametool.formats.open3d",
         signs=(
             ("text", rf"\A\ufeff?\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"),
@@ -281,9 +283,14 @@ def unread() -> tuple[str, ...]:
     return tuple(name for name, row in FORMATS.items() if row.instead)
 
 
-def writers(what: str) -> tuple[str, ...]:
-    """Name the forms in which `poses`, `points`, a `tree` or a `report` is written."""
-    return tuple(name for name, row in FORMATS.items() if what in row.writes)
+def writers(*what: str) -> tuple[str, ...]:
+    """Name the forms in which any of `poses`, `points`, a `trajectory`, a `tree` or a `report` is written."""
+    return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.writes))
+
+
+def is_trajectory(name: str) -> bool:
+    """Tell whether a form is that of the poses of one frame over time, and of nothing else."""
+    return name in FORMATS and "trajectory" in FORMATS[name].reads
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:

@@ -21,14 +21,15 @@ from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics
 from frametool.stream.blocks import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Misused
+from frametool.stream.point_writer import PointWriter
 from frametool.stream.pose_writer import PoseWriter, kept, spans_of
 from frametool.stream.row_layout import POSE, Shape, Target
 from frametool.stream.rows import Block
-from frametool.stream.run import Outcome, notes_of
+from frametool.stream.run import Outcome, RowNote, notes_of
 from frametool.stream.table_names import rename_of
 from frametool.stream.table_poses import RowPoses, TablePoses
 from frametool.stream.table_samples import FORMS, TABLE
-from frametool.stream.table_stream import DELIMITERS, begin_table
+from frametool.stream.table_stream import DELIMITERS, begin_table, moves_in_time, stamps_unasked
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
@@ -68,11 +69,11 @@ class OtherForm:
 
     def outcomes(self, stream: BinaryIO, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
-        writer = None
+        writer: PoseWriter | PointWriter | None = None
         for step in self._listed(stream) if self.module else self._rows(stream, header=header):
             poses, outcome = step
             if writer is None:
-                writer = PoseWriter(self.style, self.request.operation.extras, placed=self.placed)
+                writer = self._writer()
             if self.request.on_error == STOP and outcome.faults:
                 before = int(np.searchsorted(poses.lines, outcome.faults[0].line))
                 poses = kept(poses, slice(0, before))
@@ -82,6 +83,11 @@ class OtherForm:
         yield Outcome(writer.end())
         for told in self.tally.told():
             warn(f"{self.source}:{told.line}: {told.message}")
+
+    def _writer(self) -> PoseWriter | PointWriter:
+        if self.shape.kind != POSE:
+            return PointWriter(self.style, self.shape.kind)
+        return PoseWriter(self.style, self.request.operation.extras, placed=self.placed)
 
     def _turned(self, form: Poses) -> Request:
         """Return the request with the axes of cameras turned if that was asked for; keep what they then are."""
@@ -100,8 +106,12 @@ class OtherForm:
         form = FORMS.get(self.form, TABLE)
         request = self._turned(form)
         begun = begin_table(stream, self.form, request, source=self.source, header=header)
+        unasked = None
+        if request.timed is not None and not request.timed.name:
+            unasked, request = stamps_unasked(begun.table, request.timed), request._replace(timed=None)
         rows = TablePoses(begun, self.form, request, self.source)
-        if rows.shape.notation is None and (rows.shape.kind != POSE or request.operation.keeps_position):
+        self.shape = rows.shape
+        if rows.shape.kind == POSE and rows.shape.notation is None and request.operation.keeps_position:
             raise FormatError(
                 f"no rotation among the columns {rows.columns}: {self.style.form} is written of poses",
                 source=self.source,
@@ -115,6 +125,9 @@ class OtherForm:
             poses = rows.of_block(text)
             stamps = self._stamps(poses, form, count)
             count += len(poses.numbers)
+            if unasked is not None and len(poses.numbers) and moves_in_time(unasked, {*poses.given} or {None}):
+                rows.notes.insert(0, RowNote.of_latest(int(poses.lines[0]), unasked.name))
+                unasked = None
             yield Step(
                 poses._replace(stamps_ns=stamps),
                 Outcome(b"", rows.faults, rows.rows - before, text.count(b"\n"), notes=rows.notes, size=len(text)),
@@ -140,7 +153,7 @@ class OtherForm:
         request = self._turned(form)
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
-        self.placed = True
+        self.placed, self.shape = True, Shape(POSE, 1.0, QUATERNION)
         options = Options(self.tally, Topics(), normalize=request.normalize, answers=self.answers)
         options = options._replace(answers=self.answers._replace(camera_axes=""))
         plan = _plan(request)

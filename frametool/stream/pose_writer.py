@@ -25,6 +25,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.row_layout import Target
 from frametool.stream.rows import number_spans
+from frametool.stream.table_poses import RowPoses
 from frametool.text.cells import without_quotes
 from frametool.text.csv_line import quoted
 from frametool.text.spans import MARGIN, Spans, framed, join
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
-    from frametool.stream.table_poses import RowPoses
     from frametool.text.array_types import Floats
 
 LEARNED = ("csv", "json", "yaml")
@@ -137,7 +137,7 @@ class PoseWriter:
             return self._cells(name, block)
         stamps = self._stamps(block)
         if name == IMAGE:
-            images = _texts(block.extras[IMAGE]) if IMAGE in block.extras else [None] * size
+            images = texts_of(block.extras[IMAGE]) if IMAGE in block.extras else [None] * size
             return spans_of([image_name(*each).encode() for each in zip(images, stamps, strict=True)])
         if name == "seconds" and min(stamps) >= 0:
             return spans_of([b"%d.%09d" % divmod(stamp, BILLION) for stamp in stamps])
@@ -157,7 +157,7 @@ class PoseWriter:
             texts: Sequence[str | None] = block.names if what == "name" else block.parents
             texts = list(texts) * (len(block.numbers) if len(texts) == 1 else 1)
         else:
-            texts = _texts(list(block.extras.values())[int(what)])
+            texts = texts_of(list(block.extras.values())[int(what)])
         write: Callable[[str | None], bytes] = _csv_cell if self.style.form == "csv" else _json_cell
         known = {text: write(text) for text in dict.fromkeys(texts)}
         return spans_of([known[text] for text in texts])
@@ -255,11 +255,33 @@ def kept(block: RowPoses, rows: slice) -> RowPoses:
     )
 
 
+def block_of(results: Sequence[Result]) -> RowPoses:
+    """Return results as a block of poses; raises ValueInvalid for one without a rotation."""
+    if any(result.pose.rotation is None for result in results):
+        raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+    stamps = [result.extras.get("stamp_ns") for result in results]
+    others = {name for result in results for name in result.extras} - {"stamp_ns"}
+    blank = spans_of([b""] * len(results))
+    names = {(result.pose.parent, result.pose.name) for result in results}
+    parent, name = next(iter(names))
+    return RowPoses(
+        np.array([result.pose.components for result in results]),
+        None if None in stamps else np.array(stamps, np.int64),
+        np.arange(len(results)),
+        [parent],
+        [name],
+        {
+            each: spans_of([str(result.extras.get(each, "")).encode() for result in results]) if each == IMAGE else blank
+            for each in sorted(others)
+        },
+    )
+
+
 def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
     """Return a block as results, one a pose."""
     size = len(block.numbers)
     names, parents = (each if len(each) == size else list(each) * size for each in (block.names, block.parents))
-    others = {name: [_plain(text) for text in _texts(spans)] for name, spans in block.extras.items()}
+    others = {name: [plain_cell(text) for text in texts_of(spans)] for name, spans in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
     for at, numbers in enumerate(block.numbers.tolist()):
@@ -302,7 +324,7 @@ def spans_of(texts: list[bytes]) -> Spans:
     return Spans(framed(b"".join(texts)), ends - lengths, ends)
 
 
-def _texts(cells: Spans) -> list[str]:
+def texts_of(cells: Spans) -> list[str]:
     """Return the text of each cell, without its quotes."""
     bare = without_quotes(cells)
     data = bare.data.tobytes()
@@ -310,7 +332,7 @@ def _texts(cells: Spans) -> list[str]:
     return [data[start:end].decode("utf-8", "replace").strip().replace('""', '"') for start, end in places]
 
 
-def _plain(text: str) -> str | Verbatim | None:
+def plain_cell(text: str) -> str | Verbatim | None:
     """Return a cell as a plain value: numbers and truth values as they are written."""
     if not text:
         return None
@@ -322,4 +344,4 @@ def _csv_cell(text: str | None) -> bytes:
 
 
 def _json_cell(text: str | None) -> bytes:
-    return dump(_plain(text or "")).encode()
+    return dump(plain_cell(text or "")).encode()

@@ -39,6 +39,7 @@ class RowPoses(NamedTuple):
     lines: (n,) from 0
     parents, names: one a row, one for all, or none
     extras: columns that are not ours, by name
+    given: the frames that the rows of the input are given in
     """
 
     numbers: Floats
@@ -47,6 +48,7 @@ class RowPoses(NamedTuple):
     parents: Sequence[str | None]
     names: Sequence[str | None]
     extras: Mapping[str, Spans]
+    given: Sequence[str | None] = ()
 
 
 class TablePoses:
@@ -112,7 +114,8 @@ class TablePoses:
             lines = np.array([block.line_of(row) for row in run.rows.tolist()], np.int64)
         self.rows += len(block.places) + len(block.broken)
         return RowPoses(
-            run.results, None if stamps is None else stamps[run.rows], lines, names[0], names[1], texts
+            run.results, None if stamps is None else stamps[run.rows], lines, names[0], names[1], texts,
+            block.frames,
         )
 
     def _stamps(self, cells: Sequence[tuple[Spans, ...]]) -> tuple[Ints | None, dict[int, tuple[str, str]]]:

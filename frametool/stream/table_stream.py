@@ -46,7 +46,7 @@ def run_table(
     table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header, size=size)
     unasked = None
     if request.timed is not None and not request.timed.name:  # rows have no header
-        unasked, request = _stamps_unasked(table, request.timed), request._replace(timed=None)
+        unasked, request = stamps_unasked(table, request.timed), request._replace(timed=None)
     plan, layout = plan_table(table, request, source)
     yield Outcome(table.opening(layout), lines=lines, size=taken)
     work = TableWork(table, plan, layout, Naming(table, layout, request), unasked)
@@ -96,7 +96,7 @@ def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
     return text or None
 
 
-def _stamps_unasked(table: Table, timed: Timed) -> Timed | None:
+def stamps_unasked(table: Table, timed: Timed) -> Timed | None:
     """Find a column of stamps that no option names."""
     name = next(filter(STAMPS.fullmatch, table.names or ()), None)
     return None if name is None else timed._replace(name=name)
@@ -128,7 +128,7 @@ class TableWork:
         run = Run(self.plan, block, self.state)
         faults = run.faults()
         notes = notes_of(run, block)
-        if self.unasked is not None and len(block.places) and _moves(self.unasked, set(block.frames) or {None}):
+        if self.unasked is not None and len(block.places) and moves_in_time(self.unasked, set(block.frames) or {None}):
             notes.append(RowNote.of_latest(block.line_of(0), self.unasked.name))
             self.unasked = None
         rows = len(block.places) + len(block.broken)
@@ -143,7 +143,7 @@ class TableWork:
         )
 
 
-def _moves(timed: Timed, frames: set[str | None]) -> bool:
+def moves_in_time(timed: Timed, frames: set[str | None]) -> bool:
     """Tell whether the way from one of some frames depends on the time; rows of unknown frames say so themselves."""
     for frame in frames:
         with suppress(FrametoolError):

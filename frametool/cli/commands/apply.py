@@ -34,7 +34,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
 @pose_options
-@result_options("points")
+@result_options("points", "trajectory")
 @click.option(
     "--frame-column",
     "frame_column",
@@ -94,7 +94,7 @@ def command(
     A row at a time without data is a bad row, as --on-error says.
     """
     stream = Stream(options)
-    output = Output("points", deg=deg, **options)
+    output = Output("points", "trajectory", deg=deg, **options)
     if pose is None:
         way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize), at)
     elif time_column is not None or at is not None:
