@@ -99,6 +99,9 @@ class Output:
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
+        if self.is_trajectory:
+            self.poses_as_they_come(map(_as_pose, values))
+            return
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) == len(found):
@@ -166,10 +169,18 @@ class Output:
         self.pieces([text])
 
 
+def _as_pose(value: Result | dict[str, Any]) -> Result:
+    """Take a result for a pose; raise ValueInvalid for a point or a message."""
+    if not isinstance(value, Result):
+        raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+    return value
+
+
 def _axes_of_only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
     """Return the camera axes of the one frame of a tree, "" if it is no camera; raise ValueInvalid for several."""
     children = [track.child for track in tree.tracks()]
     if len(children) != 1:
         frames = ", ".join(map(shown, children[:8])) or "none"
-        raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; name two: lookup TREE TARGET SOURCE -f {form}")
+        instead = f"name two: lookup TREE TARGET SOURCE -f {form}"
+        raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; {instead}")
     return tree.camera_axes.get(children[0], "")

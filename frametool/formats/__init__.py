@@ -83,7 +83,10 @@ FORMATS = {
         signs=(("header", r".*\t"),),
     ),
     "semicolon": Format(
-        "CSV with semicolons and a header", reads=("tree", "rows"), reader=_TABLE, signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),)
+        "CSV with semicolons and a header",
+        reads=("tree", "rows"),
+        reader=_TABLE,
+        signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),),
     ),
     "columns": Format("columns between blanks, # comments", reads=("rows",), signs=(("header", r"#|\s*\S+\s+\S"),)),
     "tum": Format(

@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     class PlacedSamples(Protocol):
         """Poses of one frame, and where each was read."""
 
-        samples: Samples
+        @property
+        def samples(self) -> Samples:
+            """Return the poses."""
 
         def place(self, at: int) -> Place:
             """Return where one of them was read."""

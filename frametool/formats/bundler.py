@@ -49,7 +49,8 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
             turn = [number for row in rows[1:4] for number in row]
             yield Written((*rows[4], *turn), camera, at - LINES + 1)
     if missing:
-        options.tally.note(Note("odd", f"{missing} of {head[0]} cameras were not estimated (f = 0): left out", ()), first)
+        message = f"{missing} of {head[0]} cameras were not estimated (f = 0): left out"
+        options.tally.note(Note("odd", message, ()), first)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Samples]:

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.formats.pose_rows import IMAGE, Numbers, RowForm, write_rows
 from frametool.errors import FormatError, shown
+from frametool.formats.pose_rows import IMAGE, Numbers, RowForm, write_rows
 from frametool.formats.trajectory import Poses, Written, numbers_in, samples, text_lines
 from frametool.geometry import rigid
 

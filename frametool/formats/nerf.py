@@ -1,6 +1,6 @@
 """NeRF's transforms.json: the pose of each camera in the world as 4x4 rows, with the axes of OpenGL; metres or not.
 
-{"camera_angle_x": 0.69, "frames": [{"file_path": "images/1.png", "transform_matrix": [[..], [..], [..], [0, 0, 0, 1]]}]}
+{"camera_angle_x": 0.69, "frames": [{"file_path": "1.png", "transform_matrix": [[..], [..], [..], [0, 0, 0, 1]]}]}
 
 Axes of OpenGL: x right, y up, z backward. Matrices of three rows occur (Nerfstudio), and `applied_transform`, which
 they contain already.

@@ -29,7 +29,7 @@ IMAGE = "image"  # the extra that names a picture
 class Numbers(NamedTuple):
     """So many numbers of a row, with the same text between them."""
 
-    count: int
+    size: int
     between: bytes = b" "
 
 
@@ -90,7 +90,7 @@ class Lost:
     def tell(self) -> None:
         """Warn of all that was left out or made up, in one line."""
         left = [words for what, words in LOSABLE.items() if what in self.found]
-        said = [f"{' and '.join(left)} left out"] if left else []
+        said = [f"{', '.join(left)} left out"] if left else []
         said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
         said += ["pictures are named by their stamps"] * self.by_stamp
         if self.turned:
@@ -101,9 +101,15 @@ class Lost:
             warn(f"{self.style.form}: {'; '.join(said)}")
 
 
+def with_axes_turned(pose: Components) -> Components:
+    """Turn the axes of a camera by half a turn about x: from optical to those of OpenGL, and back."""
+    tx, ty, tz, x, y, z, w = pose
+    return rigid.compose(tx, ty, tz, x, y, z, w, *HALF_TURN)
+
+
 def turned(form: RowForm, style: Style, pose: Components) -> Components:
     """Turn a camera's axes to those of a form, where both are known and differ."""
-    return rigid.compose(*pose, *HALF_TURN) if is_turned(form, style) else pose
+    return with_axes_turned(pose) if is_turned(form, style) else pose
 
 
 def is_turned(form: RowForm, style: Style) -> bool:
@@ -127,7 +133,7 @@ def _row(form: RowForm, result: Result, style: Style, number: int, lost: Lost) -
         if isinstance(piece, bytes):
             yield piece.decode()
         elif isinstance(piece, Numbers):
-            yield piece.between.decode().join(style.number(next(numbers)) for _ in range(piece.count))
+            yield piece.between.decode().join(style.number(next(numbers)) for _ in range(piece.size))
         elif piece == IMAGE:
             lost.by_stamp |= image is None
             yield image_name(image, stamp)
@@ -155,15 +161,6 @@ def image_name(image: str | None, stamp_ns: int) -> str:
     if image is None:
         return format_stamp(stamp_ns)
     return "".join(letter for letter in image if letter.isprintable() and letter not in '"\\')
-
-
-def numbered(row: tuple[str | bytes | Numbers, ...]) -> tuple[int, ...]:
-    """Return where in a row its groups of numbers begin and end: 0, then the end of each."""
-    ends = [0]
-    for piece in row:
-        if isinstance(piece, Numbers):
-            ends.append(ends[-1] + piece.count)
-    return tuple(ends)
 
 
 def rows_of_matrix(*pose: float) -> Components:

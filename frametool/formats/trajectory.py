@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.chunks import lines
 from frametool.documents.document import format_error
 from frametool.errors import FormatError, ValueInvalid
-from frametool.formats.pose_rows import HALF_TURN
+from frametool.formats.pose_rows import with_axes_turned
 from frametool.frames.stamps import BILLION, parse_stamp, whole_stamp
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Samples
@@ -134,7 +134,7 @@ def _checked(some: Sequence[Written], form: Poses, file: InputFile, options: Opt
     if form.inverse:
         poses = rigid.inverse(*poses)
     if options.answers.camera_axes and form.axes and options.answers.camera_axes != form.axes:
-        poses = rigid.compose(*poses, *HALF_TURN)
+        poses = with_axes_turned(poses)
     return [at for at in range(len(some)) if at not in found.reasons], poses
 
 
@@ -182,7 +182,8 @@ class StampFile:
     def at(self, index: int) -> int:
         """Return the time of a pose, counted from 0."""
         if index >= len(self.stamps):
-            raise FormatError(f"{len(self.stamps)} times are too few for the poses; one a line is wanted", source=self.path)
+            message = f"{len(self.stamps)} times are too few for the poses; one a line is wanted"
+            raise FormatError(message, source=self.path)
         return self.stamps[index]
 
     def finish(self, count: int, name: str) -> None:

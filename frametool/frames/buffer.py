@@ -96,7 +96,7 @@ class TransformBuffer(Frames):
         """
         self.insert_components(parent, child, components[0], stamps_ns[0])
         track = self._tracks[child]
-        within = -FURTHEST_NS < stamps_ns[0] and stamps_ns[-1] < FURTHEST_NS
+        within = stamps_ns[0] > -FURTHEST_NS and stamps_ns[-1] < FURTHEST_NS
         if not self._plain or track.standing or not within or not all(map(isfinite, map(sum, components))):
             for stamp_ns, each in zip(stamps_ns[1:], components[1:], strict=True):
                 self.insert_components(parent, child, each, stamp_ns)

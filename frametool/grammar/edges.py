@@ -160,6 +160,7 @@ class Topics:
         """Read the topics chosen, with or without a leading `/`; all of them if none is."""
         self.chosen = frozenset(topic.strip("/") for topic in chosen)
         self.counts: dict[str, int] = {}
+        self.seen: set[str] = set()  # topics, also those without transforms
         self._first: dict[str, str] = {}  # child -> the topic it came by first
         self._told: set[tuple[str, str]] = set()
 
@@ -167,6 +168,10 @@ class Topics:
         """Count a transform; return whether its topic is read."""
         self.counts[topic] = self.counts.get(topic, 0) + 1
         return not self.chosen or topic.strip("/") in self.chosen
+
+    def chooses(self, topic: str) -> bool:
+        """Tell whether a topic was named; only then are messages read that are poses and no transforms."""
+        return topic.strip("/") in self.chosen
 
     def conflict(self, topic: str, child: str) -> str:
         """Return what is wrong if a frame comes from two namespaces, as of two robots; told once of each frame."""
@@ -178,9 +183,10 @@ class Topics:
 
     def missing(self) -> str:
         """Return what is wrong if none of the topics chosen is there; what names no topics is read in any case."""
-        if not self.chosen or not self.counts or any(topic.strip("/") in self.chosen for topic in self.counts):
+        known = {*self.counts, *self.seen} - {""}
+        if not self.chosen or not known or any(map(self.chooses, self.counts)):
             return ""
-        return f"no transforms on {', '.join(sorted(self.chosen))}; topics: {', '.join(sorted(self.counts))}"
+        return f"no transforms or poses on {', '.join(sorted(self.chosen))}; topics: {', '.join(sorted(known))}"
 
 
 def _source_of(topic: str) -> str:

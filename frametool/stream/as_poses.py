@@ -1,6 +1,6 @@
 """Streams whose results come out in another form than theirs: rows of tables and listed poses, block by block.
 
-    rows or listed poses -> the operation -> blocks of poses -> the text of the other form
+rows or listed poses -> the operation -> blocks of poses -> the text of the other form
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
-    from typing import BinaryIO
+    from io import BufferedReader
 
     from frametool.formats.trajectory import PoseBlock, Poses
     from frametool.grammar.edges import Answers
@@ -67,7 +67,7 @@ class OtherForm:
         self.request = request._replace(whole=True, notations=(QUATERNION,), keep_sign=True)
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
 
-    def outcomes(self, stream: BinaryIO, *, header: bool = True) -> Generator[Outcome]:
+    def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
         writer: PoseWriter | PointWriter | None = None
         for step in self._listed(stream) if self.module else self._rows(stream, header=header):
@@ -101,7 +101,7 @@ class OtherForm:
 
     # --- tables ---
 
-    def _rows(self, stream: BinaryIO, *, header: bool) -> Iterator[Step]:
+    def _rows(self, stream: BufferedReader, *, header: bool) -> Iterator[Step]:
         """Yield the rows of a table."""
         form = FORMS.get(self.form, TABLE)
         request = self._turned(form)
@@ -146,7 +146,7 @@ class OtherForm:
 
     # --- forms that list poses ---
 
-    def _listed(self, stream: BinaryIO) -> Iterator[Step]:
+    def _listed(self, stream: BufferedReader) -> Iterator[Step]:
         """Yield the poses of a form whose lines are no table."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
         form: Poses = self.module.form_of(file) if hasattr(self.module, "form_of") else self.module.POSES

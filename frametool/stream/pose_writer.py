@@ -18,7 +18,7 @@ from frametool.documents.json_writer import Verbatim, dump
 from frametool.errors import ValueInvalid
 from frametool.formats import FORMATS
 from frametool.formats.pose_rows import IMAGE, Lost, Numbers, RowForm, field, image_name, is_turned, turned
-from frametool.frames.stamps import BILLION, format_stamp
+from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
@@ -102,16 +102,16 @@ class PoseWriter:
 
     def _canonical(self, block: RowPoses) -> Components:
         """Return position and quaternion of a block, with the sign that is written."""
-        columns = self._own(block.numbers.T)
-        unit = quaternion.unit(*columns[3:7], arrays)
-        return (*columns[:3], *(unit if self.style.keep_sign else quaternion.from_quaternion(*unit, arrays)))
+        tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
+        unit = quaternion.unit(x, y, z, w, arrays)
+        return (tx, ty, tz, *(unit if self.style.keep_sign else quaternion.from_quaternion(*unit, arrays)))
 
     def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
         """Put the rows of a block together."""
         after = bytearray()
         for piece in form.row:
             if isinstance(piece, Numbers):
-                after += (piece.between[:1] or b",") * piece.count
+                after += (piece.between[:1] or b",") * piece.size
         if not np.isfinite(values).all():
             raise ValueInvalid("a result is too large for a double")
         numbers = number_spans(
@@ -124,7 +124,7 @@ class PoseWriter:
                 parts.append(_constant(piece, size))
             elif isinstance(piece, Numbers):
                 parts += _numbers(numbers, first, piece)
-                first += piece.count
+                first += piece.size
             else:
                 parts.append(self._field(piece, block, form.first))
         text = join(parts)
@@ -170,7 +170,7 @@ class PoseWriter:
             self._learn(block)
             if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
                 self.rows = None
-        columns = self._own(block.numbers.T)
+        columns = self._own(tuple(block.numbers.T))
         locked = self.target.locked(columns[:7])
         if self.rows is None or (locked is not None and bool(np.any(locked))):
             return self._one_by_one(block)
@@ -183,7 +183,7 @@ class PoseWriter:
 
     def _filled(self, rows: RowForm, block: RowPoses) -> bytes:
         """Fill the numbers of a block into the rows that were learned."""
-        written = self.target.written(self._own(block.numbers.T), arrays)
+        written = self.target.written(self._own(tuple(block.numbers.T)), arrays)
         values = np.empty((len(block.numbers), len(self.order)))
         for at, place in enumerate(self.order):
             values[:, at] = written[place]
@@ -261,7 +261,8 @@ def block_of(results: Sequence[Result]) -> RowPoses:
         raise ValueInvalid("a trajectory holds poses; a point has no rotation")
     stamps = [result.extras.get("stamp_ns") for result in results]
     others = {name for result in results for name in result.extras} - {"stamp_ns"}
-    blank = spans_of([b""] * len(results))
+    images = [str(result.extras.get(IMAGE, "")).encode() for result in results]
+    blank = [b""] * len(results)
     names = {(result.pose.parent, result.pose.name) for result in results}
     parent, name = next(iter(names))
     return RowPoses(
@@ -270,10 +271,7 @@ def block_of(results: Sequence[Result]) -> RowPoses:
         np.arange(len(results)),
         [parent],
         [name],
-        {
-            each: spans_of([str(result.extras.get(each, "")).encode() for result in results]) if each == IMAGE else blank
-            for each in sorted(others)
-        },
+        {each: spans_of(images if each == IMAGE else blank) for each in sorted(others)},
     )
 
 
@@ -306,7 +304,7 @@ def _constant(text: bytes, size: int) -> Spans:
 
 def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
     """Return the spans of neighbouring numbers, with what stands between them."""
-    last = first + piece.count
+    last = first + piece.size
     ends = numbers.ends[:, first:last].copy()
     if len(piece.between) == 1:
         ends[:, -1] -= 1

@@ -1,20 +1,19 @@
 """Tables as frames that move: every row a pose at its time, read in bulk. Trajectories (TUM, EuRoC, KITTI), CSV.
 
-    stamp,x,y,z,qx,qy,qz,qw                      frames as --frames says, `world` and `body` if it does not
-    stamp_ns,parent,name,x,y,yaw_deg             each row names its frames
-    parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that stand still
+stamp,x,y,z,qx,qy,qz,qw                      frames as --frames says, `world` and `body` if it does not
+stamp_ns,parent,name,x,y,yaw_deg             each row names its frames
+parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that stand still
 """
 
 from __future__ import annotations
 
 from itertools import chain, groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from frametool.errors import FormatError
-from frametool.formats.pose_rows import HALF_TURN
+from frametool.formats.pose_rows import with_axes_turned
 from frametool.formats.trajectory import Poses, StampFile, describe
 from frametool.frames.stamps import BILLION
-from frametool.geometry import rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
 from frametool.stream.faults import BadRow
@@ -26,8 +25,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.input_file import InputFile
+    from frametool.geometry.types import Components
     from frametool.grammar.edges import Options
     from frametool.stream.table_poses import RowPoses
+    from frametool.text.lines import ByteStream
 
 FORMS = {
     "tum": Poses("xyzw", counted=""),
@@ -44,7 +45,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     """
     form = FORMS.get(file.form, TABLE)
     request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)
-    begun = begin_table(file.stream, file.form, request, source=file.name)
+    begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
     rows = TablePoses(begun, file.form, request, file.name)
     _check(rows, form, file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
@@ -63,7 +64,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
 def _check(rows: TablePoses, form: Poses, file: InputFile, options: Options) -> None:
     """Refuse a table that is no poses, or poses without time and names."""
     if rows.shape.notation is None:
-        raise FormatError(f"no rotation among the columns {rows.columns}: points are no frames", source=file.name, line=1)
+        message = f"no rotation among the columns {rows.columns}: points are no frames"
+        raise FormatError(message, source=file.name, line=1)
     if rows.stamp_at is None and not form.counted and not options.answers.stamps and len(rows.roles) < 2:
         raise FormatError(
             f"no column of stamps among {rows.columns}; call it stamp or stamp_ns, or give --stamps FILE",
@@ -87,16 +89,16 @@ def _pieces(
     block: RowPoses, times: Sequence[int] | None, line: int, form: Poses, options: Options
 ) -> Iterator[Edge | Samples]:
     """Yield the poses of a block: as samples of one frame after the other, or as edges that stand still."""
-    columns = tuple(block.numbers.T)
+    columns: Components = tuple(block.numbers.T)
     if len(columns) == len("xyzw"):
         columns = (*[columns[0] * 0.0] * 3, *columns)
     if options.answers.camera_axes and form.axes and options.answers.camera_axes != form.axes:
-        columns = rigid.compose(*columns, *HALF_TURN)
+        columns = with_axes_turned(columns)
     poses = list(zip(*(column.tolist() for column in columns), strict=True))
     lines = (block.lines + line).tolist()
     world, body = options.answers.names(*form.frames)
     count = len(poses)
-    parents, names = ([each or other for each in _spread(given, count)] for given, other in ((block.parents, world), (block.names, body)))
+    parents, names = _spread(block.parents, count, world), _spread(block.names, count, body)
     for (parent, name), group in groupby(range(count), key=lambda at: (parents[at], names[at])):
         some = list(group)
         part = slice(some[0], some[-1] + 1)
@@ -108,8 +110,10 @@ def _pieces(
         options.tally.axes[body] = options.answers.camera_axes or form.axes
 
 
-def _spread(names: Sequence[str | None], count: int) -> Sequence[str | None]:
-    return names if len(names) == count else list(names) * count
+def _spread(names: Sequence[str | None], count: int, otherwise: str) -> list[str]:
+    """Return a name for each row."""
+    given = [name or otherwise for name in names]
+    return given if len(given) == count else given * count
 
 
 def _tell(rows: TablePoses, form: Poses, options: Options, count: int) -> None:

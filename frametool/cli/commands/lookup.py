@@ -55,8 +55,8 @@ def command(
     TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. --deg is about the angles of
     the result; the tree's own are what its file says. Between two samples of a moving frame positions are interpolated
     along the line and rotations by slerp, edge by edge, as tf2 does; nothing is extrapolated. With --times, --on-error
-    is stop (the default) or skip: times without data are left out; null is for tables. In the form of a trajectory (tum,
-    euroc, kitti, colmap, nerf, g2o, open3d) every sample of the way is printed unless --at or --times says otherwise.
+    is stop (the default) or skip: times without data are left out; null is for tables. In the form of a trajectory
+    (tum, euroc, kitti, colmap, nerf, g2o, open3d) every sample of the way is printed, without --at and --times.
     """
     by_row, stream = RowFrames(options), Stream(options)
     output = Output("poses", **options)
