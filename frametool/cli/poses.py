@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from frametool.cli.pasted_input import INLINE, is_inline, is_pasted, rewritten
 from frametool.documents.source import Source, read_text
-from frametool.errors import FormatError, ValueInvalid, warn
+from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.grammar.pose import Pose
+from frametool.grammar.pose_algebra import inverse
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
 from frametool.grammar.rotation import read_spelled, rotation_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
@@ -22,12 +24,8 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Result
     from frametool.stream.request import Request
 
-INLINE = "argument"
-
-
-def is_inline(text: str) -> bool:
-    """Tell a mapping or list written on the command line from a file's name."""
-    return text.startswith(("{", "["))
+INVERSE = "inv"
+ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
 
 
 def source_of(argument: str | Source) -> Source:
@@ -43,19 +41,37 @@ def source_of(argument: str | Source) -> Source:
     return Source("stdin", read_text("-"))
 
 
-def poses_from(argument: str | Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
-    """Read the poses of one argument: inline, `-` for standard input, or a file."""
+def pose_source(
+    argument: str | Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
+) -> Source:
+    """Take an argument as text of the grammar of poses: what was pasted is rewritten, else as `source_of`.
+
+    points: three numbers are a point.
+    """
+    if not isinstance(argument, Source) and is_pasted(argument, given):
+        argument = Source(INLINE, argument)
+    source = source_of(argument)
+    return rewritten(source, given, normalize=normalize, points=points) or source
+
+
+def poses_from(
+    argument: str | Source, given: Notation | None = None, *, degrees: bool = False, normalize: bool = False
+) -> list[Pose]:
+    """Read the poses of one argument: inline, `-` for standard input, or a file.
+
+    given: the notation of numbers that do not say theirs.
+    """
     from frametool.stream.record_values import read_poses
 
     try:
-        return read_poses(source_of(argument), degrees=degrees, normalize=normalize)
+        return read_poses(pose_source(argument, given, normalize=normalize), degrees=degrees, normalize=normalize)
     except FormatError as error:
         raise usage_if_inline(error) from None
 
 
 def write_results(argument: str, stream: Stream, request: Request, output: Output) -> int:
     """Write the results of the records of one argument: inline, a file, or the stream of the command."""
-    if stream.is_wanted(argument):
+    if stream.is_wanted(argument) or (not is_pasted(argument, request.given) and stream.takes_rows(argument)):
         return stream.run(request, output)
     output.values(values_of([argument], request, output))
     return 0
@@ -68,7 +84,9 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
     request = request._replace(notations=request.notations or output.notations)
     for argument in arguments:
         try:
-            yield from results(source_of(argument), request, output.style)
+            points = request.operation.moves
+            source = pose_source(argument, request.given, normalize=request.normalize, points=points)
+            yield from results(source, request, output.style)
         except FormatError as error:
             raise usage_if_inline(error) from None
 
@@ -80,11 +98,56 @@ def usage_if_inline(error: FormatError) -> FormatError:
     return error
 
 
-def combinations(arguments: Sequence[str | Source], *, degrees: bool, normalize: bool) -> list[tuple[Pose, ...]]:
+class Factor(NamedTuple):
+    """An argument of a product, and whether its inverse is meant."""
+
+    argument: str
+    is_inverse: bool = False
+
+    def of(self, pose: Pose) -> Pose:
+        """Return a pose of the argument, or its inverse."""
+        return inverse(pose) if self.is_inverse else pose
+
+
+def factors_of(arguments: Iterable[str]) -> list[Factor]:
+    """Read `inv(POSE)`, `~POSE`, and the word `inv` before one; twice is not at all."""
+    factors, is_inverse = [], False
+    for argument in arguments:
+        if argument == INVERSE:
+            is_inverse = not is_inverse
+            continue
+        factors.append(_factor(argument, is_inverse=is_inverse))
+        is_inverse = False
+    if is_inverse:
+        raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it")
+    return factors
+
+
+def _factor(text: str, *, is_inverse: bool) -> Factor:
+    bare = text.strip()
+    while True:
+        if bare.startswith("~") and len(bare) > 1:
+            bare = bare[1:].strip()
+        elif bare.startswith(f"{INVERSE}(") and bare.endswith(")"):
+            bare = bare[len(INVERSE) + 1 : -1].strip()
+        else:
+            return Factor(bare if bare != text.strip() else text, is_inverse)
+        if not bare:
+            raise click.UsageError(f"{shown(text)}: there is no pose whose inverse is meant")
+        is_inverse = not is_inverse
+
+
+def combinations(
+    arguments: Sequence[str | Source | Factor], given: Notation | None = None, *, degrees: bool, normalize: bool
+) -> list[tuple[Pose, ...]]:
     """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
+    factors = [each if isinstance(each, Factor) else Factor(each) for each in arguments]  # type: ignore[arg-type]
+    arguments = [each.argument for each in factors]
     if list(arguments).count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
-    read = [poses_from(each, degrees=degrees, normalize=normalize) for each in arguments]
+    read = [
+        list(map(each.of, poses_from(each.argument, given, degrees=degrees, normalize=normalize))) for each in factors
+    ]
     several = [index for index, poses in enumerate(read) if len(poses) > 1]
     if len(several) > 1:
         counts = " and ".join(f"{arguments[index]} ({len(read[index])})" for index in several)
@@ -93,9 +156,9 @@ def combinations(arguments: Sequence[str | Source], *, degrees: bool, normalize:
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 
 
-def one_pose(argument: str, *, degrees: bool, normalize: bool) -> Pose:
+def one_pose(argument: str, given: Notation | None = None, *, degrees: bool, normalize: bool) -> Pose:
     """Read the one pose of an argument."""
-    poses = poses_from(argument, degrees=degrees, normalize=normalize)
+    poses = poses_from(argument, given, degrees=degrees, normalize=normalize)
     if len(poses) != 1:
         raise click.UsageError(f"one pose is wanted here, {argument} holds {len(poses)}")
     return poses[0]
@@ -113,6 +176,8 @@ def pose_from_numbers(
     Raises click.UsageError for what is no such list of numbers, ValueInvalid for what is no rotation.
     """
     form = _form_of(texts, given)
+    if form.representation.whole and len(texts) == ROWS_OF_A_POSE:
+        return _pose_of_rows(texts, form, told=bool(given), normalize=normalize)
     size = len(form.representation.columns)
     reading = Reading(Source(INLINE, ""), degrees=degrees, normalize=normalize)
     try:
@@ -132,6 +197,23 @@ def pose_from_numbers(
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
+def _pose_of_rows(texts: Sequence[str], form: Notation, *, told: bool, normalize: bool) -> Pose:
+    """Read the rows of a 3x4 pose one after the other."""
+    from frametool.grammar.pasted import matrix_pose
+    from frametool.grammar.pose import read_pose
+
+    reading = Reading(Source(INLINE, ""), normalize=normalize)
+    try:
+        pose = read_pose(matrix_pose([list(texts)], form, told=told) or {}, reading)
+    except NotARotation:
+        raise
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+    for note in reading.notes:
+        warn(note.message)
+    return pose
+
+
 def _form_of(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Notation:
     """Settle what bare numbers are; only a matrix is known by their count."""
     from frametool.geometry.representations import REPRESENTATIONS, notation
@@ -140,7 +222,7 @@ def _form_of(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Notati
         return given[0]
     if given:
         raise click.UsageError("--from takes one representation")
-    if len(texts) in (9, 16):
+    if len(texts) in (9, ROWS_OF_A_POSE, 16):
         return notation("matrix")
     choices = ", ".join(REPRESENTATIONS)
     raise click.UsageError(f"{len(texts)} numbers do not say what they are; add --from with one of {choices}")

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from typing import TypeVar
 
     from frametool.cli.output import Output
+    from frametool.documents.source import Source
     from frametool.stream.request import Request
     from frametool.stream.run import Outcome
 
@@ -45,36 +46,36 @@ RECORDS = readers("records")
 TABLES = ("tum", "euroc", "kitti")  # trajectories whose lines are rows
 OPTIONS = {
     "input_path": click.option(
-        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream from this file instead of standard input"
+        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
     ),
     "given": click.option(
         "--from", "given", type=Notations(), metavar="REP",
-        help="what the rotations of VALUES or of a stream's columns are",
+        help="what unnamed numbers are",
     ),
     "columns": click.option(
         "--columns", type=TEXT, metavar="NAME,..", multiple=True,
         help="our columns, by name or number; once for each pose",
     ),
-    "keep": click.option("--keep", is_flag=True, help="add the result's columns instead of replacing ours"),
+    "keep": click.option("--keep", is_flag=True, help="add the result's columns, leave ours"),
     "prefix": click.option(
-        "--prefix", type=UTF8, default="", metavar="TEXT", help="put this before the names of the result's columns"
+        "--prefix", type=UTF8, default="", metavar="TEXT", help="begin the names of the result's columns so"
     ),
     "header": click.option(
         "--no-header", "header", is_flag=True, flag_value=False, default=True,
         help="a table without names; columns are numbered",
     ),
     "on_error": click.option(
-        "--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="how to treat bad rows"
+        "--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="bad rows"
     ),
     "max_errors": click.option(
         "--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N",
-        help="report at most N bad rows; all are counted",
+        help="report at most N bad rows, count all",
     ),
     "jobs": click.option(
         "--jobs", type=click.IntRange(1, MOST_JOBS), default=1, show_default=True, metavar="N",
         help="processes for a large stream",
     ),
-    "quiet": click.option("--quiet", is_flag=True, help="no progress on stderr"),
+    "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
 }  # fmt: skip
 
 
@@ -112,6 +113,13 @@ class Stream:
             raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
         return self.path is not None or argument in (None, "-")
 
+    def takes_rows(self, path: str) -> bool:
+        """Stream a file that an argument names if it is a table; one of records, or none known, is not touched."""
+        if path == "-" or (self.told_form() or _form_of(path)) in ("", *RECORDS):
+            return False
+        self.path = path
+        return True
+
     @staticmethod
     def told_form() -> str:
         """Return the form that --in names for the stream, "" if it names none."""
@@ -129,9 +137,14 @@ class Stream:
     ) -> int:
         """Run the stream and return its exit status."""
         name = self.path or "stdin"
-        with self.opened() as stream:
-            begin = stream.peek()
+        with self.opened() as given:
+            stream = given
             form, known_by = self.told_form(), ""
+            if not (form or tables_only or self._says_columns()):
+                pasted, stream = self._pasted(stream, name, request)
+                if pasted is not None:
+                    return self._run_pasted(pasted, request, output)
+            begin = stream.peek()
             if not form:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
@@ -164,6 +177,26 @@ class Stream:
             say(f"{name}: {FORMATS[form].summary}{', ' if about else ''}{about}; {states}")
         return status
 
+    def _says_columns(self) -> bool:
+        """Tell whether an option says that the stream is a table."""
+        options = self.options
+        return bool(options["columns"] or options["keep"] or options["prefix"] or not options["header"])
+
+    def _pasted(self, stream: BufferedReader, name: str, request: Request) -> tuple[Source | None, BufferedReader]:
+        """Look for what was pasted; the stream is then another, with the same in it."""
+        from frametool.cli.pasted_input import pasted_stream
+
+        return pasted_stream(stream, name, request._replace(given=request.given or self.given))
+
+    @staticmethod
+    def _run_pasted(source: Source, request: Request, output: Output) -> int:
+        """Write the results of a text that was pasted."""
+        from frametool.stream.record_values import results
+
+        request = request._replace(notations=request.notations or output.notations)
+        output.values(results(source, request, output.style))
+        return 0
+
     def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of records in another form than theirs."""
         from frametool.stream.record_values import stream_results
@@ -179,7 +212,8 @@ class Stream:
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
         options = self.options
-        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or options["prefix"])):
+        prefix = options["prefix"] and not request.operation.only_adds
+        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or prefix)):
             raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
         return request._replace(
             given=request.given or self.given,
@@ -234,6 +268,15 @@ def _opened(path: str | None) -> BufferedReader:
         return BufferedReader(FileIO(path), HEAD)
     except OSError as error:
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def _form_of(path: str) -> str:
+    """Return the form of a file by what is in it; "" where nothing tells, or it cannot be read."""
+    try:
+        with open(path, "rb") as file:
+            return detect(file.read(HEAD), *STREAMED, name=path)[0]
+    except (OSError, ValueError):
+        return ""
 
 
 def one_notation(given: Any) -> Any:

@@ -97,6 +97,11 @@ class Assembly:
         self._whole: dict[str, list[PlacedSamples]] = {}  # child -> samples that were taken in one piece
         self.axes: dict[str, str] = {}  # frame -> the axes of the camera it is
 
+    @property
+    def places(self) -> dict[str, Place]:
+        """Return where each frame that has a parent was first said to hang from it."""
+        return {child: place for child, (_, _, place) in self._first.items()}
+
     def add_root(self, frame: str) -> None:
         """Make a frame known that has no parent (yet)."""
         (self.tree if self.buffer is None else self.buffer).add_root(self._kept(frame))

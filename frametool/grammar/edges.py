@@ -101,7 +101,9 @@ class Remark(NamedTuple):
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
-    __slots__ = ("about", "axes", "names", "noise", "notes", "others", "projected", "rough")
+    __slots__ = (
+        "about", "axes", "has_joints", "names", "noise", "notes", "others", "projected", "rough", "unknown_joints",
+    )  # fmt: skip
 
     def __init__(self) -> None:
         """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic.
@@ -109,9 +111,13 @@ class Tally:
         about: what this file holds and what was taken for granted, told beside what its form means
         axes: frame -> the axes of the camera it is, `optical` or `opengl`
         projected: how far the worst matrix was from a rotation, in forms that round them
+        has_joints: whether values of joints are about this file; unknown_joints: those told of that it does not have,
+        each with the error that says so, for another file may have them
         """
         self.about = ""
         self.axes: dict[str, str] = {}
+        self.has_joints = False
+        self.unknown_joints: dict[str, FormatError] = {}
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
         self.projected = 0.0
@@ -124,7 +130,15 @@ class Tally:
         if note.rule == "rounded":
             self.rough.append(line)
         else:
-            self.notes.setdefault(note.message, Remark(line, note.message, note.rule))
+            self.remark(line, note.message, note.rule)
+
+    def remark(self, line: int, message: str, rule: str = "odd") -> None:
+        """Keep a sentence about one place."""
+        self.notes.setdefault(message, Remark(line, message, rule))
+
+    def note_each(self, message: str, line: int, rule: str = "odd") -> None:
+        """Keep a sentence about one line, also where it was said of other lines."""
+        self.notes.setdefault(f"{line}: {message}", Remark(line, message, rule))
 
     def told(self) -> Iterator[Remark]:
         """Yield one sentence for each kind of oddity."""

@@ -23,13 +23,13 @@ from frametool.stream.blocks import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Misused
 from frametool.stream.point_writer import PointWriter
 from frametool.stream.pose_writer import PoseWriter, kept, spans_of
-from frametool.stream.row_layout import POSE, Shape, Target
+from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, RowNote, notes_of
 from frametool.stream.table_names import rename_of
 from frametool.stream.table_poses import RowPoses, TablePoses
 from frametool.stream.table_samples import FORMS, TABLE
-from frametool.stream.table_stream import DELIMITERS, begin_table, moves_in_time, stamps_unasked
+from frametool.stream.table_stream import DELIMITERS, begin_table, moves_in_time, settle_stamps
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class OtherForm:
 
     def __init__(self, form: str, request: Request, style: Style, source: str, answers: Answers) -> None:
         """Take what is asked for; raises Misused for what only a table can hold."""
-        if request.keep or request.prefix or request.on_error == NULL:
+        if request.keep or (request.prefix and request.operation.formula is None) or request.on_error == NULL:
             raise Misused("--keep, --prefix and --on-error null are for tables that stay in their form")
         self.form = form
         self.source = source
@@ -85,9 +85,13 @@ class OtherForm:
             warn(f"{self.source}:{told.line}: {told.message}")
 
     def _writer(self) -> PoseWriter | PointWriter:
-        if self.shape.kind != POSE:
-            return PointWriter(self.style, self.shape.kind)
-        return PoseWriter(self.style, self.request.operation.extras, placed=self.placed)
+        """Choose what writes the results, by what they are."""
+        operation = self.request.operation
+        kind = operation.result_kind(self.shape.kind)
+        extras = [self.request.prefix + name for name in operation.extras(self.shape.kind)]
+        if operation.only_adds or kind not in (POSE, POINT, VECTOR) or (extras and kind != POSE):
+            raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
+        return PointWriter(self.style, kind) if kind != POSE else PoseWriter(self.style, extras, placed=self.placed)
 
     def _turned(self, form: Poses) -> Request:
         """Return the request with the axes of cameras turned if that was asked for; keep what they then are."""
@@ -106,9 +110,7 @@ class OtherForm:
         form = FORMS.get(self.form, TABLE)
         request = self._turned(form)
         begun = begin_table(stream, self.form, request, source=self.source, header=header)
-        unasked = None
-        if request.timed is not None and not request.timed.name:
-            unasked, request = stamps_unasked(begun.table, request.timed), request._replace(timed=None)
+        request, unasked = settle_stamps(begun.table, request, self.source)
         rows = TablePoses(begun, self.form, request, self.source)
         self.shape = rows.shape
         if rows.shape.kind == POSE and rows.shape.notation is None and request.operation.keeps_position:

@@ -24,6 +24,7 @@ from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, 
 from frametool.stream.request import Request
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
+from frametool.stream.stamp_source import key_path, read_stamp, stamp_keys
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -115,13 +116,18 @@ def _unit(record: Record, document: Any) -> Path:
 
 def _answer(record: Record, request: Request, source: Source) -> Answer:
     """Apply the operation to one record."""
+    request = request.for_kind(record.shape.kind)
     try:
         parent, name = record.parent.text, record.name.text
         if request.rename is not None:
             if lost := lost_name(record, request):
                 warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
             parent, name = request.rename(parent, name)
-        parts, _ = moved(record, _edge(record, request, source), record.values, request)
+        if request.operation.formula is not None:
+            at_ns = _asked_time(record, request, source)
+            parts, _ = moved(record, None, record.values, request, at_ns)
+        else:
+            parts, _ = moved(record, _edge(record, request, source), record.values, request)
     except ValueInvalid as error:
         raise placed(Misfit(str(error), record.path), source) from error
     return Answer(record, parts, parent, name)
@@ -133,6 +139,20 @@ def _edge(record: Record, request: Request, source: Source) -> Rigid | None:
     if timed is not None and record.stamp and timed.moves(record.parent.text):
         return timed.pose(record.parent.text, _stamp_ns(record, source))
     return None if request.way is None else request.way(record.parent.text)
+
+
+def _asked_time(record: Record, request: Request, source: Source) -> int | None:
+    """Return the time of a record where an expression looks up at it."""
+    timed = request.timed
+    if timed is None:
+        return None
+    if record.stamp and not timed.name:
+        return _stamp_ns(record, source)
+    document = next(each for each in parse_documents(source.text, source.name) if each.index == record.path[0])
+    path = record.path[1:]
+    found = key_path(document.value, path, timed.name) if timed.name else stamp_keys(document.value, path)
+    key = timed.name or str(found[-1])
+    return read_stamp(value_at(document.value, found), in_ns=timed._replace(name=key).in_ns)
 
 
 def _stamp_ns(record: Record, source: Source) -> int:
@@ -153,7 +173,9 @@ def _values(
         return
     for answer in answers:
         record = answer.record
-        if record.shape.kind == POSE:
+        if request.operation.formula is not None:
+            yield _formula_result(node, unit, answer, request)
+        elif record.shape.kind == POSE:
             made = _pose_result(node, unit, answer, request)
             if is_trajectory(style.form):
                 _keep_stamp(made, node, unit, record, source)
@@ -179,6 +201,22 @@ def _keep_stamp(result: Result, node: Node, unit: Path, record: Record, source: 
         raise placed(Misfit(str(error), record.path), source) from None
 
 
+def _formula_result(node: Node, unit: Path, answer: Answer, request: Request) -> Value:
+    """Return what an expression made of a record, with what else the record says."""
+    shape, operation = answer.record.shape, request.operation
+    kind = operation.result_kind(shape.kind)
+    names = [request.prefix + name for name in operation.extras(shape.kind)]
+    extras: dict[str, Any] = dict(zip(names, answer.parts[len(answer.parts) - len(names) :], strict=True))
+    if operation.only_adds:
+        return plain(node) | extras if type(node.value) is dict else extras
+    rest = _rest(node, unit, answer.record)
+    if kind == POSE:
+        return Result(Pose.of(answer.parts[:7], answer.name, answer.parent), extras | rest)
+    seen_from = "frame" if kind or shape.kind != POSE else "parent"
+    named = {key: name for key, name in (("name", answer.name), (seen_from, answer.parent)) if name is not None}
+    return named | ({kind: list(answer.parts[:3])} if kind else {}) | extras | rest
+
+
 def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Result:
     """Return a pose with its frames and what else its record says."""
     shape = answer.record.shape
@@ -190,7 +228,7 @@ def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Re
         pose = pose._replace(
             position=pose.position if has_position else None, rotation=pose.rotation if has_rotation else None
         )
-    extras: dict[str, Any] = dict(zip(request.operation.extras, answer.parts[7:], strict=False))
+    extras: dict[str, Any] = dict(zip(request.operation.extras(POSE), answer.parts[7:], strict=False))
     return Result(pose, extras | _rest(node, unit, answer.record))
 
 

@@ -67,8 +67,9 @@ class TablePoses:
         self.form = form
         self.plan, layout = plan_table(self.table, request._replace(whole=True), source)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
-        self.naming = Naming(self.table, layout, request)
-        rename = rename_of(request)
+        named = request.for_kind(self.shape.kind)
+        self.naming = Naming(self.table, layout, named)
+        rename = rename_of(named)
         self.unnamed = (None, None) if rename is None else rename(None, None)
         self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
         self.stamp_at = layout.time if layout.time is not None else stamp_column(self.table.names)

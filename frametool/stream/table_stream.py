@@ -6,9 +6,9 @@ from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, FrametoolError
+from frametool.errors import FormatError, FrametoolError, listing
 from frametool.stream.blocks import Run, State
-from frametool.stream.faults import NULL, Fault
+from frametool.stream.faults import NULL, Fault, Misused
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, RowNote, mapped, notes_of
 from frametool.stream.table import UNCLOSED, open_table, table_block
@@ -44,12 +44,11 @@ def run_table(
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
     table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header, size=size)
-    unasked = None
-    if request.timed is not None and not request.timed.name:  # rows have no header
-        unasked, request = stamps_unasked(table, request.timed), request._replace(timed=None)
+    request, unasked = settle_stamps(table, request, source)
     plan, layout = plan_table(table, request, source)
     yield Outcome(table.opening(layout), lines=lines, size=taken)
-    work = TableWork(table, plan, layout, Naming(table, layout, request), unasked)
+    named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
+    work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
     yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
 
 
@@ -96,10 +95,27 @@ def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
     return text or None
 
 
-def stamps_unasked(table: Table, timed: Timed) -> Timed | None:
-    """Find a column of stamps that no option names."""
+def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request, Timed | None]:
+    """Find the column of stamps that a request needs; or, where no option names one, the one nobody asked for."""
+    timed = request.timed
+    if timed is None:
+        return request, None
+    if request.operation.formula is not None:
+        name = timed.name or _stamp_column(table, source)
+        return request._replace(timed=timed._replace(name=name)), None
+    if timed.name:
+        return request, None
+    name = next(filter(STAMPS.fullmatch, table.names or ()), "")  # rows have no header
+    return request._replace(timed=None), timed._replace(name=name) if name else None
+
+
+def _stamp_column(table: Table, source: str) -> str:
+    """Name the column of stamps that an expression asks for; raises Misused where none looks so."""
     name = next(filter(STAMPS.fullmatch, table.names or ()), None)
-    return None if name is None else timed._replace(name=name)
+    if name is None:
+        known = f"; columns: {listing(table.names)}" if table.names else ""
+        raise Misused(f"@ row: no column looks like stamps; name it with --time-column{known}", source=source, line=1)
+    return name
 
 
 class TableWork:

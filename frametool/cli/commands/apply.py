@@ -8,7 +8,8 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, one_pose, values_of
+from frametool.cli.pasted_input import is_inline, is_pasted
+from frametool.cli.poses import one_pose, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
@@ -29,7 +30,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 
 @click.command(cls=Command, name="apply")
 @click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
-@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
+@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose, not by a lookup")
 @click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
@@ -40,16 +41,16 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
     "frame_column",
     type=TEXT,
     metavar="NAME",
-    help="without SOURCE, the column that names each row's frame",
+    help="column with each row's frame, without SOURCE",
 )
 @click.option(
     "--time-column",
     "time_column",
     type=TEXT,
     metavar="NAME",
-    help="move each row at its own time: the column or key of its stamp, seconds; nanoseconds where it ends in _ns",
+    help="column or key of each row's own time",
 )
-@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest; messages: their own]")
+@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
 @reading_options(streams=True)
 @stream_options
@@ -74,24 +75,12 @@ def command(
       frametool apply robot.yaml map camera_optical 0 0 1
       frametool apply --transform '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' 1 0 0
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
+      ros2 topic echo /clicked_point | frametool apply tf.txt map
 
     A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
     each record says its own frame; without records standard input is read.
 
-    \b
-      ros2 topic echo /clicked_point | frametool apply tf.txt map
-
-    Records may be ROS messages, as the echo tools print them or as JSON lines: PointStamped, Vector3Stamped,
-    PoseStamped, PoseWithCovarianceStamped, WrenchStamped, TwistStamped, TransformStamped. Frame and stamp are those
-    of each header; the stamp and all other fields stay. Each 3x3 block C of a pose's covariance becomes R C R^T. A
-    wrench is that about TARGET's origin: force R f, torque R m + t x R f. A twist is the velocity of the same rigid
-    body at TARGET's origin: angular R w, linear R v + t x R w.
-
-    \b
-      printf 'stamp,x,y,z\\n0.5,1,0,0\\n2,1,0,0\\n' | frametool apply examples/drive.yaml map lidar --time-column stamp
-
-    Stamps are decimal seconds (12.5) or nanoseconds (12500000000ns, or a name like stamp_ns), exact to the nanosecond.
-    A row at a time without data is a bad row, as --on-error says.
+    Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
     """
     stream = Stream(options)
     output = Output("points", "trajectory", deg=deg, **options)
@@ -100,7 +89,7 @@ def command(
     elif time_column is not None or at is not None:
         raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
-        way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
+        way, rest = _way_by_pose(one_pose(pose, stream.given, degrees=deg, normalize=normalize)), arguments
     if time_column is not None:
         _check_timed(rest, at)
     request = way.request(frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
@@ -226,14 +215,19 @@ def _settled(own: str | None, source: str | None) -> str | None:
 
 def _is_record(argument: str) -> bool:
     """Tell a record from a frame's name."""
-    return argument == "-" or is_inline(argument)
+    return argument == "-" or is_inline(argument) or "\n" in argument
+
+
+def _begins_number(argument: str) -> bool:
+    """Tell what is meant for one number of a point."""
+    return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
 def _sources(arguments: Sequence[str], kind: str | None) -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
     pending: list[str] = []
     for argument in (*arguments, ""):
-        if argument and not _is_record(argument):
+        if argument and not (_is_record(argument) or (not _begins_number(argument) and is_pasted(argument))):
             pending.append(argument)
             continue
         for x, y, z in _threes(pending, kind):

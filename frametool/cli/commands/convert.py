@@ -9,7 +9,8 @@ import click
 
 from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, pose_from_numbers, values_of
+from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
+from frametool.cli.poses import pose_from_numbers, values_of
 from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
@@ -79,6 +80,7 @@ def command(
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
     poses; without any argument standard input is read.
     """
+    values = rejoined(values)
     stream = Stream(options)
     output = Output("poses", deg=deg, **options)
     from frametool.stream.operation import Operation
@@ -94,13 +96,16 @@ def command(
         notations=forms,
         unwrap=unwrap,
     )
+    is_numbers = _are_numbers(values, told=bool(given))
+    if len(values) == 1 and not (is_numbers or stream.path) and _is_table(values[0], stream):
+        values = ()
     if stream.path or values == ("-",) or not (values or (turn and not stream.has_input())):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
         return stream.run(request, output)
     if not values:
         results: list[Any] = [Result(Pose.of((0.0, 0.0, 0.0, *turn[0][3:]))._replace(position=None))]
-    elif not is_inline(values[0]) and (given or len(values) > 1):
+    elif is_numbers:
         pose = pose_from_numbers(values, given, degrees=deg, normalize=normalize)
         results = [Result(_turned(pose, turn))]
     else:
@@ -111,6 +116,22 @@ def command(
     output.values(results)
     output.tell_of_lock(poses)
     return 0
+
+
+def _are_numbers(values: Sequence[str], *, told: bool) -> bool:
+    """Tell bare numbers from mappings and files; one that is alone is a number where --from says of what."""
+    if len(values) != 1:
+        return bool(values) and not is_inline(values[0])
+    try:
+        parse_angle(values[0])
+    except ValueInvalid:
+        return False
+    return told
+
+
+def _is_table(value: str, stream: Stream) -> bool:
+    """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
+    return not is_pasted(value, stream.given) and stream.takes_rows(value)
 
 
 def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool) -> tuple[Notation, ...]:

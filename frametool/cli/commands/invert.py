@@ -35,6 +35,10 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
     from frametool.stream.request import Request
 
     request = Request(
-        Operation(inverse=True), degrees=deg, normalize=normalize, rename=lambda parent, name: (name, parent)
+        Operation(inverse=True),
+        given=stream.given,
+        degrees=deg,
+        normalize=normalize,
+        rename=lambda parent, name: (name, parent),
     )
     return write_results(pose, stream, request, output)

@@ -41,23 +41,25 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
     """
     stream = Stream(options)
     output = Output("poses", deg=deg, **options)
+    from frametool.stream.request import Request
+
     given = [each for each in (a, b) if each is not None]
     if consecutive and given not in ([], ["-"]):
         raise click.UsageError("--consecutive is about the rows of a stream; leave A and B out")
     if len(given) < 2 or "-" in given:
-        return stream.run(_request(a, b, consecutive=consecutive, degrees=deg, normalize=normalize), output)
+        request = Request(given=stream.given, degrees=deg, normalize=normalize)
+        return stream.run(_asked(a, b, request, consecutive=consecutive), output)
     if stream.path:
         raise click.UsageError("-i FILE is read where - stands for A or B")
-    output.poses([relative(*pair) for pair in combinations(given, degrees=deg, normalize=normalize)])
+    pairs = combinations(given, stream.given, degrees=deg, normalize=normalize)
+    output.poses([relative(*pair) for pair in pairs])
     return 0
 
 
-def _request(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, normalize: bool) -> Request:
+def _asked(a: str | None, b: str | None, plain: Request, *, consecutive: bool) -> Request:
     """Compare a stream's rows with a fixed A or B, with the row before, or with the row's own second pose."""
     from frametool.stream.operation import Operation
-    from frametool.stream.request import Request
 
-    plain = Request(degrees=degrees, normalize=normalize)
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
@@ -68,7 +70,7 @@ def _request(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, 
     if a == b == "-":
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     first = a != "-"
-    fixed = one_pose(str(a if first else b), degrees=degrees, normalize=normalize)
+    fixed = one_pose(str(a if first else b), plain.given, degrees=plain.degrees, normalize=plain.normalize)
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         own = Pose(name=name, parent=parent)
