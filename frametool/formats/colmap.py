@@ -44,6 +44,7 @@ ROWS = RowForm(
     first=1,
     axes="optical",
     holds=(),
+    beside="every camera is number 1, without points",
 )
 
 

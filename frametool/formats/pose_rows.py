@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: between optical axes and those of OpenGL
 LOSABLE = {"frames": "names of frames", "stamps": "stamps", "extras": "other columns"}
 IMAGE = "image"  # the extra that names a picture
+NUMBER = "number"  # the extra that says what a pose was counted as in the same form
 
 
 class Numbers(NamedTuple):
@@ -42,6 +43,7 @@ class RowForm(NamedTuple):
     head, between, tail: text before the first pose, between two, and behind the last
     axes: those of a camera, where the form states them
     holds: which of `frames`, `stamps`, `extras` are written
+    beside: what else a reader of the form finds in it, told whenever it is written
     """
 
     row: tuple[str | bytes | Numbers, ...]
@@ -52,6 +54,7 @@ class RowForm(NamedTuple):
     first: int = 0
     axes: str = ""
     holds: tuple[str, ...] = ("stamps",)
+    beside: str = ""
 
 
 def write_rows(form: RowForm, results: Iterable[Result], style: Style) -> str:
@@ -91,6 +94,7 @@ class Lost:
         """Warn of all that was left out or made up, in one line."""
         left = [words for what, words in LOSABLE.items() if what in self.found]
         said = [f"{', '.join(left)} left out"] if left else []
+        said += [self.form.beside] * bool(self.form.beside)
         said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
         said += ["pictures are named by their stamps"] * self.by_stamp
         if self.turned:

@@ -66,13 +66,14 @@ class PoseBlock(NamedTuple):
     """Poses of a thing in the world, checked.
 
     poses: tx, ty, tz, x, y, z, w, arrays of n; stamps_ns: int64 of n
-    lines: where each stands; images: the names of their pictures, "" for none
+    lines: where each stands; images: the names of their pictures, "" for none; numbers: what they are counted as
     """
 
     poses: Components
     stamps_ns: Any
     lines: Sequence[int]
     images: Sequence[str]
+    numbers: Sequence[int]
 
 
 def samples(rows: Iterator[Written], form: Poses, file: InputFile, options: Options) -> Iterator[Samples]:
@@ -145,7 +146,9 @@ def _block(some: Sequence[Written], good: Sequence[int], poses: Components, time
     if len(good) < len(some):
         poses, stamps = tuple(part[list(good)] for part in poses), stamps[list(good)]
         some = [some[at] for at in good]
-    return PoseBlock(poses, stamps, [row.line for row in some], [row.image for row in some])
+    return PoseBlock(
+        poses, stamps, [row.line for row in some], [row.image for row in some], [row.number for row in some]
+    )
 
 
 def _counted(row: Written, file: InputFile) -> int:

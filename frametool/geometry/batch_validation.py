@@ -46,9 +46,7 @@ def read_rotations(
     refused = np.flatnonzero(off == np.inf)
     reasons = {row: _reason(notation, [number[row] for number in numbers], normalize) for row in refused.tolist()}
     quaternions[:, refused] = np.reshape(IDENTITY, (4, 1))
-    finite = off < np.inf
-    worst = max(float(off[finite].max(initial=0.0)), min(worst, SILENT))
-    return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & finite), worst)
+    return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)), worst)
 
 
 def require_rotations(notation: Notation, given: Components, name: str, *, normalize: bool = False) -> Components:
@@ -98,7 +96,8 @@ def _repaired(
     refused = ~(off < np.inf) if normalize else ~(off <= TOLERATED)
     rough = np.flatnonzero((off > rule.exact) & ~refused)
     grades = None if worst <= SILENT else np.where(refused, np.inf, 0.0 if normalize else off)
-    return grades, _with_repaired(rule, block, rough) if rough.size else block, worst
+    kept = float(off[~refused].max(initial=0.0))
+    return grades, _with_repaired(rule, block, rough) if rough.size else block, kept
 
 
 def _with_repaired(rule: BatchRule, block: Components, rough: Indices) -> Components:

@@ -14,13 +14,13 @@ import numpy as np
 from frametool.documents.input_file import InputFile
 from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.formats import FORMATS
-from frametool.formats.pose_rows import HALF_TURN, IMAGE
-from frametool.formats.trajectory import StampFile, blocks
+from frametool.formats.pose_rows import HALF_TURN, IMAGE, NUMBER
+from frametool.formats.trajectory import StampFile, blocks, describe
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Options, Tally, Topics
+from frametool.grammar.edges import Options, Tally, Topics, stop
 from frametool.stream.blocks import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, Misused
+from frametool.stream.faults import NULL, STOP, Fault, Misused
 from frametool.stream.point_writer import PointWriter
 from frametool.stream.pose_writer import PoseWriter, kept, spans_of
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
@@ -136,6 +136,8 @@ class OtherForm:
             )
         if self.stamps:
             self.stamps.finish(count, self.source)
+        if self.form in FORMS:
+            describe(Options(self.tally, Topics(), answers=self.answers), form, count)
 
     def _stamps(self, poses: RowPoses, form: Poses, before: int) -> Any:
         """Return the stamps of poses: their own, those of a file, or their numbers as seconds."""
@@ -152,12 +154,14 @@ class OtherForm:
         """Yield the poses of a form whose lines are no table."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
         form: Poses = self.module.form_of(file) if hasattr(self.module, "form_of") else self.module.POSES
-        request = self._turned(form)
+        before, request = self.request, self._turned(form)
+        request = request._replace(operation=before.operation)  # the reader turns them
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
         self.placed, self.shape = True, Shape(POSE, 1.0, QUATERNION)
-        options = Options(self.tally, Topics(), normalize=request.normalize, answers=self.answers)
-        options = options._replace(answers=self.answers._replace(camera_axes=""))
+        faults: list[Fault] = []
+        report = stop if request.on_error == STOP else lambda error: faults.append(_fault(error))
+        options = Options(self.tally, Topics(), report, normalize=request.normalize, answers=self.answers)
         plan = _plan(request)
         state = State()
         rename = rename_of(request)
@@ -167,11 +171,19 @@ class OtherForm:
             run = Run(plan, block, state)
             good = run.rows.tolist()
             images = [each.images[row] for row in good]
-            poses = RowPoses(
-                run.results, each.stamps_ns[run.rows], np.array(each.lines, np.int64)[run.rows], [parent], [name],
-                {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {},
-            )  # fmt: skip
-            yield Step(poses, Outcome(b"", run.faults(), len(each.lines), 0, notes=notes_of(run, block)))
+            extras = {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {}
+            if self.form == self.style.form:
+                extras[NUMBER] = spans_of([b"%d" % each.numbers[row] for row in good])
+            lines = np.array(each.lines, np.int64)[run.rows]
+            poses = RowPoses(run.results, each.stamps_ns[run.rows], lines, [parent], [name], extras)
+            found = sorted(faults + run.faults())
+            yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
+            faults.clear()
+
+
+def _fault(error: FormatError) -> Fault:
+    """Make the fault of a pose that was refused; lines from 0."""
+    return Fault(max(error.line, 1) - 1, "", error.message)
 
 
 def _none() -> RowPoses:

@@ -17,7 +17,7 @@ from frametool.documents.json_reader import JSON_NUMBER
 from frametool.documents.json_writer import Verbatim, dump
 from frametool.errors import ValueInvalid
 from frametool.formats import FORMATS
-from frametool.formats.pose_rows import IMAGE, Lost, Numbers, RowForm, field, image_name, is_turned, turned
+from frametool.formats.pose_rows import IMAGE, NUMBER, Lost, Numbers, RowForm, field, image_name, is_turned, turned
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion
 from frametool.geometry.representations import notation
@@ -91,8 +91,8 @@ class PoseWriter:
             images = block.extras.get(IMAGE)
             lost.add(
                 frames=bool(there),
-                stamps=block.stamps_ns is not None,
-                extras=bool(self.extras or block.extras.keys() - {IMAGE}),
+                stamps=block.stamps_ns is not None and NUMBER not in block.extras,
+                extras=bool(self.extras or block.extras.keys() - {IMAGE, NUMBER}),
             )
             lost.counted |= "stamps" in form.holds and block.stamps_ns is None
             lost.by_stamp |= IMAGE in form.row and images is None
@@ -141,7 +141,9 @@ class PoseWriter:
             return spans_of([image_name(*each).encode() for each in zip(images, stamps, strict=True)])
         if name == "seconds" and min(stamps) >= 0:
             return spans_of([b"%d.%09d" % divmod(stamp, BILLION) for stamp in stamps])
-        numbers = range(self.count + first, self.count + first + size)
+        numbers: Sequence[int] = range(self.count + first, self.count + first + size)
+        if NUMBER in block.extras and name in (NUMBER, "next"):
+            numbers = [int(text) for text in texts_of(block.extras[NUMBER])]
         return spans_of([field(name, stamp, number).encode() for stamp, number in zip(stamps, numbers, strict=True)])
 
     def _stamps(self, block: RowPoses) -> list[int]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from itertools import chain, groupby
 from typing import TYPE_CHECKING, cast
 
+from frametool.documents.source import not_text
 from frametool.errors import FormatError
 from frametool.formats.pose_rows import with_axes_turned
 from frametool.formats.trajectory import Poses, StampFile, describe
@@ -44,6 +45,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     Raises or reports FormatError with the line of a row that is no pose.
     """
     form = FORMS.get(file.form, TABLE)
+    if what := not_text(file.head()):
+        raise FormatError(what, source=file.name)
     request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)
     begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
     rows = TablePoses(begun, file.form, request, file.name)
