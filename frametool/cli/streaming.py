@@ -25,8 +25,8 @@ from frametool.cli.command import (
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
-from frametool.formats import FORMATS, readers
-from frametool.formats.detect import detect
+from frametool.formats import FORMATS, is_trajectory, readers
+from frametool.formats.detect import by_sign, detect
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ class Stream:
         with self.opened() as given:
             stream = given
             form, known_by = self.told_form(), ""
-            if not (form or tables_only or self._says_columns()):
+            if not (form or tables_only or self._says_columns() or is_trajectory(_signed(stream.peek(), name))):
                 pasted, stream = self._pasted(stream, name, request)
                 if pasted is not None:
                     return self._run_pasted(pasted, request, output)
@@ -253,6 +253,12 @@ class Stream:
         from frametool.stream.table_stream import run_table
 
         return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
+
+
+def _signed(begin: bytes, name: str) -> str:
+    """Return the form that a stream shows, if it is no single row of a pose, which may have been pasted."""
+    form = by_sign(begin, *STREAMED, name=name) or ""
+    return "" if form == "kitti" else form
 
 
 def _opened(path: str | None) -> BufferedReader:

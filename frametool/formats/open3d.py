@@ -62,11 +62,11 @@ def _blocks(file: InputFile) -> Iterator[Written]:
     for number, words in lines:
         if len(words) != 3 or not words[0].isdecimal():
             raise FormatError("expected three whole numbers before a matrix", source=file.name, line=number)
-        rows = []
+        rows, at = [], number
         for _ in range(4):
-            at, row = next(lines, (number, []))
+            at, row = next(lines, (at, []))
             if len(row) != 4:
-                message = f"expected four rows of four numbers below line {number}, found {len(row)} numbers"
+                message = f"expected four rows of four numbers behind line {number}, found {len(row)} numbers"
                 raise FormatError(message, source=file.name, line=at)
             rows.append(numbers_in(file, at, row))
         if rows[3] != LAST_ROW:

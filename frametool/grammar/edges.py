@@ -200,7 +200,7 @@ class Topics:
         known = {*self.counts, *self.seen} - {""}
         if not self.chosen or not known or any(map(self.chooses, self.counts)):
             return ""
-        return f"no transforms or poses on {', '.join(sorted(self.chosen))}; topics: {', '.join(sorted(known))}"
+        return f"no transforms on {', '.join(sorted(self.chosen))}; topics: {', '.join(sorted(known))}"
 
 
 def _source_of(topic: str) -> str:
