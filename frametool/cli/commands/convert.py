@@ -15,7 +15,7 @@ from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
-from frametool.geometry.representations import notation
+from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.text.numbers import parse_angle
@@ -31,7 +31,17 @@ if TYPE_CHECKING:
 AXES = 3
 
 
-@click.command(cls=Command, name="convert", short_help="one rotation or pose in other representations")
+class ConvertCommand(Command):
+    """A command whose help lists the representations."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List them, then the exit codes."""
+        formatter.write_paragraph()
+        formatter.write_text(f"Representations: {', '.join(row.spelling for row in REPRESENTATIONS.values())}.")
+        super().format_epilog(ctx, formatter)
+
+
+@click.command(cls=ConvertCommand, name="convert", short_help="one rotation or pose in other representations")
 @click.argument("values", nargs=-1, type=TEXT, metavar="[VALUES.. | POSE]")
 @click.option(
     "--axes",
