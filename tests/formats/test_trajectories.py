@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-Run = Callable[..., Any] if TYPE_CHECKING else object
+    Run = Callable[..., Any]
 
 CHILD = {"kitti": "cam0", "colmap": "camera", "nerf": "camera", "open3d": "camera", "bundler": "camera", "open3d-json": "camera"}
 WRITTEN = tuple(name for name in writers("trajectory") if name != "csv")
@@ -64,9 +64,8 @@ def text_of(form: str, poses: np.ndarray) -> str:
     inverse = [np.linalg.inv(pose) for pose in poses]
     xyzw = [quaternion(pose) for pose in poses]
     if form == "tum":
-        rows = zip(poses, xyzw, strict=True)
         seconds = [f"{stamp(at) // 10**9}.{stamp(at) % 10**9:09d}" for at in range(len(poses))]
-        return "".join(f"{at} {words(pose[:3, 3])} {words(turn)}\n" for at, (pose, turn) in zip(seconds, rows, strict=True))
+        return "".join(f"{at} {words(pose[:3, 3])} {words(turn)}\n" for at, pose, turn in zip(seconds, poses, xyzw, strict=True))
     if form in ("euroc", "csv"):
         head = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []"
         head = head if form == "euroc" else "stamp_ns,x,y,z,qw,qx,qy,qz"
@@ -111,7 +110,7 @@ def samples_of(path: Path | str, **options: Any) -> tuple[np.ndarray, list[int]]
                         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]  # fmt: skip
         pose[:3, 3] = position
         found.append(pose)
-        stamps.append(stamp_ns)
+        stamps.append(stamp_ns or 0)
     return np.array(found), stamps
 
 

@@ -49,13 +49,10 @@ def command(
       frametool lookup robot.yaml base_link lidar --to rpy_deg --format json
       frametool lookup drive.yaml map base_link --at 2.5
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
-      frametool lookup drive.yaml map base_link -f tum -o drive.tum
       frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. Between two samples of a moving
-    frame positions go along the line and rotations by slerp, edge by edge, as in tf2; nothing is extrapolated. With
-    --times and --on-error skip, times without data are left out. Trajectories (-f tum, euroc, kitti, colmap, nerf,
-    g2o, open3d) hold every sample of the way, unless --at or --times says otherwise.
+    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp; nothing
+    is extrapolated. Trajectories (-f tum, kitti ..) hold all samples of the way without --times.
     """
     by_row, stream = RowFrames(options), Stream(options)
     output = Output("poses", **options)
