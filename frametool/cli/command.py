@@ -243,10 +243,10 @@ _PLACE = (
 )
 
 
-def result_options(what: str) -> Callable[[Function], Function]:
+def result_options(*what: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     form = click.option(
-        "-f", "--format", "format_name", type=click.Choice(("text", *writers(what))),
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers(*what))),
         help="form of the result",
     )  # fmt: skip
     return lambda function: decorated(function, (form, _PRECISION, *_PLACE))

@@ -11,7 +11,7 @@ from frametool.documents.input_file import InputFile
 from frametool.errors import BadAnswer, FileProblem, FormatError, warn
 from frametool.formats import BAG, FORMATS
 from frametool.formats.detect import detect, of_folder
-from frametool.grammar.edges import Answers, Edge, Options, Tally, Topics, stop
+from frametool.grammar.edges import Answers, Edge, Options, Samples, Tally, Topics, stop
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -79,13 +79,24 @@ class Recording(InputFile):
     @property
     def stated(self) -> str:
         """Say what a file that was read means, if its form is not one of ours: directions, units, what was assumed."""
-        states = FORMATS[self.form].states
-        return f"{self.described}{', ' if self.tally.about else ''}{self.tally.about}; {states}" if states else ""
+        states, about = FORMATS[self.form].states, self.tally.about
+        said = f"{self.described}{', ' if about else ''}{about}" if states or about else ""
+        return f"{said}; {states}" if states else said
 
     def edges(
         self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
     ) -> Iterator[Edge]:
-        """Yield the edges in the order they were written, then warn of what was odd.
+        """Yield the edges in the order they were written, then warn of what was odd; otherwise as `pieces`."""
+        for piece in self.pieces(report, tell=tell, raw=raw, normalize=normalize):
+            if isinstance(piece, Samples):
+                yield from piece.edges()
+            else:
+                yield piece
+
+    def pieces(
+        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
+    ) -> Iterator[Edge | Samples]:
+        """Yield edges, and the poses of one frame that come in bulk as one piece, in the order they were written.
 
         report: takes the errors, and reading goes on behind them where it can; without it the first one is raised.
         tell: without it what was odd is only kept, in `tally`.  raw: messages as tf2 receives them, unchecked.

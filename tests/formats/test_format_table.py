@@ -87,6 +87,7 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
 
     row = FORMATS[name]
     functions = {"poses": "write_poses", "points": "write_points", "tree": "write_tree", "report": "write_points"}
+    functions["trajectory"] = "write_poses"
     assert all(hasattr(import_module(row.writer), functions[what]) for what in row.writes)
     assert "tree" not in row.reads or hasattr(import_module(row.reader), "read")
     assert row.summary

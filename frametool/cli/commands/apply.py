@@ -38,7 +38,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
 @pose_options
-@result_options("points")
+@result_options("points", "trajectory")
 @explain_options
 @click.option(
     "--frame-column",
@@ -87,7 +87,7 @@ def command(
     Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
     """
     stream, explaining = Stream(options), Explaining(options)
-    output = Output("points", deg=deg, **options)
+    output = Output("points", "trajectory", deg=deg, **options)
     plan = explaining.plan(output, stream) if explaining else None
     if pose is None:
         way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize), at)
