@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from frametool.calc.python_face import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.formats.load import load as load
+    from frametool.formats.robot import load_robot as load_robot
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.tree import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
@@ -40,6 +41,7 @@ _HOMES = {
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
     "load": "frametool.formats.load",
+    "load_robot": "frametool.formats.robot",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
     "tutorial": "frametool.sim.scene",
@@ -56,6 +58,7 @@ __all__ = [
     "__version__",
     "calc",
     "load",
+    "load_robot",
     "simulate",
     "simulate_many",
     "tutorial",

@@ -15,7 +15,6 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.chunks import lines
 from frametool.documents.input_file import InputFile
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, listing, shown, warn
@@ -26,7 +25,7 @@ from frametool.formats.joints import JointValue
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.readers import Misfit, as_mapping, kind
 from frametool.ros import joint_state, messages
-from frametool.ros.message_stream import Message, read_messages
+from frametool.ros.message_stream import Message, line_texts, read_messages
 from frametool.text.csv_line import split_line
 from frametool.text.numbers import parse_number
 
@@ -133,7 +132,7 @@ class JointFile:
             for message in read_messages(self.file.stream, name, "csv1", self.tally):
                 yield from self._message(message, self._numbered)
         elif joint_state.looks_like_row(first):
-            for line, text in self._lines():
+            for line, text in line_texts(self.file.stream, name, self.tally):
                 yield from self._message(Message(text, Source(name, text), line, cells=True), self._row)
         else:
             yield from self._columns(form)
@@ -144,13 +143,6 @@ class JointFile:
     def _row(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
         return self._state(joint_state.of_row(joint_state.unquoted(value)), path, message)
 
-    def _lines(self) -> Iterator[tuple[int, str]]:
-        """Yield the lines that are not blank, with their numbers."""
-        for piece in lines(self.file.stream, self.file.name):
-            for number, line in enumerate(piece.text.split("\n"), piece.line):
-                if line.strip():
-                    yield number, line.strip("\r\ufeff")
-
     def _cells(self, form: str, line: str) -> list[str]:
         if form == "csv":
             return [cell.text for cell in split_line(line)]
@@ -158,9 +150,9 @@ class JointFile:
 
     def _columns(self, form: str) -> Iterator[Setting]:
         """Yield the settings of a table whose header names joints."""
-        rows = self._lines()
+        rows = line_texts(self.file.stream, self.file.name, self.tally)
         number, header = next(rows, (1, ""))
-        names = self._cells(form, header)
+        names = self._cells(form, header.strip("\r\ufeff"))
         try:
             columns = find_joint_columns(names, self.joints)
             if problem := misspelt(names, self.joints) if columns else no_joints(names, self.joints):
@@ -175,7 +167,7 @@ class JointFile:
         for number, line in rows:
             if line.lstrip().startswith("#"):
                 continue
-            cells = self._cells(form, line)
+            cells = self._cells(form, line.rstrip("\r"))
             refuse = partial(_refused_row, self.file.name, number)
             if len(cells) != len(names):
                 raise refuse(f"expected {len(names)} cells, found {len(cells)}", ())

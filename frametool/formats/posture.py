@@ -33,7 +33,11 @@ STATES = "--joint NAME=VALUE"
 
 
 class Posture:
-    """The values of all joints of a robot: one each, or samples over time."""
+    """The values of all joints of a robot: one each, or samples over time.
+
+    still, moving: values by name, or by name and stamp
+    given: names of the joints told of; the others follow them, or are at rest
+    """
 
     def __init__(self, joints: Iterable[Joint], options: Options, fail: Fail, *, fixed: Collection[str] = ()) -> None:
         """Take what options and files say.
@@ -53,6 +57,8 @@ class Posture:
         self._take_files()
         self._take_options()
         self._tell_limits()
+        self.given = frozenset((*self.still, *self.moving))
+        self._told = set(self.given)
         self._follow(fail)
         options.tally.has_joints = True
         options.tally.about = options.tally.about or self._about()
@@ -152,7 +158,6 @@ class Posture:
 
     def _follow(self, fail: Fail) -> None:
         """Give each joint that nobody told of its leader's value, along chains of any length, or that at rest."""
-        self.told = {*self.still, *self.moving}
         for name in self.joints:
             chain = {name: None}
             last = name
@@ -189,8 +194,8 @@ class Posture:
             self.still[name] = followed(joint, self.still[leader])
         else:
             self.still[name] = followed(joint, JointValue(0.0)) if mimic else joint.start
-        if leader in self.told:
-            self.told.add(name)
+        if leader in self._told:
+            self._told.add(name)
 
     def _tell_limits(self) -> None:
         """Note the values told that lie beyond limits, and steps that a pose cannot follow."""
@@ -211,7 +216,7 @@ class Posture:
 
     def _about(self) -> str:
         """Say how many joints stand where nobody said."""
-        free = [joint for joint in self.joints.values() if joint.name not in self.told]
+        free = [joint for joint in self.joints.values() if joint.name not in self._told]
         if not free:
             return ""
         at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)
