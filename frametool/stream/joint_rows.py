@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
-from frametool.errors import BadAnswer, FormatError, bare, did_you_mean, listing, shown, warn
+from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
 from frametool.formats import FORMATS
 from frametool.formats.joint_columns import find_joint_columns
 from frametool.formats.joints import TURNING, JointValue
@@ -58,13 +58,18 @@ class JointRows:
         fixed: the joints that nothing but `constants` may tell.
         Raises Misused for a joint that has none or several, FormatError for a unit it cannot have.
         """
-        columns = [column for column in find_joint_columns(names, self.joints) if self.chain.uses(column.joint)]
+        try:
+            found = find_joint_columns(names, self.joints)
+        except ValueInvalid as error:
+            raise FormatError(str(error), source=source, line=1) from None
+        columns = [column for column in found if self.chain.uses(column.joint)]
         told = {**self.constants, **{column.joint: None for column in columns}}
         if twice := next((column for column in columns if column.joint in fixed), None):
             problem = f"joint {shown(twice.joint)} has a column, {shown(names[twice.place])}, and a value by --joint"
             raise Misused(f"{problem}; keep one", source=source)
         if missing := self.chain.missing(told):
-            raise Misused(_about_missing(missing, names), source=source, line=1)
+            others = [name for place, name in enumerate(names) if place not in {column.place for column in found}]
+            raise Misused(_about_missing(missing, names, others), source=source, line=1)
         self.columns = tuple(names[column.place] for column in columns)
         self._read = tuple((column.joint, column.degrees, column.per_metre) for column in columns)
 
@@ -101,16 +106,16 @@ class JointRows:
             warn(f"joint {shown(joint.name)} goes beyond its limits {joint.lower:g} .. {joint.upper:g} {unit}")
 
 
-def _about_missing(missing: Sequence[str], names: Sequence[str]) -> str:
-    """Say which joints have no column."""
-    near = did_you_mean(missing[0], names)
+def _about_missing(missing: Sequence[str], names: Sequence[str], others: Sequence[str]) -> str:
+    """Say which joints have no column; one of the others may be meant."""
+    near = did_you_mean(missing[0], others)
     plural = "s" * (len(missing) > 1)
     columns = f"{', '.join(map(bare, names[:12]))}{', ..' * (len(names) > 12)}"
     example = f"give --joint {missing[0]}=VALUE" if not near else "or give it by --joint"
     return f"no column for joint{plural} {listing(missing)}{near or ';'} {example}; columns: {columns}"
 
 
-def names_in(begin: bytes, form: str, source: str) -> list[str]:
+def names_in(begin: bytes, form: str, source: str, *, header: bool = True) -> list[str]:
     """Return the names of a table's columns, or the keys of the first record; of a JointState the joints it names.
 
     begin: the first bytes of the stream, of one of the forms that are streamed.
@@ -123,7 +128,7 @@ def names_in(begin: bytes, form: str, source: str) -> list[str]:
     from frametool.stream.table import open_table
     from frametool.stream.table_stream import DELIMITERS
 
-    table, _ = open_table(begin, DELIMITERS[form], header=True, source=source)
+    table, _ = open_table(begin, DELIMITERS[form], header=header, source=source)
     if table.names is None:
         raise FormatError("the columns have no names, so that none is a joint", source=source, line=1)
     return list(table.names)

@@ -50,7 +50,8 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
     name = stream.path or "stdin"
     begin = stream.opened().peek()
     form = stream.told_form() or detect(begin, *STREAMED, name=stream.path or "")[0]
-    rows.bind(names_in(begin, form, name), name, fixed=frozenset(file.answers.joints))
+    names = names_in(begin, form, name, header=stream.options["header"])
+    rows.bind(names, name, fixed=frozenset(file.answers.joints))
     file.tally.about = f"{len(rows.columns)} of {len(robot.joints)} joints from the rows"
     state([file])
     echo_form = "" if form in RECORDS else echoed(begin)
