@@ -23,6 +23,7 @@ from frametool.formats.detect import detect
 from frametool.formats.joint_columns import find_joint_columns, misspelt, no_joints, stamp_column
 from frametool.formats.joints import JointValue
 from frametool.frames.stamps import parse_stamp
+from frametool.grammar.edges import Tally
 from frametool.grammar.readers import Misfit, as_mapping, kind
 from frametool.ros import joint_state, messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from frametool.formats.joints import Joint
-    from frametool.grammar.edges import Tally
     from frametool.grammar.readers import Path
 
 TIMES = ("stamp", "stamp_ns", "time", "t")
@@ -53,18 +53,26 @@ class Setting(NamedTuple):
 class JointFile:
     """One file of joint values, and the joints of the robot that it may speak of."""
 
-    def __init__(self, path: str, joints: Mapping[str, Joint], tally: Tally) -> None:
+    def __init__(self, path: str, joints: Mapping[str, Joint]) -> None:
         """Open it: a file, or FILE:STATE for a state that it has a name for; raises FileProblem."""
         self.path, self.state = _parted(path)
         self.joints = joints
-        self.tally = tally
+        self.tally = Tally()
         self.file = InputFile(self.path)
 
     def settings(self) -> Iterator[Setting]:
-        """Yield what it says, in order.
+        """Yield what it says, in order, and close it.
 
         Raises FormatError.
         """
+        try:
+            yield from self._settings()
+        finally:
+            self.file.close()
+        for told in self.tally.told():
+            warn(f"{self.file.name}:{told.line}: {told.message}")
+
+    def _settings(self) -> Iterator[Setting]:
         head = self.file.head()
         name = self.file.name
         form = detect(head, "joints", "records", "rows", name=self.path, otherwise="yaml")[0]

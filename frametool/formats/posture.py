@@ -108,7 +108,7 @@ class Posture:
         for path in self._options.answers.joint_files:
             found: dict[str, list[tuple[int | None, Value]]] = {}
             setting = None
-            for setting in JointFile(path, self.joints, self._options.tally).settings():
+            for setting in JointFile(path, self.joints).settings():
                 if setting.joint in self.joints:
                     found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting)))
                 else:
@@ -180,6 +180,9 @@ class Posture:
             return None
         if mimic.joint not in self.joints:
             raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is no joint")
+        if self.joints[mimic.joint].posed:
+            kind = self.joints[mimic.joint].kind
+            raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {kind}")
         return mimic.joint
 
     def _settle(self, joint: Joint) -> None:

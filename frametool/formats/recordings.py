@@ -43,7 +43,11 @@ class Recording(InputFile):
         if not (form or folder) and os.path.isdir(path):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
-        self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+        try:
+            self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+        except FormatError:
+            self.close()
+            raise
         self.tally = Tally()
         self.topics = Topics(topics)
         self.answers = answers

@@ -250,12 +250,13 @@ def robot_of(file: Recording) -> tuple[Robot, Posture]:
     from frametool.formats.urdf import describe
 
     options = Options(file.tally, file.topics, answers=file.answers)
-    with paused_collector():
-        described = describe(file, options)
-        posture = described.posture(options)
-    file.close()
+    try:
+        with paused_collector():
+            described = describe(file, options)
+            posture = described.posture(options)
+    finally:
+        file.close()
     refuse_unknown_joints([file])
-    file.tell()
     links: dict[str, Link] = {}
     for hinge in described.hinges:
         if hinge.child in links:
@@ -263,4 +264,5 @@ def robot_of(file: Recording) -> tuple[Robot, Posture]:
             problem = f"frame {shown(hinge.child)} has two parents: {parents}"
             raise BadTopology(problem, source=file.name, line=hinge.element.line, rule="two-parents")
         links[hinge.child] = Link(hinge.parent, hinge.origin, hinge.joint)
+    file.tell()
     return Robot(file.name, links, described.links), posture
