@@ -246,6 +246,7 @@ def load_robot(path: str | PathLike[str]) -> Robot:
 def robot_of(file: Recording) -> tuple[Robot, Posture]:
     """Return the robot of a file, and where its joints stand as the file's answers say; otherwise as `load_robot`."""
     if file.form != "urdf":
+        file.close()
         raise FormatError(f"expected a URDF robot, found {FORMATS[file.form].summary}", source=file.name)
     from frametool.formats.urdf import describe
 

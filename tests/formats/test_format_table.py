@@ -107,6 +107,11 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a bag": (b"#ROSBAG V2.0\n", "tree", "bag1"),
     "sqlite": (b"SQLite format 3\0..", "tree", "bag2"),
     "mcap": (b"\x89MCAP0\r\n", "tree", "mcap"),
+    "URDF": (b'<?xml version="1.0"?>\n<!-- <xacro:a/> ${b} -->\n<robot name="r" xmlns:xacro="x">\n<link', "tree", "urdf"),
+    "URDF that begins with a joint": (b'<robot name="r"><joint name="a"><origin/></joint>', "tree", "urdf"),
+    "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "tree", "srdf"),
+    "SRDF as values of joints": (b'<robot name="r"><disable_collisions link1="a"/>', "joints records rows", "srdf"),
+    "a map of joints": (b"joint: 30deg\n", "joints records rows", "yaml"),
     "rows": (b"x,y,z\n1,2,3\n", "rows records", "csv"),
     "rows whose first column ends in a colon": (b"a:,y\n1,2\n", "rows records", "csv"),
     "rows under a comment": (b"# t,x,y\n1,2,3\n", "rows records", "csv"),
@@ -147,10 +152,10 @@ def test_two_forms_that_fit_are_both_named(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_the_root_element_of_xml_is_a_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "robot"),)))
-    for head in (b"<robot name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<robot>", b"\xef\xbb\xbf<robot/>"):
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "toy"),)))
+    for head in (b"<toy name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<toy>", b"\xef\xbb\xbf<toy/>"):
         assert by_sign(head, "tree") == "toy"
-    assert by_sign(b"<robots>", "tree") is None
+    assert by_sign(b"<toys>", "tree") is None
 
 
 @pytest.mark.parametrize("name", FORMATS)
