@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from frametool.formats.assembly import Place, Rules
     from frametool.formats.recordings import Recording
+    from frametool.formats.robot import Robot
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
@@ -251,7 +252,7 @@ class Frame(Text):
 FRAME = Frame()
 
 
-def frame_name(name: str, tree: FrameTree | TransformBuffer) -> str:
+def frame_name(name: str, tree: FrameTree | TransformBuffer | Robot) -> str:
     """Return a frame's name without a leading `/`, which tf2 has given up, unless a frame is called so."""
     if name.startswith("/") and name not in tree.frames:
         warn(f"frame {shown(name)}: the leading / is no part of a name and was left out")

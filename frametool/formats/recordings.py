@@ -110,7 +110,12 @@ class Recording(InputFile):
             self.close()
         if missing := self.topics.missing():
             report(FormatError(missing, source=self.name))
-        for told in self.tally.told() if tell else ():
+        if tell:
+            self.tell()
+
+    def tell(self) -> None:
+        """Warn of what was odd in the file, once it was read."""
+        for told in self.tally.told():
             warn(f"{self.name}:{told.line}: {told.message}")
 
     def _scoped(self, edges: Iterable[Edge]) -> Iterator[Edge]:

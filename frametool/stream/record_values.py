@@ -211,10 +211,19 @@ def _formula_result(node: Node, unit: Path, answer: Answer, request: Request) ->
         return plain(node) | extras if type(node.value) is dict else extras
     rest = _rest(node, unit, answer.record)
     if kind == POSE:
-        return Result(Pose.of(answer.parts[:7], answer.name, answer.parent), extras | rest)
+        stamp = _header_stamp(node, unit, answer.record) if not request.poses else {}
+        return Result(Pose.of(answer.parts[:7], answer.name, answer.parent), stamp | extras | rest)
     seen_from = "frame" if kind or shape.kind != POSE else "parent"
     named = {key: name for key, name in (("name", answer.name), (seen_from, answer.parent)) if name is not None}
     return named | ({kind: list(answer.parts[:3])} if kind else {}) | extras | rest
+
+
+def _header_stamp(node: Node, unit: Path, record: Record) -> dict[str, int]:
+    """Return the stamp of a message's header, if it has one."""
+    if not record.stamp:
+        return {}
+    seconds, below = (int(node.at(path[len(unit) :]).value) for path in record.stamp)
+    return {"stamp_ns": seconds * BILLION + below}
 
 
 def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Result:

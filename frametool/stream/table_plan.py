@@ -179,6 +179,8 @@ def _shifts(request: Request) -> bool:
 def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ...]:
     """Find the columns that name frames: for look-ups those named, else the one a row is given in."""
     names = table.names or ()
+    if not (request.poses or request.frames):
+        return ()
     if request.frames and request.frames != ("",):
         return tuple(_place(name, names, source) for name in request.frames)
     found = _first_called(PARENTS, table)
