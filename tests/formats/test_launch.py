@@ -314,6 +314,14 @@ def test_a_name_that_launch_files_would_replace_is_not_written(run: Callable[...
     assert "a frame name with $( has no place in a launch file" in done.err
 
 
+def test_frames_that_move_are_not_written_as_static_but_as_they_stood_at_a_time(run: Callable[..., Any]) -> None:
+    moving = "{frames: [{name: b, parent: a, samples: [{stamp: 0, xyz: [0, 0, 0]}, {stamp: 1, xyz: [1, 0, 0]}]}]}"
+    done = run("tree", "a.yaml", "-f", "launch", files={"a.yaml": moving})
+    assert (done.status, done.out) == (1, "")
+    assert done.err == "frametool: frames move and cannot be published as static: b; give --at TIME\n"
+    assert "--x 0.5 " in run("tree", "a.yaml", "-f", "launch", "--at", "0.5").out
+
+
 def test_what_was_read_is_said_once(run: Callable[..., Any]) -> None:
     done = run("lookup", "a.launch", "base", "cam", files={"a.launch": f"<launch>{NODE.format(FLAGS)}</launch>"})
     assert done.err == (
