@@ -90,6 +90,9 @@ class SdfFrames:
             for holder in scope.holder.children:
                 if holder.tag == "include":
                     self._leave_out(holder)
+                elif holder.tag == "state":
+                    message = "<state> is left out: every model stands where its own pose has it"
+                    self.options.tally.note_each(message, holder.element.line)
                 elif holder.tag in ("model", "link", "joint", "frame"):
                     frame = self._named(holder, scope)
                     if holder.tag == "model":

@@ -208,6 +208,13 @@ def test_a_key_holds_values_of_all_joints_in_the_order_of_the_bodies(run: Callab
     assert json.loads(partly.out)["xyz"] == [0.0, 0.0, 0.0]
 
 
+def test_joints_move_over_time_where_a_file_of_values_has_stamps(run: Callable[..., Any]) -> None:
+    rows = "stamp,elbow,grip\n0,0,0\n1,0.5,0.25\n"
+    done = run("lookup", "a.xml", "base", "hand", "--joints", "v.csv", "--at", "1", "-f", "json", files={"a.xml": KEYS, "v.csv": rows})
+    still = run("lookup", "a.xml", "base", "hand", "-j", "elbow=0.5", "-j", "grip=25cm", "-f", "json")
+    assert {key: value for key, value in json.loads(done.out).items() if key != "stamp_ns"} == json.loads(still.out)
+
+
 @pytest.mark.parametrize(
     ("key", "text", "said"),
     [

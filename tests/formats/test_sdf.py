@@ -361,6 +361,23 @@ def test_included_models_are_left_out_and_named_with_their_lines(tmp_path: Path)
     ]
 
 
+def test_the_saved_state_of_a_world_is_not_taken_for_its_models_and_said(tmp_path: Path) -> None:
+    state = '<state world_name="w"><model name="m"><pose>9 9 9 0 0 0</pose></model></state>'
+    tree, said = read(tmp_path, f"<world name='w'>{model(LINK)}\n{state}</world>")
+    assert tree.lookup("world", "m").xyz.tolist() == [0.0, 0.0, 0.0]
+    assert said == ["a.sdf:4: <state> is left out: every model stands where its own pose has it"]
+
+
+def test_joints_move_over_time_where_a_file_of_values_has_stamps(run: Callable[..., Any]) -> None:
+    text = f"<sdf version='1.9'>{model(A_AND_B + JOINT.format('universal', '<axis><xyz>1 0 0</xyz></axis><axis2/>'))}</sdf>"
+    rows = "stamp,j,j:2\n0,0,0\n1,0.5,1\n"
+    files = {"a.sdf": text, "v.csv": rows}
+    done = run("lookup", "a.sdf", "m::b", "m::a", "--joints", "v.csv", "--at", "1", "-f", "json", files=files)
+    still = run("lookup", "a.sdf", "m::b", "m::a", "-j", "j=0.5", "-j", "j:2=1", "-f", "json")
+    assert json.loads(done.out)["quaternion"] == json.loads(still.out)["quaternion"]
+    assert json.loads(done.out)["stamp_ns"] == 1_000_000_000
+
+
 def test_what_builds_on_an_included_model_is_left_out_with_it_and_all_that_builds_on_that(tmp_path: Path) -> None:
     body = (
         '\n<include><uri>model://create</uri></include>\n<include merge="{}"><uri>model://rack/model.sdf</uri></include><link name="L"/>'
