@@ -39,16 +39,29 @@ class Command(WithHelp):
     exit_codes = EXIT_CODES
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Shield negative numbers, then parse; what is an option of this command is none (-j)."""
-        options = {name for parameter in self.get_params(ctx) for name in parameter.opts}
-        shielded = (f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args)
-        return super().parse_args(ctx, list(shielded))
+        """Shield negative numbers (-j is an option where joints are), give a bare --explain its form, then parse."""
+        options = {name for each in self.get_params(ctx) for name in each.opts}
+        shielded = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
+        return super().parse_args(ctx, _with_form(shielded) if "--explain" in shielded else shielded)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """End every help with the exit codes."""
         super().format_epilog(ctx, formatter)
         formatter.write_paragraph()
         formatter.write_text(self.exit_codes)
+
+
+def _with_form(args: list[str]) -> list[str]:
+    """Join --explain with the form behind it, or with `text`: click would take any argument there for its value."""
+    joined: list[str] = []
+    for each in args:
+        if joined and joined[-1] == "--explain":
+            is_form = each in ("text", "markdown", "latex")
+            joined[-1] = f"--explain={each if is_form else 'text'}"
+            if is_form:
+                continue
+        joined.append(each)
+    return [f"{each}=text" if each == "--explain" else each for each in joined]
 
 
 class Text(click.ParamType[str]):
@@ -230,10 +243,10 @@ _PLACE = (
 )
 
 
-def result_options(what: str) -> Callable[[Function], Function]:
+def result_options(*what: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     form = click.option(
-        "-f", "--format", "format_name", type=click.Choice(("text", *writers(what))),
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers(*what))),
         help="form of the result",
     )  # fmt: skip
     return lambda function: decorated(function, (form, _PRECISION, *_PLACE))

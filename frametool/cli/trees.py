@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from frametool.formats.assembly import Place, Rules
     from frametool.formats.recordings import Recording
+    from frametool.formats.robot import Robot
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
@@ -47,6 +48,13 @@ def _option(*names: str, **rest: Any) -> Callable[[Any], Any]:
 
 
 _quiet_option = _option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+_CAMERA_AXES = _option(
+    "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
+    help="turn cameras to these axes  [default: those that the form of the file has]",
+)  # fmt: skip
+_STAMPS = _option(
+    "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
+)
 _READING_OPTIONS = (
     _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
             help="read only this topic; may be repeated"),
@@ -58,11 +66,15 @@ _READING_OPTIONS = (
             help="names of frames that a form does not name; may be repeated, in the order of the files"),
     _option("--direction", "direction", type=click.Choice(DIRECTIONS),
             help="of matrices whose key does not say which frame they are seen from"),
-    _option("--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
-            help="what the axes of a file's cameras are  [default: as its form has them]"),
+    _CAMERA_AXES,
     _option("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
-    _option("--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"),
+    _STAMPS,
 )  # fmt: skip
+
+
+def pose_reading_options(function: Function) -> Function:
+    """Add to a command of streams the options about trajectories: the times of their poses, the axes of cameras."""
+    return decorated(function, [_CAMERA_AXES, _STAMPS])
 
 
 def load_tree(
@@ -140,15 +152,12 @@ def opened(
     context = click.get_current_context(silent=True)
     if context is not None:
         context.meta[TREES_OPENED] = True
-    chosen = dict(context.meta.get(READING, {})) if context is not None else {}
-    chosen.pop("quiet", None)
-    topics = chosen.pop("topics", ())
-    named = chosen.pop("named_frames", ())
+    topics = _reading("topics")
+    named = _reading("named_frames")
     if not streams:
         _refuse_more("--frames", named, of or len(arguments))
     frames = iter(named[behind:] or named)
-    chosen["joints"] = dict(map(_joint, chosen.pop("joints", ())))
-    general = Answers(**{name: value for name, value in chosen.items() if value})
+    general = answers()
     return opened_together(
         Recording.inline(source_of(each))
         if is_inline(each)
@@ -178,6 +187,19 @@ def _refuse_more(option: str, values: Sequence[str], files: int) -> None:
     """Refuse an option that is given more often than there are files."""
     if len(values) > files:
         raise click.UsageError(f"{option} is given {len(values)} times for {files} file{'s' * (files != 1)}")
+
+
+def _reading(name: str) -> Any:
+    """Return what an option about files of frames says."""
+    context = click.get_current_context(silent=True)
+    return (context.meta.get(READING, {}) if context is not None else {}).get(name, ())
+
+
+def answers() -> Answers:
+    """Return what the options say about all files whose form leaves it open."""
+    named = {name: _reading(name) for name in Answers._fields if name not in ("joints", "frames")}
+    given = {name: value for name, value in named.items() if value}
+    return Answers(joints=dict(map(_joint, _reading("joints"))), **given)
 
 
 def _joint(text: str) -> tuple[str, str]:
@@ -230,7 +252,7 @@ class Frame(Text):
 FRAME = Frame()
 
 
-def frame_name(name: str, tree: FrameTree | TransformBuffer) -> str:
+def frame_name(name: str, tree: FrameTree | TransformBuffer | Robot) -> str:
     """Return a frame's name without a leading `/`, which tf2 has given up, unless a frame is called so."""
     if name.startswith("/") and name not in tree.frames:
         warn(f"frame {shown(name)}: the leading / is no part of a name and was left out")

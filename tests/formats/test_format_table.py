@@ -87,6 +87,7 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
 
     row = FORMATS[name]
     functions = {"poses": "write_poses", "points": "write_points", "tree": "write_tree", "report": "write_points"}
+    functions["trajectory"] = "write_poses"
     assert all(hasattr(import_module(row.writer), functions[what]) for what in row.writes)
     assert "tree" not in row.reads or hasattr(import_module(row.reader), "read")
     assert row.summary
@@ -112,6 +113,14 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a launch file in YAML": (b"%YAML 1.2\n---\nlaunch:\n- node: {pkg: x}\n", "tree", "launch"),
     "a launch file in Python": (b"import os\n\ndef generate_launch_description():\n    pass\n", "tree", "launch"),
     "a tree with a frame called launch": (b"frames:\n  launch:\n    a:\n", "tree", "yaml"),
+    "a world of Gazebo": (b"<?xml version='1.0' ?>\n<sdf version='1.6'>\n<world name='a'>", "tree", "sdf"),
+    "a model of MuJoCo": (b"<mujoco model='a'>\n<compiler angle='radian'/>", "tree", "mjcf"),
+    "a model of MuJoCo whose joints are told": (b"<mujoco model='a'>\n<keyframe>", "joints records rows", "mjcf"),
+    "URDF": (b'<?xml version="1.0"?>\n<!-- <xacro:a/> ${b} -->\n<robot name="r" xmlns:xacro="x">\n<link', "tree", "urdf"),
+    "URDF that begins with a joint": (b'<robot name="r"><joint name="a"><origin/></joint>', "tree", "urdf"),
+    "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "tree", "srdf"),
+    "SRDF as values of joints": (b'<robot name="r"><disable_collisions link1="a"/>', "joints records rows", "srdf"),
+    "a map of joints": (b"joint: 30deg\n", "joints records rows", "yaml"),
     "rows": (b"x,y,z\n1,2,3\n", "rows records", "csv"),
     "rows whose first column ends in a colon": (b"a:,y\n1,2\n", "rows records", "csv"),
     "rows under a comment": (b"# t,x,y\n1,2,3\n", "rows records", "csv"),
@@ -136,6 +145,20 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "OpenCV's XML": (b'<?xml version="1.0"?>\n<opencv_storage>\n<a type_id="opencv-matrix">', "tree", "opencv"),
     "OpenCV's JSON": (b'{"a": {"type_id": "opencv-matrix", "rows": 4}}', "tree", "opencv"),
     "a sensor of EuRoC": (b"#Default\nsensor_type: camera\nT_BS:\n  cols: 4\n", "tree", "euroc-sensor"),
+    "KITTI's odometry": (b"P0: 7.2e+02 0 6.1e+02 0 0 7 1 0 0 0 1 0\n", "tree", "kitti-calib"),
+    "KITTI's odometry with a bad number": (b"P0: 7.2e+02 0 x 0 0 7 1 0 0 0 1 0\n", "tree", "kitti-calib"),
+    "KITTI's tracking without colons": (b"R_rect 9.9e-01 1 0 0 0 0 0 0 1\n", "tree", "kitti-calib"),
+    "KITTI's raw recordings": (b"calib_time: 15-Mar-2012 11:37:16\nR: 7.5e-03", "tree", "kitti-calib"),
+    "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "tree", "drake"),
+    "sensors of nuScenes": (b'[\n{\n"token": "f4d",\n"sensor_token": "47f",', "tree", "nuscenes"),
+    "ego poses of nuScenes": (b'[{"token": "5a", "timestamp": 15, "rotation": [', "tree", "nuscenes"),
+    "a table of joints": (b"joint,theta,d,a,alpha\n1,q1,0.1,0,pi/2\n", "tree", "dh"),
+    "a table of joints between blanks": (b"# i  alpha_i-1  a_i-1  d_i  theta_i\n1 0 0 0.3 q1\n", "tree", "dh"),
+    "a table of joints with units": ("\u03b8_deg\td (mm)\ta [mm]\t\u03b1 [deg]\n".encode(), "tree", "dh"),
+    "a table of joints in YAML": (b"dh:\n  - {joint: one, theta: 0, d: 0, a: 1, alpha: 0}\n", "tree", "dh"),
+    "a table of joints in JSON": (b'[{"alpha": 0, "a": 0.3, "d": 0.1}]', "tree", "dh"),
+    "a tree of ours about alpha": (b"frames:\n  alpha:\n    a: {xyz: [1, 0, 0]}\n    d: {}\n", "tree", "yaml"),
+    "a table of numbers about colours": (b"a,alpha,blue\n1,2,3\n", "rows records", "csv"),
     "a hand-eye calibration": (b"parameters:\n  eye_on_hand: true\ntransformation: {x: 1}\n", "tree", "handeye"),
     "a second hand-eye calibration": (b"parameters:\n  tracking_base_frame: a\n", "tree", "handeye"),
 }
@@ -175,10 +198,10 @@ def test_a_form_that_is_read_goes_before_one_that_is_only_known(monkeypatch: pyt
 
 
 def test_the_root_element_of_xml_is_a_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "toybox"),)))
-    for head in (b"<toybox name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<toybox>", b"\xef\xbb\xbf<toybox/>"):
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "toys"),)))
+    for head in (b"<toys name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<toys>", b"\xef\xbb\xbf<toys/>"):
         assert by_sign(head, "tree") == "toy"
-    assert by_sign(b"<toyboxes>", "tree") is None
+    assert by_sign(b"<toy>", "tree") is None
 
 
 @pytest.mark.parametrize("name", FORMATS)
