@@ -38,7 +38,8 @@ class Operation(NamedTuple):
         "pair" the two poses of a row, "previous" the row before and this one
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
-    turns: only the rotation changes; the position, if there is one, stays as it is
+    turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
+    mirrors: the row is seen in a mirror across y, before all else
     """
 
     left: Rigid | None = None
@@ -48,6 +49,7 @@ class Operation(NamedTuple):
     fixed: Rigid | None = None
     moves: bool = False
     turns: bool = False
+    mirrors: bool = False
 
     @property
     def extras(self) -> tuple[str, ...]:
@@ -62,7 +64,7 @@ class Operation(NamedTuple):
     @property
     def keeps_position(self) -> bool:
         """Tell whether positions stay as they are written."""
-        return self.changes_nothing or self.turns
+        return self.changes_nothing or (self.turns and self.left is None and not self.mirrors)
 
     @property
     def only_inverts(self) -> bool:
@@ -71,7 +73,7 @@ class Operation(NamedTuple):
 
     @property
     def _is_bare(self) -> bool:
-        return not (self.left or self.right or self.of or self.moves)
+        return not (self.left or self.right or self.of or self.moves or self.mirrors)
 
     def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
         """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
@@ -94,6 +96,8 @@ class Operation(NamedTuple):
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
         """Return the resulting pose, and what else is known about it."""
         result: Rigid = rigid.inverse(*poses[0]) if self.inverse else poses[0]
+        if self.mirrors:
+            result = rigid.mirrored(*result)
         left = edge or self.left
         if left is not None:
             result = rigid.compose(*left, *result)

@@ -163,7 +163,7 @@ def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Re
     shape = answer.record.shape
     operation = request.operation
     pose = Pose.of(answer.parts[:7], answer.name, answer.parent)
-    if operation.keeps_position or operation.only_inverts:
+    if operation.keeps_position or operation.only_inverts or operation.turns:
         has_position = shape.whole or shape.unit is not None
         has_rotation = shape.notation is not None or operation.turns or request.notations
         pose = pose._replace(

@@ -11,9 +11,10 @@ from frametool.cli.command import TEXT, Command, Number, pose_options, result_op
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
 from frametool.cli.poses import pose_from_numbers, values_of
+from frametool.cli.stderr import say
 from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.errors import ValueInvalid
-from frametool.geometry import quaternion
+from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -23,11 +24,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.geometry.representations import Notation
-    from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Quaternion
+    from frametool.stream.operation import Operation
 
 
 AXES = 3
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 @click.command(cls=Command, name="convert", short_help="one rotation or pose in other representations")
@@ -37,7 +38,15 @@ AXES = 3
     type=TEXT,
     metavar="NAME",
     help="the pose at the same place with these axes; alone, the pose of such axes on a ROS body: "
-    "optical, opengl, frd, flu, enu, ned, or A_from_B",
+    "optical (opencv), opengl, frd, flu (ros), enu, ned, or A_from_B; mirrored ones, unity, on both sides only",
+)
+@click.option(
+    "--world-axes",
+    "world",
+    type=TEXT,
+    metavar="A_from_B",
+    help="change the axes of the frame that poses are seen from, as --axes does those of the frame they are the pose "
+    "of: NED to ENU is --world-axes enu_from_ned --axes frd_from_flu",
 )
 @click.option(
     "--find",
@@ -57,6 +66,7 @@ def command(
     values: tuple[str, ...],
     given: tuple[Notation, ...] | None,
     axes: str | None,
+    world: str | None,
     find: str | None,
     tolerance: float,
     deg: bool,
@@ -71,6 +81,7 @@ def command(
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
       frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle --format json
       frametool convert --axes optical --to rpy_deg
+      frametool convert '{xyz: [1, 2, -3], rpy_deg: [0, 0, 0]}' --world-axes enu_from_ned --axes frd_from_flu
       frametool convert --from rpy_deg 10 20 30 --to euler:all
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
 
@@ -84,28 +95,30 @@ def command(
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
-    turn: tuple[Rigid, ...] = () if axes is None else ((0.0, 0.0, 0.0, *_axes(axes)),)
+    operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
     forms = output.notations or (notation("quaternion"),)
     request = Request(
-        Operation(right=turn, turns=bool(turn)),
+        operation,
         given=one_notation(given),
         degrees=deg,
         normalize=normalize,
         notations=forms,
         unwrap=unwrap,
     )
+    if values or stream.path or not operation.turns or stream.has_input():
+        _say_other_side(axes, world)
     is_numbers = _are_numbers(values, told=bool(given))
     if len(values) == 1 and not (is_numbers or stream.path) and _is_table(values[0], stream):
         values = ()
-    if stream.path or values == ("-",) or not (values or (turn and not stream.has_input())):
+    if stream.path or values == ("-",) or not (values or (operation.turns and not stream.has_input())):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
         return stream.run(request, output)
     if not values:
-        results: list[Any] = [Result(Pose.of((0.0, 0.0, 0.0, *turn[0][3:]))._replace(position=None))]
+        results: list[Any] = [Result(_changed(Pose(rotation=IDENTITY), operation))]
     elif is_numbers:
         pose = pose_from_numbers(values, given, degrees=deg, normalize=normalize)
-        results = [Result(_turned(pose, turn))]
+        results = [Result(_changed(pose, operation))]
     else:
         results = list(values_of(values, request, output))
     poses = [each.pose for each in results if isinstance(each, Result)]
@@ -150,19 +163,36 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool)
     return tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes)
 
 
-def _turned(pose: Pose, turn: tuple[Rigid, ...]) -> Pose:
-    """Return a pose with other axes; without a turn its bits stay as they are."""
-    if not turn or pose.rotation is None:
+def _changed(pose: Pose, operation: Operation) -> Pose:
+    """Return a pose with other axes; without a change its bits stay as they are."""
+    if not operation.turns:
         return pose
-    return pose._replace(rotation=quaternion.compose(*pose.rotation, *turn[0][3:]))
+    components = operation.pose([pose.components], None, floats)
+    position = None if pose.position is None else pose.position if operation.keeps_position else components[:3]
+    return Pose(position, components[3:7], pose.name, pose.parent)
 
 
-def _axes(name: str) -> Quaternion:
-    """Return the rotation that --axes names."""
-    from frametool.geometry.conventions import named_rotation
+def _change_of_axes(axes: str | None, world: str | None) -> Operation:
+    """Return the operation that --axes and --world-axes name."""
+    from frametool.geometry.conventions import both_sides
+    from frametool.stream.operation import Operation
 
     try:
-        rotation: Quaternion = named_rotation(name).components
+        left, mirrors, right = both_sides(world, axes)
     except ValueInvalid as error:
         raise click.UsageError(str(error)) from None
-    return rotation
+    before = (0.0, 0.0, 0.0, *left.components) if left is not None else None
+    behind = ((0.0, 0.0, 0.0, *right.components),) if right is not None else ()
+    return Operation(before, behind, turns=True, mirrors=mirrors)
+
+
+def _say_other_side(axes: str | None, world: str | None) -> None:
+    """Tell what changes the axes of the other frame of a pose where such conventions come in pairs."""
+    from frametool.geometry.conventions import other_side
+
+    if (axes is None) == (world is None):
+        return
+    if axes and (other := other_side(axes, of_world=False)):
+        say(f"note: the frame that poses are seen from keeps its axes; --world-axes {other} changes them")
+    if world and (other := other_side(world, of_world=True)):
+        say(f"note: the frames that these are the poses of keep their axes; --axes {other} changes them")
