@@ -151,6 +151,8 @@ class Stream:
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             request = self._completed(request, output, form)
+            if request.gathered is not None:
+                return self._gather(stream, form, request._replace(notations=()), name)
             if form in RECORDS and (output.told or form) != form:
                 return self._run_as_values(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
@@ -174,8 +176,11 @@ class Stream:
     @staticmethod
     def _run_pasted(source: Source, request: Request, output: Output) -> int:
         """Write the results of a text that was pasted."""
-        from frametool.stream.record_values import results
+        from frametool.stream.record_values import read_poses, results
 
+        if request.gathered is not None:
+            request.gathered.add(read_poses(source, degrees=request.degrees, normalize=request.normalize))
+            return 0
         request = request._replace(notations=request.notations or output.notations)
         output.values(results(source, request, output.style))
         return 0
@@ -197,6 +202,8 @@ class Stream:
         options = self.options
         if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or options["prefix"])):
             raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
+        if form in RECORDS and len(options["columns"]) > 1:
+            raise click.UsageError("--columns are those of a table; a record names its own numbers")
         return request._replace(
             given=request.given or self.given,
             notations=request.notations or output.notations,
@@ -222,6 +229,19 @@ class Stream:
             closing(self._outcomes(stream, form, request, name)) as outcomes,  # ends the processes of --jobs
         ):
             return run(outcomes, write, self.policy(name), progress.advance)
+
+    def _gather(self, stream: Any, form: str, request: Request, name: str) -> int:
+        """Let the request take all poses; nothing is written."""
+        from contextlib import closing
+
+        from frametool.stream.run import run
+        from frametool.view.progress import ProgressBar
+
+        with (
+            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
+            closing(self._outcomes(stream, form, request, name)) as outcomes,
+        ):
+            return run(outcomes, lambda _: None, self.policy(name), progress.advance)
 
     def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
         if form in RECORDS:

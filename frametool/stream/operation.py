@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.geometry import quaternion, rigid, spatial
+from frametool.geometry import quaternion, rigid, rotvec, spatial
 from frametool.geometry.trig import RADIAN
+from frametool.grammar.pose import VELOCITY
 from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from frametool.stream.row_layout import Shape
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
+START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
 
 
 def _turn(_x: Number, _y: Number, _z: Number, *numbers: Number) -> Components:
@@ -35,7 +37,8 @@ class Operation(NamedTuple):
     left, right: applied as left @ row @ right[0] @ right[1] ..
     inverse: the row itself is inverted first
     of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
-        "pair" the two poses of a row, "previous" the row before and this one
+        "pair" the two poses of a row, "previous" the row before and this one, "start" the first row and this one
+    velocity: of "previous" also the twist that leads from one row to the next in the time between them
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
@@ -50,11 +53,17 @@ class Operation(NamedTuple):
     moves: bool = False
     turns: bool = False
     mirrors: bool = False
+    velocity: bool = False
 
     @property
     def extras(self) -> tuple[str, ...]:
         """Name the numbers that come beside the pose."""
-        return RELATIVE_EXTRAS if self.of else ()
+        return (RELATIVE_EXTRAS + VELOCITY * self.velocity) if self.of else ()
+
+    @property
+    def looks_back(self) -> bool:
+        """Tell whether a row's result depends on the rows before it."""
+        return self.of in (START, PREVIOUS)
 
     @property
     def changes_nothing(self) -> bool:
@@ -110,6 +119,15 @@ class Operation(NamedTuple):
         result = rigid.relative(*first, *second)
         metres, angle = rigid.extent(*result, xp)
         return *result, metres, angle, angle * RADIAN
+
+    @staticmethod
+    def with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Components:
+        """Add the body twist that makes this step in so many seconds, seen in the first of the two frames.
+
+        Linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt: position and rotation on their own.
+        """
+        turned = rotvec.from_quaternion(parts[3], parts[4], parts[5], parts[6], xp)
+        return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
 
     def _pair(self, poses: Sequence[Rigid]) -> tuple[Rigid, Rigid]:
         if self.of == "first" and self.fixed is not None:

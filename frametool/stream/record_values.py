@@ -19,10 +19,13 @@ from frametool.geometry import floats
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, Reading
 from frametool.grammar.result import Result
+from frametool.stream.memory import Memory
 from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, placed, value_at
 from frametool.stream.request import Request
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
+from frametool.stream.stamp_source import in_nanoseconds, read_header_stamp, read_stamp
+from frametool.stream.template import beside_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -87,19 +90,22 @@ def documents(source: Source, request: Request) -> Iterator[tuple[Document, list
         yield document, records
 
 
-def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
+def results(source: Source, request: Request, style: Style, memory: Memory | None = None) -> Iterator[Value]:
     """Yield the results of every record of a text in a form: poses with what else their records say, or messages.
 
+    memory: of the records before this text.
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
     from frametool.documents.nodes import parse_nodes
 
     nodes: list[Node] = []
     found = False
+    memory = memory or Memory()
     for document, records in documents(source, request):
         found = True
         nodes = nodes or parse_nodes(source.text)
-        answers = [_answer(record, request, source) for record in records]
+        read = [_answer(document, record, request, source, memory) for record in records]
+        answers = [answer for answer in read if answer is not None]
         for unit in dict.fromkeys(_unit(answer.record, document.value) for answer in answers):
             ours = [answer for answer in answers if answer.record.path[: len(unit)] == unit]
             yield from _values(_at(nodes, unit), unit, ours, request, style)
@@ -112,18 +118,34 @@ def _unit(record: Record, document: Any) -> Path:
     return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
 
 
-def _answer(record: Record, request: Request, source: Source) -> Answer:
-    """Apply the operation to one record."""
+def _answer(
+    document: Document, record: Record, request: Request, source: Source, memory: Memory
+) -> Answer | None:
+    """Apply the operation to one record; the first of all has no velocity and so no result."""
     try:
         parent, name = record.parent.text, record.name.text
         if request.rename is not None:
             if lost := lost_name(record, request):
                 warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
             parent, name = request.rename(parent, name)
-        parts, _ = moved(record, _edge(record, request, source), record.values, request)
+        parts, _ = moved(record, _edge(record, request, source), record.values, request, memory)
+        if request.operation.velocity:
+            seconds = memory.step(_beside_ns(document, record, request))
+            if seconds is None:
+                return None
+            parts = request.operation.with_velocity(parts, seconds, floats)
+    except Misfit as misfit:
+        raise placed(misfit, source) from misfit
     except ValueInvalid as error:
         raise placed(Misfit(str(error), record.path), source) from error
     return Answer(record, parts, parent, name)
+
+
+def _beside_ns(document: Document, record: Record, request: Request) -> int:
+    """Return the stamp that stands beside a record."""
+    paths = beside_path(document, record, request.beside or "")
+    texts = [str(value_at(document.value, path[1:])) for path in paths]
+    return read_header_stamp(*texts) if len(texts) > 1 else read_stamp(*texts, in_ns=in_nanoseconds(str(paths[0][-1])))
 
 
 def _edge(record: Record, request: Request, source: Source) -> Rigid | None:
@@ -278,6 +300,7 @@ def stream_results(
 
     splitter = Splitter(form)
     line, rows = 1, 0
+    memory = Memory()
     for block in read_blocks(stream, whole=splitter.whole):
         for part in splitter.parts(block).parts:
             rows += 1
@@ -287,7 +310,7 @@ def stream_results(
                 continue
             try:
                 text = decode(block[part.start : part.end], bad.source)
-                yield from results(Source(bad.source, text), request, style)
+                yield from results(Source(bad.source, text), request, style, memory)
             except FormatError as error:
                 bad.take([Fault(at + max(error.line, 1) - 1, str(error.column or ""), error.message)])
             except FrametoolError as error:

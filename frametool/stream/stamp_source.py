@@ -38,7 +38,7 @@ class Timed(NamedTuple):
     @property
     def in_ns(self) -> bool:
         """Tell whether the name says that stamps are integer nanoseconds."""
-        return self.name.endswith("_ns") or self.name in NANOSECONDS
+        return in_nanoseconds(self.name)
 
     @property
     def column(self) -> str:
@@ -49,6 +49,11 @@ class Timed(NamedTuple):
         """Return the pose at one time, to the bit as `many` does; raises FrametoolError where there is none."""
         tx, ty, tz, x, y, z, w = (float(column[0]) for column in self.many(frame, [stamp_ns]))
         return (tx, ty, tz, x, y, z, w) if w == w else self.one(frame, stamp_ns)  # noqa: PLR0124 - nan is not itself
+
+
+def in_nanoseconds(name: str) -> bool:
+    """Tell whether the name of stamps says that they are integer nanoseconds."""
+    return name.endswith("_ns") or name in NANOSECONDS
 
 
 def read_header_stamp(seconds: str, nanoseconds: str) -> int:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, FrametoolError
 from frametool.stream.blocks import Run, State
-from frametool.stream.faults import NULL, Fault
+from frametool.stream.faults import NULL, Fault, Misused
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.table import UNCLOSED, open_table, table_block
@@ -53,6 +53,8 @@ def run_table(
     unasked = None
     if request.timed is not None and not request.timed.name:  # rows have no header
         unasked, request = _stamps_unasked(table, request.timed), request._replace(timed=None)
+    if request.beside == "":
+        request = request._replace(beside=_usual_stamps(table, source))
     plan, layout = plan_table(table, request, source)
     taken = len(first) - len(rest)
     yield Outcome(table.opening(layout), lines=first.count(b"\n", 0, taken), size=taken)
@@ -89,6 +91,15 @@ def _stamps_unasked(table: Table, timed: Timed) -> Timed | None:
     """Find a column of stamps that no option names."""
     name = next(filter(STAMPS.fullmatch, table.names or ()), None)
     return None if name is None else timed._replace(name=name)
+
+
+def _usual_stamps(table: Table, source: str) -> str:
+    """Return the name of the column of stamps that no option names."""
+    name = next(filter(STAMPS.fullmatch, table.names or ()), None)
+    if name is None:
+        columns = f"; columns: {', '.join(table.names)}" if table.names else ""
+        raise Misused(f"rows have no column of stamps; give --time-column{columns}", source=source, line=1)
+    return name
 
 
 class TableWork:

@@ -7,6 +7,7 @@ cuts them all into the same stretches, and nothing has to be parsed again.
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -48,6 +49,7 @@ FREE = {
 }
 SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 # scalars under these keys decide what a record is, wherever in it they stand ..
+USUAL_STAMPS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
 # .. and these in the mappings that hold the record
 _WORDS = frozenset(word.partition("_deg")[0].partition("_rad")[0] for word in (*OURS, *POSE_KEYS, "theta"))
@@ -118,6 +120,11 @@ class Template:
         return tuple(
             ".".join(map(str, path[1:])) if path else "" for entry in self.entries for path in entry.record.numbers
         )
+
+    @property
+    def beside(self) -> str:
+        """Return the last key that leads to what is read beside the numbers."""
+        return next((str(entry.stamp[0][-1]) for entry in self.entries if entry.stamp), "")
 
     def segments(self) -> list[str]:
         """Return the text of each stretch."""
@@ -294,11 +301,29 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
         stamp = ((document.index, *found),)
     elif timed is not None and record.stamp and timed.moves(record.parent.text):
         stamp = record.stamp
+    elif request.beside is not None:
+        stamp = beside_path(document, record, request.beside)
     elif request.way is not None:
         edge = request.way(record.parent.text)
     if request.rename is not None:
         request.rename(record.parent.text, record.name.text)
     return Entry(record, target_of(record, request), edge, stamp)
+
+
+def beside_path(document: Document, record: Record, name: str) -> tuple[Path, ...]:
+    """Find what stands beside a record under a key; "" is the stamp of its header, or else under a usual key.
+
+    Raises Misfit.
+    """
+    if not name and record.stamp:
+        return record.stamp
+    for usual in USUAL_STAMPS if not name else ():
+        with suppress(Misfit):
+            return ((document.index, *stamp_path(document.value, record.path[1:], usual)),)
+    if not name:
+        usual = ", ".join(USUAL_STAMPS)
+        raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path)
+    return ((document.index, *within((document.index,), stamp_path, document.value, record.path[1:], name)),)
 
 
 def _edits(text: str, entries: Sequence[Entry], root: Node, request: Request, *, json: bool) -> list[Edit]:

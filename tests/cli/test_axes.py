@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ MIRRORS = [name for name, rows in CHANGES.items() if np.linalg.det(rows) < 0]
 POSE = {"xyz": [1.5, -2.25, 3.0], "xyzw": Rotation.from_euler("xyz", [0.3, -0.8, 1.9]).as_quat().tolist()}
 
 
-def homogeneous(rotation: object, xyz: object = (0, 0, 0)) -> np.ndarray:
+def homogeneous(rotation: Any, xyz: Any = (0, 0, 0)) -> Any:
     """Write a 4x4 matrix."""
     made = np.eye(4)
     made[:3, :3], made[:3, 3] = rotation, xyz
