@@ -5,6 +5,11 @@
     map_from_camera = tree.lookup("map", "camera_optical")      # the pose of camera_optical in map
     point_in_map = map_from_camera.apply([0.0, 0.0, 1.0])
 
+`FORMATS` is the table of the forms of files, name -> row: what is read from a form and written in it, how it is
+recognised, what its numbers mean; `frametool formats` prints it.
+
+    [name for name, row in frametool.FORMATS.items() if "tree" in row.reads]    # what `load` takes as its format
+
 Arguments are always in the order (target, source). Metres, radians, quaternions x, y, z, w, stamps in integer
 nanoseconds. Names are loaded when first used: `import frametool` alone loads neither numpy nor yaml.
 """
@@ -13,12 +18,15 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from frametool.calc.python_face import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
+    from frametool.formats import FORMATS as FORMATS
     from frametool.formats.load import load as load
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.tree import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
+    from frametool.lint.tree_diff import diff as diff
     from frametool.sim.controllers import FollowController as FollowController
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
@@ -29,6 +37,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "calc": "frametool.calc",
+    "FORMATS": "frametool.formats",
     "FollowController": "frametool.sim.controllers",
     "FrameTree": "frametool.frames.tree",
     "FrametoolError": "frametool.errors",
@@ -37,12 +47,14 @@ _HOMES = {
     "TransformBuffer": "frametool.frames.buffer",
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
+    "diff": "frametool.lint.tree_diff",
     "load": "frametool.formats.load",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
     "tutorial": "frametool.sim.scene",
 }
 __all__ = [
+    "FORMATS",
     "FollowController",
     "FrameTree",
     "FrametoolError",
@@ -52,6 +64,8 @@ __all__ = [
     "Turtle",
     "Twist",
     "__version__",
+    "calc",
+    "diff",
     "load",
     "simulate",
     "simulate_many",
@@ -65,7 +79,8 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'frametool' has no attribute {name!r}")
     from importlib import import_module
 
-    value: object = getattr(import_module(_HOMES[name]), name)
+    home = import_module(_HOMES[name])
+    value: object = home if _HOMES[name] == f"frametool.{name}" else getattr(home, name)
     globals()[name] = value
     return value
 

@@ -5,6 +5,7 @@
       FormatError      text that is not what it should be, with      1
                        its source, line and column
       Unanswered       a form that leaves open what an option says   2
+      BadAnswer        an option that does not fit the file          2
       BadTopology      cycle, two parents, a frame in itself         1
       LookupFailed                                                   4
         UnknownFrame   NotConnected
@@ -106,6 +107,12 @@ class FormatError(FrametoolError, ValueError):
 
 class Unanswered(FormatError):
     """Report a file whose form leaves something open, with the options that say it."""
+
+    exit_code = 2
+
+
+class BadAnswer(FormatError):
+    """Report an option about a file that does not fit it, as a joint that the robot does not have."""
 
     exit_code = 2
 

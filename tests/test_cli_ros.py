@@ -151,7 +151,7 @@ def test_monitor_names_each_parent_once_and_counts_the_changes(run: Run) -> None
     entry = json.loads(run("monitor", "-", "-f", "json", stdin=moving(*STEADY, parents="mo")).out)
     assert (entry["parents"], entry["parent_changes"]) == ("map, odom", 19)
     header, row = run("monitor", "-", "-f", "text", stdin=moving(*STEADY, parents="mo")).out.splitlines()
-    assert (header.split()[-1], row.split()[-1]) == ("reparented", "19")
+    assert (header.split()[-1], row.split()[-1]) == ("parents", "19")
 
 
 @pytest.mark.parametrize("begin", [1, 9])

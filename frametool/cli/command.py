@@ -16,7 +16,7 @@ from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, nota
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from frametool.geometry.representations import Notation
 
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+]| +(Translation|Rotation):)", re.IGNORECASE)
 READ = readers("tree", "records", "rows", "joints")
-SPELLINGS = [row.spelling for row in REPRESENTATIONS.values()]
-EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file, 130 interrupted."
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file."
 
 
 class Command(WithHelp):
@@ -36,6 +35,8 @@ class Command(WithHelp):
     own check of misspelled options; `Text` takes the blank off again.
     """
 
+    exit_codes = EXIT_CODES
+
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers, then parse."""
         return super().parse_args(ctx, [f" {each}" if NEGATIVE.match(each) else each for each in args])
@@ -44,7 +45,7 @@ class Command(WithHelp):
         """End every help with the exit codes."""
         super().format_epilog(ctx, formatter)
         formatter.write_paragraph()
-        formatter.write_text(EXIT_CODES)
+        formatter.write_text(self.exit_codes)
 
 
 class Text(click.ParamType[str]):
@@ -146,7 +147,7 @@ def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> Non
 
 verbose_option = click.option(
     "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
-    help="say on stderr what each input was taken for",
+    help="say what each input was taken for",
 )  # fmt: skip
 
 
@@ -155,22 +156,32 @@ FORMS = "frametool.forms"  # where a command's context keeps those of --in
 
 
 class Form(Text):
-    """The name of a form of text from which something is read."""
+    """The name of a form of text, of any or of those from which something is read."""
 
     name = "form"
 
+    def __init__(self, names: Collection[str], are: str) -> None:
+        """Keep the forms that may be named, and what they are in an error: `read`, `known`."""
+        self.names = names
+        self.are = are
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Refuse what is none, with the nearest names."""
-        if value not in READ:
-            near = did_you_mean(value, READ)
-            self.fail(f"no form {shown(value)} is read{near}; `frametool formats` lists all", param, ctx)
+        """Refuse what is none, with the nearest name; of a form that is known and not read, say what to do."""
+        if value not in self.names:
+            self.fail(self._problem(value), param, ctx)
         return value
+
+    def _problem(self, value: str) -> str:
+        if value in FORMATS and (instead := FORMATS[value].instead):
+            return f"{value} ({FORMATS[value].summary}) is not read: {instead}"
+        near = did_you_mean(value, self.names)
+        return f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
         """Offer the forms."""
         from click.shell_completion import CompletionItem
 
-        return [CompletionItem(name, help=FORMATS[name].summary) for name in READ if name.startswith(incomplete)]
+        return [CompletionItem(name, help=FORMATS[name].summary) for name in self.names if name.startswith(incomplete)]
 
 
 def _keep_forms(context: click.Context, _: click.Parameter, chosen: Sequence[str]) -> None:
@@ -184,8 +195,9 @@ def forms_told() -> tuple[str, ...]:
 
 
 in_option = click.option(
-    "--in", "input_forms", type=Form(), multiple=True, metavar="FORM", expose_value=False, callback=_keep_forms,
-    help="form of the input, one of `frametool formats`; once a file  [default: by content, then by suffix]",
+    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM", expose_value=False,
+    callback=_keep_forms,
+    help="form of the input (`frametool formats`), once a file",
 )  # fmt: skip
 
 
@@ -196,29 +208,35 @@ def say_if_verbose(text: str) -> None:
         say(text)
 
 
+_PRECISION = click.option(
+    "--precision", type=Digits(), metavar="N|full",
+    help="digits after the point  [default: full; overviews 6]",
+)  # fmt: skip
+_PLACE = (
+    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
+    click.option("--force", is_flag=True, help="let --output replace a file"),
+)
+
+
 def result_options(what: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
-    options = [
-        click.option(
-            "-f",
-            "--format",
-            "format_name",
-            type=click.Choice(("text", *writers(what))),
-            help="form of the result  [default: text on a terminal, yaml otherwise]",
-        ),
-        click.option(
-            "--precision",
-            type=Digits(),
-            metavar="N|full",
-            help="digits after the point  [default: full, the shortest text that reads back to the same bits; "
-            "6 in an overview for people]",
-        ),
-        click.option(
-            "-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all"
-        ),
-        click.option("--force", is_flag=True, help="let --output replace an existing file"),
-    ]
-    return lambda function: decorated(function, options)
+    form = click.option(
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers(what))),
+        help="form of the result",
+    )  # fmt: skip
+    return lambda function: decorated(function, (form, _PRECISION, *_PLACE))
+
+
+def list_options(*more: str) -> Callable[[Function], Function]:
+    """Add to a command the options that shape and place a list for people, which is text wherever it goes.
+
+    more: forms beside text and those of reports
+    """
+    form = click.option(
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers("report"), *more)),
+        help="form of the result  [default: text]",
+    )  # fmt: skip
+    return lambda function: decorated(function, (form, *_PLACE))
 
 
 def rotation_options(function: Function) -> Function:
@@ -231,11 +249,11 @@ def rotation_options(function: Function) -> Function:
                 "notations",
                 type=Notations(),
                 metavar="REP[,REP..]",
-                help=f"representations of the result: {', '.join(SPELLINGS)}; angles take _deg  [default: quaternion]",
+                help="representations of the result  [default: quaternion]",
             ),
             click.option("--deg", is_flag=True, help="angles in degrees"),
             click.option(
-                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out instead of w >= 0"
+                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"
             ),
         ],
     )
@@ -244,7 +262,7 @@ def rotation_options(function: Function) -> Function:
 def pose_options(function: Function) -> Function:
     """Add to a command the options that say how poses are read; they come beside `rotation_options`."""
     return click.option(
-        "--normalize", is_flag=True, help="accept any non-zero quaternion and any matrix near a rotation"
+        "--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation"
     )(function)
 
 

@@ -69,17 +69,44 @@ class Group(WithHelp, click.Group):
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
+ALL_VERSIONS = "frametool.all_versions"  # where the context keeps that --version is to tell more
+
+
+def _keep_all_versions(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
+    ctx.meta[ALL_VERSIONS] = chosen
+
+
 def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
     """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
     if chosen:
         with writing(None) as write:
-            write(f"frametool {__version__}\n")
+            write(f"frametool {__version__}\n{_surroundings() if ctx.meta.get(ALL_VERSIONS) else ''}")
         ctx.exit()
 
 
+EXTRAS = {"rosbags": "bag", "matplotlib": "plot"}  # package -> the extra it comes with
+
+
+def _surroundings() -> str:
+    """Return the versions of Python and of the packages there are, one a line, for a report of a fault."""
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    lines = [f"Python {platform.python_version()} on {platform.system()} {platform.machine()}"]
+    for package in ("numpy", "click", "rich", "pyyaml", *EXTRAS):
+        try:
+            found = version(package)
+        except PackageNotFoundError:
+            found = "not installed"
+        lines.append(f"{package} {found}{f' (extra {EXTRAS[package]})' if package in EXTRAS else ''}")
+    return "".join(f"{line}\n" for line in lines)
+
+
 @click.command(cls=Group, help=HELP, no_args_is_help=True)
-@click.option("--version", is_flag=True, is_eager=True, expose_value=False, help="Show the version and exit.",
-              callback=_show_version)  # fmt: skip
+@click.option("-v", "all_versions", is_flag=True, is_eager=True, expose_value=False, callback=_keep_all_versions,
+              help="with --version: of Python and of its packages too")  # fmt: skip
+@click.option("--version", is_flag=True, expose_value=False, callback=_show_version,
+              help="Show the version and exit.")  # fmt: skip
 def group() -> None:
     """Hold the commands."""
 

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 def column_options(function: Function) -> Function:
     """Add to a command the options that name columns of frames; `RowFrames` takes them."""
     function = click.option(
-        "--source-column", type=TEXT, metavar="NAME", help="stream a table; this column names each row's SOURCE"
+        "--source-column", type=TEXT, metavar="NAME", help="column of a table with each row's SOURCE"
     )(function)
     return click.option(
-        "--target-column", type=TEXT, metavar="NAME", help="stream a table; this column names each row's TARGET"
+        "--target-column", type=TEXT, metavar="NAME", help="column of a table with each row's TARGET"
     )(function)
 
 

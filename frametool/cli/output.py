@@ -41,13 +41,17 @@ class Output:
         notations: tuple[Notation, ...] | None = None,
         deg: bool = False,
         keep_sign: bool = False,
+        otherwise: str | None = None,
     ) -> None:
-        """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+        """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe.
+
+        otherwise: the form that stands in the place of these two
+        """
         self.path = output
         self.force = force
         self.told = format_name or by_suffix(output, writers(what))
         self.notations = notations or ()
-        form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
+        form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
         full = precision == FULL

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from frametool.cli.pasted_input import INLINE, is_inline, is_pasted, rewritten
 from frametool.documents.source import Source, read_text
-from frametool.errors import FormatError, ValueInvalid, warn
+from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.grammar.pose import Pose
+from frametool.grammar.pose_algebra import inverse
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
 from frametool.grammar.rotation import read_spelled, rotation_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Result
     from frametool.stream.request import Request
 
+INVERSE = "inv"
 ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
 
 
@@ -96,13 +98,56 @@ def usage_if_inline(error: FormatError) -> FormatError:
     return error
 
 
+class Factor(NamedTuple):
+    """An argument of a product, and whether its inverse is meant."""
+
+    argument: str
+    is_inverse: bool = False
+
+    def of(self, pose: Pose) -> Pose:
+        """Return a pose of the argument, or its inverse."""
+        return inverse(pose) if self.is_inverse else pose
+
+
+def factors_of(arguments: Iterable[str]) -> list[Factor]:
+    """Read `inv(POSE)`, `~POSE`, and the word `inv` before one; twice is not at all."""
+    factors, is_inverse = [], False
+    for argument in arguments:
+        if argument == INVERSE:
+            is_inverse = not is_inverse
+            continue
+        factors.append(_factor(argument, is_inverse=is_inverse))
+        is_inverse = False
+    if is_inverse:
+        raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it")
+    return factors
+
+
+def _factor(text: str, *, is_inverse: bool) -> Factor:
+    bare = text.strip()
+    while True:
+        if bare.startswith("~") and len(bare) > 1:
+            bare = bare[1:].strip()
+        elif bare.startswith(f"{INVERSE}(") and bare.endswith(")"):
+            bare = bare[len(INVERSE) + 1 : -1].strip()
+        else:
+            return Factor(bare if bare != text.strip() else text, is_inverse)
+        if not bare:
+            raise click.UsageError(f"{shown(text)}: there is no pose whose inverse is meant")
+        is_inverse = not is_inverse
+
+
 def combinations(
-    arguments: Sequence[str | Source], given: Notation | None = None, *, degrees: bool, normalize: bool
+    arguments: Sequence[str | Source | Factor], given: Notation | None = None, *, degrees: bool, normalize: bool
 ) -> list[tuple[Pose, ...]]:
     """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
+    factors = [each if isinstance(each, Factor) else Factor(each) for each in arguments]  # type: ignore[arg-type]
+    arguments = [each.argument for each in factors]
     if list(arguments).count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
-    read = [poses_from(each, given, degrees=degrees, normalize=normalize) for each in arguments]
+    read = [
+        list(map(each.of, poses_from(each.argument, given, degrees=degrees, normalize=normalize))) for each in factors
+    ]
     several = [index for index, poses in enumerate(read) if len(poses) > 1]
     if len(several) > 1:
         counts = " and ".join(f"{arguments[index]} ({len(read[index])})" for index in several)

@@ -45,36 +45,36 @@ STREAMED = ("records", "rows")
 RECORDS = readers("records")
 OPTIONS = {
     "input_path": click.option(
-        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream from this file instead of standard input"
+        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
     ),
     "given": click.option(
         "--from", "given", type=Notations(), metavar="REP",
-        help="what the rotations of VALUES or of a stream's columns are",
+        help="what unnamed numbers are",
     ),
     "columns": click.option(
         "--columns", type=TEXT, metavar="NAME,..", multiple=True,
         help="our columns, by name or number; once for each pose",
     ),
-    "keep": click.option("--keep", is_flag=True, help="add the result's columns instead of replacing ours"),
+    "keep": click.option("--keep", is_flag=True, help="add the result's columns, leave ours"),
     "prefix": click.option(
-        "--prefix", type=UTF8, default="", metavar="TEXT", help="put this before the names of the result's columns"
+        "--prefix", type=UTF8, default="", metavar="TEXT", help="begin the names of the result's columns so"
     ),
     "header": click.option(
         "--no-header", "header", is_flag=True, flag_value=False, default=True,
         help="a table without names; columns are numbered",
     ),
     "on_error": click.option(
-        "--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="how to treat bad rows"
+        "--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="bad rows"
     ),
     "max_errors": click.option(
         "--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N",
-        help="report at most N bad rows; all are counted",
+        help="report at most N bad rows, count all",
     ),
     "jobs": click.option(
         "--jobs", type=click.IntRange(1, MOST_JOBS), default=1, show_default=True, metavar="N",
         help="processes for a large stream",
     ),
-    "quiet": click.option("--quiet", is_flag=True, help="no progress on stderr"),
+    "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
 }  # fmt: skip
 
 
@@ -200,7 +200,8 @@ class Stream:
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
         options = self.options
-        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or options["prefix"])):
+        prefix = options["prefix"] and not request.operation.only_adds
+        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or prefix)):
             raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
         if form in RECORDS and len(options["columns"]) > 1:
             raise click.UsageError("--columns are those of a table; a record names its own numbers")

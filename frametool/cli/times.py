@@ -106,11 +106,11 @@ def rules_options(function: Function) -> Function:
     """Add to a command the options that say how moving frames are taken."""
     options = [
         click.option("--moving", is_flag=True,
-                     help="an edge with one stamp answers only that instant, as in tf2  [default: it stands still]"),
+                     help="an edge with one stamp answers only that instant"),
         click.option("--cache", type=Time(latest=False), metavar="SECONDS",
-                     help="keep only so much before each frame's newest sample, as tf2 does  [default: everything]"),
+                     help="forget what is older  [default: nothing]"),
         click.option("--tf2", type=click.Choice(POLICIES),
-                     help="accept, refuse and complain as tf2 does; implies --cache 10"),
+                     help="take, refuse and complain as tf2 does"),
     ]  # fmt: skip
     return decorated(function, options)
 
@@ -163,6 +163,6 @@ def _range(text: str) -> range:
 
 
 times_option = click.option(
-    "--times", type=TEXT, metavar="FILE|START:STOP:STEP",
-    help="many times: one a line, or a range in seconds, STOP included where a step meets it",
+    "--times", type=TEXT, metavar="TIMES",
+    help="many: FILE, one a line, or START:STOP:STEP, seconds",
 )  # fmt: skip

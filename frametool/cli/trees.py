@@ -14,8 +14,6 @@ from frametool.cli.poses import source_of
 from frametool.cli.stderr import say
 from frametool.errors import shown, warn
 from frametool.formats import FORMATS
-from frametool.formats.load import load_sources
-from frametool.formats.recordings import Recording
 from frametool.grammar.edges import CAMERA_AXES, DH, DIRECTIONS, Answers
 
 if TYPE_CHECKING:
@@ -24,7 +22,8 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from frametool.formats.assembly import Rules
+    from frametool.formats.assembly import Place, Rules
+    from frametool.formats.recordings import Recording
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
@@ -47,10 +46,10 @@ def _option(*names: str, **rest: Any) -> Callable[[Any], Any]:
     return click.option(*names, expose_value=False, callback=_keep, **rest)
 
 
-_quiet_option = _option("--quiet", "quiet", is_flag=True, help="do not say what files of other forms were taken for")
+_quiet_option = _option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
 _READING_OPTIONS = (
     _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
-            help="read only this topic of a recording; may be repeated"),
+            help="read only this topic; may be repeated"),
     _option("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
             help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
     _option("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
@@ -73,10 +72,32 @@ def load_tree(
 
     streams: `--in` is about what is streamed wherever that can be
     """
+    from frametool.formats.load import load_sources  # not every command that may read trees does
+
     files = opened((argument, *more), streams=streams)
     tree = load_sources(files, rules)
     state(files)
     return tree
+
+
+def load_sides(
+    a: Sequence[str], b: Sequence[str], *, normalize: bool, places: Sequence[dict[str, Place]]
+) -> list[FrameTree | TransformBuffer]:
+    """Read two trees that will be compared, each of several files, as `load_tree` does.
+
+    places: are filled with where each frame of the one and the other was said to be
+    """
+    refuse_two_readers((*a, *b))
+    from frametool.formats.assembly import Rules
+    from frametool.formats.load import load_sources
+
+    rules = Rules(normalize=normalize)
+    trees = []
+    for arguments, behind, found in ((a, 0, places[0]), (b, len(a), places[1])):
+        files = opened(arguments, behind=behind)
+        trees.append(load_sources(files, rules, found))
+        state(files)
+    return trees
 
 
 def state(files: Sequence[Recording]) -> None:
@@ -84,30 +105,39 @@ def state(files: Sequence[Recording]) -> None:
     context = click.get_current_context(silent=True)
     if context is None:
         return
-    quiet = context.params.get("quiet") or context.meta.get(READING, {}).get("quiet")
     for file in files:
-        if said := ("" if quiet else file.stated) or (file.described if context.meta.get(VERBOSE) else ""):
+        if said := ("" if is_quiet() else file.stated) or (file.described if context.meta.get(VERBOSE) else ""):
             say(said)
 
 
-def opened(arguments: Sequence[str], *, streams: bool = False) -> list[Recording]:
+def is_quiet() -> bool:
+    """Return whether the command was called with --quiet."""
+    context = click.get_current_context()
+    return bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
+
+
+def opened(arguments: Sequence[str], *, streams: bool = False, behind: int = 0) -> list[Recording]:
     """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
 
     streams: as `load_tree` has it
+    behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
     """
-    if list(arguments).count("-") > 1:
-        raise click.UsageError("standard input can be read once; only one argument may be -")
+    from frametool.formats.recordings import Recording, opened_together
+
+    refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
-    told = iter([form for form in forms_told() if _reads_trees(form, streams=streams)])
+    forms = [form for form in forms_told() if _reads_trees(form, streams=streams)]
+    told = iter(forms[behind:] or forms)
     context = click.get_current_context(silent=True)
     chosen = dict(context.meta.get(READING, {})) if context is not None else {}
     chosen.pop("quiet", None)
     topics = chosen.pop("topics", ())
-    frames = iter(chosen.pop("named_frames", ()))
+    named = chosen.pop("named_frames", ())
+    frames = iter(named[behind:] or named)
     chosen["joints"] = dict(map(_joint, chosen.pop("joints", ())))
     general = Answers(**{name: value for name, value in chosen.items() if value})
-    return [
+    return opened_together(
         Recording.inline(source_of(each))
         if is_inline(each)
         else Recording(
@@ -117,7 +147,13 @@ def opened(arguments: Sequence[str], *, streams: bool = False) -> list[Recording
             answers=general._replace(frames=_frame_names(next(frames, ""))),
         )
         for each in arguments
-    ]
+    )
+
+
+def refuse_two_readers(arguments: Sequence[str]) -> None:
+    """Raise a usage error where two arguments stand for standard input."""
+    if list(arguments).count("-") > 1:
+        raise click.UsageError("standard input can be read once; only one argument may be -")
 
 
 def _reads_trees(form: str, *, streams: bool) -> bool:
@@ -164,7 +200,7 @@ class Frame(Text):
 
         from frametool.errors import FrametoolError
 
-        named = ctx.params.get("tree") or next(iter(ctx.params.get("arguments") or ()), None)
+        named = ctx.params.get("tree") or ctx.params.get("a") or next(iter(ctx.params.get("arguments") or ()), None)
         if named is None and "arguments" in ctx.params:
             return [CompletionItem(incomplete, type="file")]
         try:

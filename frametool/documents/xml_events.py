@@ -7,6 +7,7 @@ are read too.
 from __future__ import annotations
 
 import re
+from math import inf, isfinite
 from typing import NamedTuple
 from xml.parsers import expat
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 DEEPEST_ELEMENT = 100_000
 _BLOCK = 1 << 16
+_DECIMALS = "0123456789.-+eE \t\r\n"
 
 
 class Element(NamedTuple):
@@ -56,33 +58,48 @@ class XmlFile:
         if len(self.data) > MOST_CHARACTERS:
             raise FormatError(f"longer than {MOST_CHARACTERS} bytes, the most in one file", source=self.name)
 
-    def elements(self) -> Iterator[Element]:
+    def elements(self, deepest: int = DEEPEST_ELEMENT, *, ends: bool = True) -> Iterator[Element]:
         """Yield the beginnings and ends of all elements, in order.
 
+        deepest: those further down are left out; ends: without them the text in elements is left out too.
         Raises FormatError for what is no XML, and for declarations of entities.
         """
         opened: list[Element] = []
         texts: list[list[str]] = []
         found: list[Element] = []
         parser = expat.ParserCreate()
+        depth = 0
 
         def start(tag: str, attributes: dict[str, str]) -> None:
-            place = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, parser.CurrentByteIndex
-            opened.append(Element(False, tag, attributes, len(opened) + 1, *place))  # noqa: FBT003 - a field of a record
-            texts.append([])
-            if len(opened) > DEEPEST_ELEMENT:
-                raise self.error(opened[-1], f"more than {DEEPEST_ELEMENT} elements inside one another")
-            found.append(opened[-1])
+            nonlocal depth
+            depth += 1
+            if depth <= deepest:
+                place = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, parser.CurrentByteIndex
+                found.append(Element(False, tag, attributes, depth, *place))  # noqa: FBT003 - a field of a record
+                if ends:
+                    opened.append(found[-1])
+                    texts.append([])
+            if depth > DEEPEST_ELEMENT:
+                message = f"more than {DEEPEST_ELEMENT} elements inside one another"
+                raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
 
         def end(_: str) -> None:
-            found.append(opened.pop()._replace(ends=True, text="".join(texts.pop())))
+            nonlocal depth
+            if ends and depth <= deepest:
+                found.append(Element(True, *opened.pop()[1:7], "".join(texts.pop())))  # noqa: FBT003 - a field
+            depth -= 1
+
+        def read_text(text: str) -> None:
+            if depth <= deepest:
+                texts[-1].append(text)
 
         def refuse(*_: object) -> NoReturn:
             message = "XML with entities of its own is not read; expand them: xmllint --noent FILE"
             raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
 
         parser.StartElementHandler, parser.EndElementHandler = start, end
-        parser.CharacterDataHandler = lambda text: texts[-1].append(text)  # noqa: PLW0108 - the last one changes
+        if ends:
+            parser.CharacterDataHandler = read_text
         parser.EntityDeclHandler = refuse
         parser.ExternalEntityRefHandler = refuse
         for begin in range(0, len(self.data) or 1, _BLOCK):
@@ -108,15 +125,19 @@ class XmlFile:
 
     def error(self, element: Element, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
         """Make the error for an element, or for the value of one of its attributes."""
-        line, column = element.line, element.column
-        if attribute:
-            tail = self.data[element.offset : element.offset + _BLOCK]
-            value = re.search(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()), tail)
-            if value:
-                before = tail[: value.end()].decode("utf-8", "replace")
-                line += before.count("\n")
-                column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
+        line, column = self.place(element, attribute)
         return self._at(line, column, message, rule=rule)
+
+    def place(self, element: Element, attribute: str = "") -> tuple[int, int]:
+        """Return line and column of an element, or of the value of one of its attributes."""
+        line, column = element.line, element.column
+        name = re.compile(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()))
+        value = name.search(self.data, element.offset, element.offset + _BLOCK) if attribute else None
+        if value:
+            before = self.data[element.offset : value.end()].decode("utf-8", "replace")
+            line += before.count("\n")
+            column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
+        return line, column
 
     def _at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
         # lines as expat counts them, which are those of every editor
@@ -134,6 +155,13 @@ class XmlFile:
     def numbers_in(self, text: str, element: Element, attribute: str, count: int) -> tuple[float, ...]:
         """Read a text of an element as so many finite numbers; the attribute, if any, is where it stands."""
         words = text.split()
+        if len(words) == count and not text.strip(_DECIMALS):  # plain decimals, nearly always
+            try:
+                numbers = tuple(map(float, words))
+            except ValueError:
+                numbers = (inf,)
+            if all(map(isfinite, numbers)):
+                return numbers
         if len(words) != count:
             found = f"found {len(words)} in {shown(text)}"
             expected = f"{count} number{'s' * (count != 1)}"

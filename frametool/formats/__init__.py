@@ -10,7 +10,8 @@ class Format(NamedTuple):
 
     summary: what it is, in a line
     suffixes: of files in this form
-    reads: what is read from it: `tree` by `read` of `reader`; `records` and `rows` by the streams
+    reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
+        `records` and `rows` by the streams
     writes: what is written in it, by `write_poses`, `write_points` (also for a `report`), `write_tree` of `writer`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
@@ -35,6 +36,10 @@ _MESSAGES = "frametool.ros.message_reader"
 BAG = "frametool.ros.bags"
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
+)
+_SRDF = (
+    "group|group_state|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
+    "(?:disable|enable|disable_default)_collisions"
 )
 
 FORMATS = {
@@ -137,9 +142,89 @@ FORMATS = {
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
     "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.dot"),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.mermaid"),
+    "autoware": Format(
+        "Autoware sensor calibration",
+        reads=("tree",),
+        reader="frametool.formats.autoware",
+        writes=("tree",),
+        writer="frametool.formats.autoware",
+        signs=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
+        states="parent<-child, metres, radians, roll pitch yaw about fixed axes",
+    ),
+    "camchain": Format(
+        "camera chain of Kalibr, OpenVINS or okvis",
+        reads=("tree",),
+        reader="frametool.formats.camchain",
+        writes=("tree",),
+        writer="frametool.formats.camchain",
+        signs=(("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),),
+        states="target<-source as each key says; metres",
+        asks=("direction", "frames"),
+    ),
+    "opencv": Format(
+        "OpenCV FileStorage",
+        reads=("tree",),
+        reader="frametool.formats.opencv",
+        writes=("tree",),
+        writer="frametool.formats.opencv",
+        signs=(
+            ("xml", "opencv_storage"),
+            ("json path", "*/type_id"),
+            ("text", r"\A\s*%YAML:1\.0|: *!!opencv-"),
+        ),
+        states="target<-source as each key says, camera<-object by rvec and tvec; metres",
+        asks=("direction", "frames"),
+    ),
+    "euroc-sensor": Format(
+        "sensor.yaml of EuRoC",
+        reads=("tree",),
+        reader="frametool.formats.euroc_sensor",
+        signs=(("yaml key", "T_BS"),),
+        states="T_BS is body<-sensor, metres",
+        asks=("frames",),
+    ),
+    "handeye": Format(
+        "hand-eye calibration of easy_handeye",
+        reads=("tree",),
+        reader="frametool.formats.handeye",
+        writes=("tree",),
+        writer="frametool.formats.handeye",
+        signs=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
+        states="effector (base if not on the hand)<-tracking base, metres, x y z w",
+    ),
+    "launch": Format(
+        "launch file",
+        suffixes=(".launch",),
+        reads=("tree",),
+        reader="frametool.formats.launch",
+        writes=("tree",),
+        writer="frametool.formats.launch",
+        signs=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
+        states="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
+    ),
+    "urdf": Format(
+        "URDF robot",
+        suffixes=(".urdf",),
+        reads=("tree",),
+        reader="frametool.formats.urdf",
+        writes=("tree",),
+        writer="frametool.formats.urdf_writer",
+        signs=(("xml", "robot"),),
+        states="parent<-child, metres, radians, rpy about fixed axes",
+    ),
+    "srdf": Format(
+        "SRDF, the semantics of a robot",
+        suffixes=(".srdf",),
+        reads=("tree", "joints"),
+        reader="frametool.formats.srdf",
+        signs=(("xml child", f"robot/(?:{_SRDF})"),),
+        states="virtual joints: parent_frame<-child_link; its states are values of joints (--joints FILE:STATE)",
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
-        signs=(("xml text", r"<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b"),),
+        signs=(  # launch files have the same substitutions
+            ("xml text", r"(?s)\A(?!<launch\b).*?(?:<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b)"),
+        ),
         instead="expand it: xacro FILE > robot.urdf (pip install xacro)",
     ),
     "camera_info": Format(

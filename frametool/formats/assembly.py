@@ -80,6 +80,11 @@ class Assembly:
         self._stamps: dict[str, int] = {}  # child -> its one stamp, while it has no other
         self._moves: set[str] = set()
 
+    @property
+    def places(self) -> dict[str, Place]:
+        """Return where each frame that has a parent was first said to hang from it."""
+        return {child: place for child, (_, _, place) in self._first.items()}
+
     def add_root(self, frame: str) -> None:
         """Make a frame known that has no parent (yet)."""
         (self.tree if self.buffer is None else self.buffer).add_root(self._kept(frame))

@@ -13,7 +13,8 @@ Kinds of signs in the table, the strongest first.  Above the suffix, a sign belo
     yaml inner a pattern of a key that stands deeper
     text       a pattern found in the first characters
     line       a pattern of the first line of data, behind blank lines, comments and what tools print
-    leaves     a pattern of all the keys that have a number beside them
+    leaves     a pattern of the keys that have a number beside them, behind a slash for each key above them; of five
+               one may be another, so that a misspelt one is told where it stands
 
 Below it, the first form that looks so is taken:
 
@@ -99,13 +100,35 @@ class Beginning:
 
     @cached_property
     def yaml_inner_keys(self) -> set[str]:
-        """Return the words behind the blanks or dashes of a line that a colon follows."""
-        return {found[2] for found in re.finditer(rf"(?m)^[ -]+{_YAML_KEY}", self.text)}
+        """Return the words behind the blanks or dashes of a line, and a brace, that a colon follows."""
+        return {found[2] for found in re.finditer(rf"(?m)^[ -]+\{{? *{_YAML_KEY}", self.text)}
 
     @cached_property
-    def number_keys(self) -> set[str]:
-        """Return the words with a colon and a number behind them."""
-        return {found[2] for found in re.finditer(rf"(?m)(?:^|[ ,{{]){_YAML_KEY}[ \t]*[-+]?\.?\d", self.text)}
+    def leaves(self) -> set[str]:
+        """Return the keys of YAML's maps with a number beside them, behind a slash for each key above them.
+
+        A list in between is a `[`.
+        """
+        from frametool.documents.marks import END, LEAF, LIST, MAP
+        from frametool.documents.yaml_events import yaml_events
+
+        found: set[str] = set()
+        outer: list[tuple[str, str | None]] = []
+        way, key = "", None  # what leads to the keys of a map; the key whose value comes next
+        for kind, word, *_ in yaml_events(self.text[:LOOKED_AT]):
+            if kind == END:
+                way, key = outer.pop()
+            elif kind == LEAF and outer and not way.endswith("[") and key is None:
+                key = word
+            elif kind == LEAF:
+                if key is not None and re.match(r"[-+]?\.?\d", word):
+                    found.add(way + key)
+                key = None
+            else:
+                outer.append((way, None))
+                way += "[" if kind == LIST else "/" if len(outer) > 1 and kind == MAP else ""
+                key = None
+        return found
 
     @cached_property
     def xml(self) -> str:
@@ -140,7 +163,7 @@ _STRONG: dict[str, Shows] = {
     "yaml inner": lambda begin, what: _any_is(begin.yaml_inner_keys, what),
     "text": lambda begin, what: re.search(what, begin.text) is not None,
     "line": lambda begin, what: re.match(what, begin.data_line) is not None,
-    "leaves": lambda begin, what: all(re.fullmatch(what, key) for key in begin.number_keys or " "),
+    "leaves": lambda begin, what: 5 * _count(begin.leaves, what) >= 4 * max(1, len(begin.leaves)),
 }
 _WEAK: dict[str, Shows] = {
     "begin": lambda begin, what: re.match(what, begin.text) is not None,
@@ -150,6 +173,10 @@ _WEAK: dict[str, Shows] = {
 
 def _leads(path: tuple[str, ...], way: list[str]) -> bool:
     return len(path) == len(way) and all(step in (key, "*") for key, step in zip(path, way, strict=True))
+
+
+def _count(keys: set[str], pattern: str) -> int:
+    return sum(re.fullmatch(pattern, key) is not None for key in keys)
 
 
 def _any_is(keys: set[str], pattern: str) -> bool:

@@ -6,12 +6,12 @@ from os import PathLike
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.collector import paused_collector
-from frametool.documents.document import format_error, locate
+from frametool.documents.document import format_error, locate, locate_many
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, alternatives
 from frametool.formats import readers
 from frametool.formats.assembly import Assembly, Rules
-from frametool.formats.recordings import Recording
+from frametool.formats.recordings import Recording, close_all, opened_together, refuse_unknown_joints
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
@@ -72,16 +72,41 @@ def load(
     values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in given.items()}
     joint_files = () if joints is None or given is joints else (str(joints),)
     known = Answers(tuple(frames), joints=values, joint_files=joint_files, **answers)
-    return load_sources([Recording(path, form=format, topics=chosen, answers=known) for path in paths], rules)
+    files = (Recording(path, form=format, topics=chosen, answers=known) for path in paths)
+    return load_sources(opened_together(files), rules)
 
 
-def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = None) -> FrameTree | TransformBuffer:
-    """Merge the frames of several texts and files; otherwise as `load`."""
+def load_sources(
+    sources: Sequence[Source | Recording], rules: Rules | None = None, places: dict[str, Place] | None = None
+) -> FrameTree | TransformBuffer:
+    """Merge the frames of several texts and files; otherwise as `load`.
+
+    places: is filled with where each frame was first said to hang from its parent
+    """
     assembly = Assembly(", ".join(source.name for source in sources), rules)
-    with paused_collector():
-        for source in sources:
-            _add(assembly, Recording.inline(source) if isinstance(source, Source) else source)
-        return assembly.finish()
+    try:
+        with paused_collector():
+            files = [Recording.inline(source) if isinstance(source, Source) else source for source in sources]
+            for file in files:
+                _add(assembly, file)
+            refuse_unknown_joints(files)
+            tree = assembly.finish()
+    finally:
+        close_all(sources)
+    if places is not None:
+        places |= assembly.places
+    return tree
+
+
+def lines_of(places: Sequence[Place]) -> list[tuple[str, int]]:
+    """Return file and line of many places, each file walked once; 0 where a line says nothing."""
+    edges = [place for place in places if isinstance(place, EdgePlace)]
+    lines: dict[int, int] = {}
+    for file in {id(each.file): each.file for each in edges}.values():
+        inside = [each for each in edges if each.file is file and each.edge.path]
+        found = locate_many(file.text, [each.edge.path for each in inside]) if inside else []
+        lines |= {id(each): line for each, (line, _) in zip(inside, found, strict=True)}
+    return [(each.file.name, lines.get(id(each), each.edge.line)) for each in edges]
 
 
 def _add(assembly: Assembly, file: Recording) -> None:

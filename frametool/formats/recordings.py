@@ -8,13 +8,13 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from frametool.documents.input_file import InputFile
-from frametool.errors import FileProblem, FormatError, warn
+from frametool.errors import BadAnswer, FileProblem, FormatError, warn
 from frametool.formats import BAG, FORMATS
 from frametool.formats.detect import detect, of_folder
 from frametool.grammar.edges import Answers, Edge, Options, Tally, Topics, stop
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
     from os import PathLike
     from typing import BinaryIO
 
@@ -43,7 +43,11 @@ class Recording(InputFile):
         if not (form or folder) and os.path.isdir(path):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
-        self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+        try:
+            self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+        except BaseException:
+            self.close()
+            raise
         self.tally = Tally()
         self.topics = Topics(topics)
         self.answers = answers
@@ -89,6 +93,36 @@ class Recording(InputFile):
             report(FormatError(missing, source=self.name))
         for told in self.tally.told() if tell else ():
             warn(f"{self.name}:{told.line}: {told.message}")
+
+
+def opened_together(files: Iterable[Recording]) -> list[Recording]:
+    """Return files that are opened one after the other; where one cannot be, the others are closed again."""
+    found: list[Recording] = []
+    try:
+        found.extend(files)
+    except BaseException:
+        close_all(found)
+        raise
+    return found
+
+
+def close_all(files: Iterable[Source | Recording]) -> None:
+    """Let go of files, those among them that were not read."""
+    for file in files:
+        if isinstance(file, Recording):
+            file.close()
+
+
+def refuse_unknown_joints(files: Sequence[Recording]) -> None:
+    """Raise the error for a joint that options or files told of and that none of the files has, once all were read."""
+    told = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
+    robots = [file.tally for file in files if file.tally.has_joints]
+    if told and not robots:
+        option = "--joint" if told[0].joints else "--joints"
+        raise BadAnswer(f"{option}: there are no joints in {', '.join(file.name for file in files)}")
+    for name, error in robots[0].unknown_joints.items() if robots else ():
+        if all(name in robot.unknown_joints for robot in robots):
+            raise error
 
 
 def _about_folder(path: str) -> str:

@@ -335,7 +335,7 @@ def cross(ax: N, ay: N, az: N, bx: N, by: N, bz: N) -> Three[N]:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-def largest_eigenvector(moment: Sequence[Sequence[float]]) -> Four[float]:
+def largest_eigenvector(moment: Sequence[Sequence[N]], xp: Functions[N]) -> Four[N]:
     """Return a unit eigenvector of the largest eigenvalue of a symmetric 4 by 4 matrix without negative ones.
 
     Squared again and again the matrix becomes the projection on that eigenvector, whose longest column is it.
@@ -345,5 +345,9 @@ def largest_eigenvector(moment: Sequence[Sequence[float]]) -> Four[float]:
         trace = moment[0][0] + moment[1][1] + moment[2][2] + moment[3][3]
         moment = [[part / trace for part in row] for row in moment]
         moment = [[a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] for b in moment] for a in moment]
-    x, y, z, w = max(moment, key=lambda row: max(map(abs, row)))
-    return normalized(x, y, z, w, floats)
+    longest = moment[0]
+    for row in moment[1:]:
+        longer = largest_of([abs(part) for part in row], xp) > largest_of([abs(part) for part in longest], xp)
+        longest = [xp.where(longer, new, old) for new, old in zip(row, longest, strict=True)]
+    x, y, z, w = longest
+    return normalized(x, y, z, w, xp)

@@ -238,7 +238,7 @@ class Rotation(Batched):
         if not self.shape:
             return self
         moment = dispatch.second_moment(self._components, dispatch.masses(weights, self.shape))
-        return Rotation.of(*quaternion.largest_eigenvector(moment)).canonical()
+        return Rotation.of(*quaternion.largest_eigenvector(moment, floats)).canonical()
 
     def __repr__(self) -> str:
         """Show one rotation's quaternion, or the shape of many."""

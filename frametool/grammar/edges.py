@@ -80,14 +80,18 @@ class Remark(NamedTuple):
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
-    __slots__ = ("about", "names", "noise", "notes", "others", "rough")
+    __slots__ = ("about", "has_joints", "names", "noise", "notes", "others", "rough", "unknown_joints")
 
     def __init__(self) -> None:
         """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic.
 
         about: what this file holds and what was taken for granted, told beside what its form means
+        has_joints: whether values of joints are about this file; unknown_joints: those told of that it does not have,
+        each with the error that says so, for another file may have them
         """
         self.about = ""
+        self.has_joints = False
+        self.unknown_joints: dict[str, FormatError] = {}
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
         self.rough: list[int] = []
@@ -99,7 +103,15 @@ class Tally:
         if note.rule == "rounded":
             self.rough.append(line)
         else:
-            self.notes.setdefault(note.message, Remark(line, note.message, note.rule))
+            self.remark(line, note.message, note.rule)
+
+    def remark(self, line: int, message: str, rule: str = "odd") -> None:
+        """Keep a sentence about one place."""
+        self.notes.setdefault(message, Remark(line, message, rule))
+
+    def note_each(self, message: str, line: int, rule: str = "odd") -> None:
+        """Keep a sentence about one line, also where it was said of other lines."""
+        self.notes.setdefault(f"{line}: {message}", Remark(line, message, rule))
 
     def told(self) -> Iterator[Remark]:
         """Yield one sentence for each kind of oddity."""

@@ -15,19 +15,20 @@ if TYPE_CHECKING:
 
 # rule -> (level, what it is about); an error fails, a warning fails under --strict, a note never
 RULES = {
-    "syntax": ("error", "text that is not YAML, JSON or what a tool prints, or lacks a part"),
+    "syntax": ("error", "text that cannot be read, or lacks a part"),
     "empty": ("warning", "a file without any transform"),
     "denormalized": ("error", "a quaternion or matrix that is no rotation"),
-    "rounded": ("warning", "a quaternion or matrix off by 1e-6 to 1e-3: normalised"),
+    "rounded": ("warning", "a rotation off by 1e-6 to 1e-3: normalised"),
     "mirrored": ("error", "a left-handed matrix"),
     "not-finite": ("error", "NaN or infinity"),
     "degrees": ("warning", "bare angles beyond a full turn: degrees?"),
-    "w-first": ("warning", "x = 1 of x, y, z, w: half a turn, or the identity with w first?"),
+    "w-first": ("warning", "x = 1 of x, y, z, w: the identity with w first?"),
     "identity": ("warning", "an entry with neither position nor rotation"),
     "slash": ("warning", "a frame name that begins with /"),
     "noise": ("note", "lines that a tool printed between messages"),
-    "topics": ("note", "the topics that transforms came by, with their numbers"),
+    "topics": ("note", "the topics that transforms came by"),
     "two-topics": ("error", "a frame that comes by the topics of two robots"),
+    "limit": ("warning", "the value of a joint beyond its limits"),
     "odd": ("warning", "anything else worth a look while reading"),
     "self": ("error", "a frame that is its own parent"),
     "cycle": ("error", "frames that form a cycle"),
@@ -39,10 +40,10 @@ RULES = {
     "repeated-stamp": ("warning", "two different samples of a frame at one stamp"),
     "backward": ("warning", "samples of a frame that come after later ones"),
     "gap": ("warning", "a pause more than 5 times the usual one"),
-    "jump": ("warning", "a step more than 10 times the usual one, and longer than 0.1 m or 0.2 rad"),
-    "disagreement": ("error", "a frame that goes far and back all the time: two publishers that disagree"),
+    "jump": ("warning", "a step 10 times the usual one, and 0.1 m or 0.2 rad"),
+    "disagreement": ("error", "a frame that jumps to and fro: two publishers?"),
     "reparented": ("note", "a frame whose parent changes once or twice"),
-    "flicker": ("error", "a frame whose parent goes back and forth: two publishers that disagree"),
+    "flicker": ("error", "a parent that goes to and fro: two publishers?"),
 }
 
 
@@ -113,9 +114,15 @@ def write_github(findings: Iterable[Finding]) -> str:
 
 def _command(finding: Finding) -> str:
     level = "notice" if finding.level == "note" else finding.level
-    place = {"file": finding.source, "line": finding.line, "col": finding.column, "title": finding.rule}
+    return github_command(
+        level, finding.message, file=finding.source, line=finding.line, col=finding.column, title=finding.rule
+    )
+
+
+def github_command(level: str, message: str, **place: str | int) -> str:
+    """Return one workflow command: `error`, `warning` or `notice`; what is empty or 0 of its place is left out."""
     properties = ",".join(f"{key}={_escaped(str(value), ',:')}" for key, value in place.items() if value)
-    return f"::{level} {properties}::{_escaped(finding.message)}\n"
+    return f"::{level} {properties}::{_escaped(message)}\n"
 
 
 def _escaped(text: str, more: str = "") -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import shown
+from frametool.formats.recordings import refuse_unknown_joints
 from frametool.frames.edge_log import EdgeLog
 from frametool.frames.path import cycle_message
 from frametool.frames.stamps import BILLION, format_stamp
@@ -38,6 +39,7 @@ def _statements(files: Sequence[Recording], findings: list[Finding], *, normaliz
             yield statement
         if statement is None and len(findings) == before:
             findings.append(Finding("empty", "no transforms in it", file.name, 1, 1))
+    refuse_unknown_joints(files)
 
 
 class Child:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
-from frametool.geometry import arrays, rigid
+from frametool.geometry import arrays, floats, rigid
 from frametool.geometry.batch_validation import read_rotations
 from frametool.stream.beside import seconds_before, stamps_of, weights_of
 from frametool.stream.faults import NULL, STOP, Fault
@@ -15,6 +15,7 @@ from frametool.stream.operation import START
 from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, POSE, TURN, pose_of
 from frametool.stream.row_transforms import NOWHERE, by_frame, by_time
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
+from frametool.stream.stamp_columns import parse_header_stamps, parse_stamps
 from frametool.stream.text_parts import Const, In, Instead, Out
 from frametool.text.numbers import read_number_or_angle
 from frametool.text.parse import parse_floats
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.gathering import Gathered
-    from frametool.stream.operation import Operation
+    from frametool.stream.operation import Formula, Operation
     from frametool.stream.row_layout import Shape, Target
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
@@ -93,6 +94,7 @@ class Run:
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
         self.mended: list[int] = []
         self.doubted: list[tuple[int, str]] = []
+        self.evaluated: list[tuple[str, Components, list[Floats], Ints | None]] = []
         self.count = len(block.places)
         numbers = self._read()
         movers = self._movers()
@@ -139,6 +141,8 @@ class Run:
         """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
         plan, block = self.plan, self.block
         shapes = max(len(plan.shapes), 1)
+        if plan.operation.formula is not None:
+            return [None] * shapes
         if plan.timed is not None and self.count:
             frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
             edges = plan.edges or [None] * shapes
@@ -154,11 +158,16 @@ class Run:
 
     def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
-        shapes, operation, moved = self.plan.shapes, self.plan.operation, []
+        shapes, operation = self.plan.shapes, self.plan.operation
+        moved: list[Components] = []
         poses: list[Rigid] = []
         first = 0
         for shape, mover in zip(shapes, movers, strict=False):
             numbers = columns[first : first + shape.size]
+            if operation.formula is not None:
+                moved.append(self._evaluated(operation.formula, shape, numbers, first, len(moved)))
+                first += shape.size
+                continue
             own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
             if shape.kind != POSE:
                 start = shape.position(own) if shape.unit is not None else tuple(own)
@@ -175,6 +184,43 @@ class Run:
         if poses or not shapes:
             moved.append(operation.pose(poses or [NOWHERE], movers[0], arrays))
         return moved
+
+    def _evaluated(
+        self, formula: Formula, shape: Shape, numbers: list[Floats], first: int, at: int
+    ) -> Components:
+        """Return what an expression makes of the rows, a constant as often as there are rows."""
+        own = numbers[: shape.own_size]
+        parts: Components = ()
+        if shape.kind == POSE:
+            pose = pose_of(shape.position(own), self._rotation(shape, own, first))
+            parts = rigid.inverse(*pose) if shape.inverse else pose
+        elif shape.kind:
+            parts = shape.position(own)
+        cells = numbers[shape.size - shape.beside :]
+        times = self._times(at) if formula.needs_time else None
+        self.evaluated.append((shape.kind, parts, cells, times))
+        found = formula.result(shape.kind, parts, cells, times, arrays)
+        return tuple(np.full(self.count, part) if type(part) is float else part for part in found)
+
+    def _times(self, at: int) -> Ints:
+        """Read the stamps of the rows."""
+        stamps, column = self.block.stamps[at], self.plan.timed.column if self.plan.timed else ""
+        in_ns = self.plan.timed is not None and self.plan.timed.in_ns
+        times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=in_ns)
+        for row, reason in reasons.items():
+            self._blame(row, column, reason)
+        return times
+
+    def _why_no_value(self, formula: Formula, row: int) -> str | FrametoolError:
+        """Evaluate an expression for one row alone, which says why it has no value there."""
+        for kind, parts, cells, times in self.evaluated:
+            given = tuple(part if type(part) is float else float(part[row]) for part in parts)
+            own = [float(cell[row]) for cell in cells]
+            try:
+                formula.result(kind, given, own, None if times is None else int(times[row]), floats)
+            except FrametoolError as error:
+                return error
+        return "the result is not finite: the numbers are too large"
 
     def _good(self) -> list[int]:
         return [row for row in range(self.count) if row not in self.reasons]
@@ -236,7 +282,10 @@ class Run:
             results[:, column] = number
         if not np.isfinite(results.sum()):
             for row in np.flatnonzero(~np.isfinite(results).all(axis=1)).tolist():
-                self._blame(row, "", "the result is not finite: the numbers are too large")
+                if row not in self.reasons:
+                    formula = self.plan.operation.formula
+                    too_large = "the result is not finite: the numbers are too large"
+                    self._blame(row, "", self._why_no_value(formula, row) if formula else too_large)
         return results, locked
 
     def _keep(self, kept: Flags) -> None:

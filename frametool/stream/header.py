@@ -15,6 +15,7 @@ from frametool.geometry.representations import NAMED, REPRESENTATIONS
 from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, Shape
+from frametool.text.units import ANGLES, BRACKETS, LENGTHS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -28,14 +29,11 @@ if TYPE_CHECKING:
 XYZ = ("x", "y", "z")
 POSITIONS = (XYZ, ("tx", "ty", "tz"), ("px", "py", "pz"))
 TELLING = ("position", "translation", "point", "vector")
-LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0, "um": 1e6}  # how many make a metre
-ANGLES = {"deg": True, "degree": True, "degrees": True, "°": True, "rad": False, "radian": False, "radians": False}
 NO_UNIT = ("", "-", "1")
 MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
 LONGEST_RANGE = 40  # characters: more digits name no column
 # behind an underscore: these are units of no length, and those are lengths that nobody should have to guess
 UNITS = re.compile(r"_(deg|rad|mm|cm|um|m)(?![^\W_])|_(km|in|ft|s)$")
-BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 TOKEN = re.compile(r"[^\W_]+")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.geometry import quaternion, rigid, rotvec, spatial
 from frametool.geometry.trig import RADIAN
@@ -31,6 +31,43 @@ MOVERS: dict[str, Callable[..., Components]] = {
 }  # a pose is composed: `Operation.pose`
 
 
+class Formula(Protocol):
+    """An expression over rows: what it reads of each, what kind of thing it makes of it, and its numbers.
+
+    The kind of a row is that of its shape, "" where it holds neither point nor pose.
+    """
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name the columns, or keys, whose numbers it reads."""
+
+    @property
+    def reads_row(self) -> bool:
+        """Tell whether it reads the row's own point or pose."""
+
+    @property
+    def needs_time(self) -> bool:
+        """Tell whether it reads the row's own time."""
+
+    @property
+    def adds(self) -> bool:
+        """Tell whether rows stay as they are and results stand beside them."""
+
+    def kind(self, row: str) -> str:
+        """Return whether a row becomes a pose, a point or a vector; "" for numbers alone, which are `extras`."""
+
+    def extras(self, row: str) -> tuple[str, ...]:
+        """Name the numbers that come beside a pose or point."""
+
+    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
+        """Return the frames of the result of a row with these; raise FrametoolError where they do not fit."""
+
+    def result(
+        self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
+    ) -> Components:
+        """Return the components of the result and then the extras; of floats raises FrametoolError where none are."""
+
+
 class Operation(NamedTuple):
     """What is done to each row: turned around if asked for, then multiplied with fixed poses, then compared.
 
@@ -43,6 +80,7 @@ class Operation(NamedTuple):
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
     mirrors: the row is seen in a mirror across y, before all else
+    formula: an expression, instead of all this
     """
 
     left: Rigid | None = None
@@ -54,11 +92,27 @@ class Operation(NamedTuple):
     turns: bool = False
     mirrors: bool = False
     velocity: bool = False
+    formula: Formula | None = None
+
+    def extras(self, kind: str) -> tuple[str, ...]:
+        """Name the numbers that come beside the result of a row of some kind."""
+        if self.formula is not None:
+            return self.formula.extras(kind)
+        return RELATIVE_EXTRAS + VELOCITY * self.velocity if self.of and kind == POSE else ()
+
+    def result_kind(self, kind: str) -> str:
+        """Return what a row of some kind becomes; "" for numbers alone."""
+        return kind if self.formula is None else self.formula.kind(kind)
 
     @property
-    def extras(self) -> tuple[str, ...]:
-        """Name the numbers that come beside the pose."""
-        return (RELATIVE_EXTRAS + VELOCITY * self.velocity) if self.of else ()
+    def columns(self) -> tuple[str, ...]:
+        """Name the columns whose numbers are read beside those of points and poses."""
+        return () if self.formula is None else self.formula.columns
+
+    @property
+    def only_adds(self) -> bool:
+        """Tell whether rows stay as they are and results stand beside them."""
+        return self.formula is not None and self.formula.adds
 
     @property
     def looks_back(self) -> bool:

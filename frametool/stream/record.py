@@ -19,7 +19,8 @@ from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, ki
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
 from frametool.ros.message_parts import read_stamp, whole_list
 from frametool.stream.row_layout import COVARIANCE, POINT, POSE, TWIST, VECTOR, WRENCH, Shape
-from frametool.text.numbers import NotFinite, read_number_or_angle
+from frametool.stream.stamp_source import key_path
+from frametool.text.numbers import NotFinite, parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from frametool.errors import FormatError
     from frametool.grammar.readers import Path
     from frametool.stream.header import Columns, PoseColumns
+    from frametool.stream.operation import Formula
     from frametool.stream.request import Request
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
@@ -81,12 +83,15 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
 
     Raises Misfit, with the path, for a document without records and for a record that cannot be read.
     """
+    formula = request.operation.formula
     try:
         found = list(_search(document, (), ()))
         if not found and type(document) is dict and NOTHING_BUT.issuperset(document) and not request.operation.moves:
             reading.here = path
             reading.note("neither position nor rotation: taken as the identity", rule="identity")
             found = [((), ())]
+        if not found and formula is not None and not formula.reads_row:
+            found = [(path, ()) for path in _mappings(document)]
         if not found:
             raise _nothing_in(document)
     except Misfit as misfit:
@@ -95,6 +100,13 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
         raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
     for inner, outer in found:
         yield _record(document, inner, outer, request, reading, path)
+
+
+def _mappings(document: Any) -> list[Path]:
+    """Return the paths of the mappings that a document is, or is a list of."""
+    if type(document) is list:
+        return [(index,) for index, item in enumerate(document) if type(item) is dict]
+    return [()] if type(document) is dict else []
 
 
 def _nothing_in(document: Any) -> Misfit:
@@ -215,17 +227,57 @@ def _record(
         if type(value) is list:
             return _bare_list(value, here, reading, request)
         record = _mapping(value, here, reading, request)
+        if request.operation.formula is not None:
+            record = _for_formula(record, value, request.operation.formula)
     except Misfit as misfit:
         raise misfit.below(*here) from None
     try:
         record = _with_covariance(record, document, path, above, request)
+        record = _with_asked(record, document, path, above, request)
+        if request.operation.only_adds:
+            _refuse_repeated(record, document, path, request)
         return _with_names(record, document, path, outer, above, request)
     except Misfit as misfit:
         raise misfit.below(*above) from None
 
 
+def _for_formula(record: Record, value: dict[str, Any], formula: Formula) -> Record:
+    """Refuse what an expression cannot take; what holds no numbers of ours is a row of kind ""."""
+    if record.shape.kind in PARTS:
+        raise Misfit(f"an expression takes poses, points and vectors; this is a {record.shape.kind}")
+    if not record.numbers and not record.values and not formula.reads_row and not _is_holder(value):
+        return record._replace(shape=Shape("", None))
+    return record
+
+
+def _refuse_repeated(record: Record, document: Any, path: Path, request: Request) -> None:
+    """Stop where a key that an expression adds is there already."""
+    lists = [at for at, step in enumerate(path) if type(step) is int]
+    holder = value_at(document, path[: lists[-1] + 1] if lists else ())
+    for name in request.operation.extras(record.shape.kind):
+        if request.prefix + name in holder:
+            raise Misfit(f"key {shown(request.prefix + name)} is there already; take another name, or --prefix", path)
+
+
+def _with_asked(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
+    """Add the numbers under the keys that an expression asks for."""
+    numbers, values = record.numbers, record.values
+    for name in request.operation.columns:
+        found = key_path(document, path, name, "a number")
+        text = value_at(document, found)
+        try:
+            values = (*values, parse_number(text if type(text) is str else ""))
+        except ValueInvalid as error:
+            raise Misfit(str(error), found) from None
+        numbers = (*numbers, (*above, *found))
+    shape = record.shape._replace(beside=len(request.operation.columns))
+    return record._replace(shape=shape, numbers=numbers, values=values)
+
+
 def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request) -> Record:
     """Read [x, y, z], or the rows of a matrix."""
+    if request.operation.only_adds or request.operation.columns:
+        raise Misfit("a bare list has no keys; write a mapping like {point: [x, y, z]}")
     if type(value[0]) is list:
         return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading, request)
     if len(value) != 3 or not request.operation.moves:
@@ -438,7 +490,9 @@ def _with_covariance(record: Record, document: Any, path: Path, above: Path, req
     around = value_at(document, path[:-1]) if path[-1:] == (record.shape.kind,) else None
     if type(around) is not dict or "covariance" not in around or request.operation.changes_nothing:
         return record
-    if not request.operation.moves:
+    if request.operation.only_adds:
+        return record
+    if not request.operation.moves or request.operation.formula is not None:
         raise Misfit("the covariance would be wrong afterwards; leave it out, or move the message with apply", beside)
     values = within(beside, whole_list, around["covariance"], "36 numbers")
     names = [f"c{row}{column}" for row in range(6) for column in range(6)]
@@ -508,6 +562,7 @@ def placed(misfit: Misfit, source: Source) -> FormatError:
 
 def lost_name(record: Record, request: Request) -> str:
     """Name a frame that the record names and its result cannot, because the operation does not know the other one."""
+    request = request.for_kind(record.shape.kind)
     if request.rename is None:
         return ""
     before = record.parent.text or record.name.text or ""

@@ -240,7 +240,7 @@ class RecordBlocks:
             on_error=SKIP if request.on_error == NULL else request.on_error,
             unwrap=request.unwrap,
             yaml=self.form == "yaml",
-            timed=request.timed,
+            timed=template.timed(request),
             beside=template.beside if request.beside is not None else "",
             gathered=request.gathered,
             sources=tuple(entry.record.parent.text for entry in template.entries),

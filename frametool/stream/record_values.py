@@ -24,7 +24,7 @@ from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, 
 from frametool.stream.request import Request
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
-from frametool.stream.stamp_source import in_nanoseconds, read_header_stamp, read_stamp
+from frametool.stream.stamp_source import in_nanoseconds, key_path, read_header_stamp, read_stamp, stamp_keys
 from frametool.stream.template import beside_path
 
 if TYPE_CHECKING:
@@ -122,13 +122,18 @@ def _answer(
     document: Document, record: Record, request: Request, source: Source, memory: Memory
 ) -> Answer | None:
     """Apply the operation to one record; the first of all has no velocity and so no result."""
+    request = request.for_kind(record.shape.kind)
     try:
         parent, name = record.parent.text, record.name.text
         if request.rename is not None:
             if lost := lost_name(record, request):
                 warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
             parent, name = request.rename(parent, name)
-        parts, _ = moved(record, _edge(record, request, source), record.values, request, memory)
+        if request.operation.formula is not None:
+            at_ns = _asked_time(record, request, source)
+            parts, _ = moved(record, None, record.values, request, at_ns)
+        else:
+            parts, _ = moved(record, _edge(record, request, source), record.values, request, memory=memory)
         if request.operation.velocity:
             seconds = memory.step(_beside_ns(document, record, request))
             if seconds is None:
@@ -156,6 +161,20 @@ def _edge(record: Record, request: Request, source: Source) -> Rigid | None:
     return None if request.way is None else request.way(record.parent.text)
 
 
+def _asked_time(record: Record, request: Request, source: Source) -> int | None:
+    """Return the time of a record where an expression looks up at it."""
+    timed = request.timed
+    if timed is None:
+        return None
+    if record.stamp and not timed.name:
+        return _stamp_ns(record, source)
+    document = next(each for each in parse_documents(source.text, source.name) if each.index == record.path[0])
+    path = record.path[1:]
+    found = key_path(document.value, path, timed.name) if timed.name else stamp_keys(document.value, path)
+    key = timed.name or str(found[-1])
+    return read_stamp(value_at(document.value, found), in_ns=timed._replace(name=key).in_ns)
+
+
 def _stamp_ns(record: Record, source: Source) -> int:
     """Return the stamp of a record's header."""
     values = {document.index: document.value for document in parse_documents(source.text, source.name)}
@@ -172,12 +191,30 @@ def _values(node: Node, unit: Path, answers: list[Answer], request: Request, sty
         return
     for answer in answers:
         record = answer.record
-        if record.shape.kind == POSE:
+        if request.operation.formula is not None:
+            yield _formula_result(node, unit, answer, request)
+        elif record.shape.kind == POSE:
             yield _pose_result(node, unit, answer, request)
         elif style.form == "csv" or (style.form == "text" and record.shape.kind not in PARTS):
             yield _flat(answer, request)
         else:
             yield _rewritten(node, unit, [answer], request)
+
+
+def _formula_result(node: Node, unit: Path, answer: Answer, request: Request) -> Value:
+    """Return what an expression made of a record, with what else the record says."""
+    shape, operation = answer.record.shape, request.operation
+    kind = operation.result_kind(shape.kind)
+    names = [request.prefix + name for name in operation.extras(shape.kind)]
+    extras: dict[str, Any] = dict(zip(names, answer.parts[len(answer.parts) - len(names) :], strict=True))
+    if operation.only_adds:
+        return plain(node) | extras if type(node.value) is dict else extras
+    rest = _rest(node, unit, answer.record)
+    if kind == POSE:
+        return Result(Pose.of(answer.parts[:7], answer.name, answer.parent), extras | rest)
+    seen_from = "frame" if kind or shape.kind != POSE else "parent"
+    named = {key: name for key, name in (("name", answer.name), (seen_from, answer.parent)) if name is not None}
+    return named | ({kind: list(answer.parts[:3])} if kind else {}) | extras | rest
 
 
 def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Result:
@@ -191,7 +228,7 @@ def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Re
         pose = pose._replace(
             position=pose.position if has_position else None, rotation=pose.rotation if has_rotation else None
         )
-    extras: dict[str, Any] = dict(zip(request.operation.extras, answer.parts[7:], strict=False))
+    extras: dict[str, Any] = dict(zip(request.operation.extras(POSE), answer.parts[7:], strict=False))
     return Result(pose, extras | _rest(node, unit, answer.record))
 
 

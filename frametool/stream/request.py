@@ -68,6 +68,13 @@ class Request(NamedTuple):
         """Tell whether a row's result depends on the rows before it."""
         return self.unwrap or self.operation.looks_back or self.gathered is not None
 
+    def for_kind(self, kind: str) -> Request:
+        """Return what is asked of rows of one kind: how an expression names its result depends on it."""
+        formula = self.operation.formula
+        if formula is None:
+            return self
+        return self._replace(rename=lambda parent, name: formula.rename(kind, parent, name))
+
     def counts(self, frame: str) -> bool:
         """Tell whether what stands under `frame` is a counter rather than a frame's name."""
         return self.counters and frame.isdecimal()

@@ -38,6 +38,7 @@ class Shape(NamedTuple):
     covariance: the 36 numbers of a covariance come last
     radians_at: which of the rotation's numbers are radians where the others are degrees
     absent: which numbers have no column and count as 0
+    beside: how many numbers that an expression reads come last
     """
 
     kind: str
@@ -49,6 +50,7 @@ class Shape(NamedTuple):
     covariance: bool = False
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
+    beside: int = 0
 
     @property
     def joined(self) -> Whole | None:
@@ -58,7 +60,7 @@ class Shape(NamedTuple):
     @property
     def size(self) -> int:
         """Count the numbers of a row."""
-        return self.own_size + COVARIANCE * self.covariance
+        return self.own_size + COVARIANCE * self.covariance + self.beside
 
     @property
     def own_size(self) -> int:
@@ -86,6 +88,8 @@ class Shape(NamedTuple):
 
     def in_degrees(self, place: int) -> bool | None:
         """Tell whether a row's number is an angle in degrees; None if it is no angle."""
+        if place >= self.own_size:
+            return None
         there = [each for each in range(self._full) if each not in self.absent]
         index = there[place] - (self.unit is not None) * 3
         if self.whole or self.notation is None or index not in self.notation.representation.angles:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Components, Quaternion, Rigid
     from frametool.stream.memory import Memory
+    from frametool.stream.operation import Formula
     from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
@@ -36,10 +37,10 @@ def result_of(template: Template, request: Request) -> Rendered:
     locked = mended = False
     doubt = ""
     first = 0
-    for entry, edge in zip(template.entries, _edges(template, request), strict=True):
+    for entry, edge, at in zip(template.entries, *_movers(template, request), strict=True):
         shape = entry.record.shape
         values = template.values[first : first + shape.size]
-        parts, odd = moved(entry.record, edge, values, request)
+        parts, odd = moved(entry.record, edge, values, request, at)
         numbers += entry.target.written(parts, floats)
         for name, number in entry.target.left_out(parts, floats):
             if abs(number) > FLAT:
@@ -54,26 +55,30 @@ def result_of(template: Template, request: Request) -> Rendered:
     return Rendered(_text(template, [write(number) for number in numbers], locked=locked), mended, doubt)
 
 
-def _edges(template: Template, request: Request) -> list[Rigid | None]:
-    """Return the poses that move the records, at their own times if they have such."""
-    timed, segments = request.timed, template.segments()
-    edges = []
+def _movers(template: Template, request: Request) -> tuple[list[Rigid | None], list[int | None]]:
+    """Return the poses that move the records, at their own times if they have such, and those times."""
+    timed, segments = template.timed(request), template.segments()
+    edges: list[Rigid | None] = []
+    times: list[int | None] = []
     for entry, stamps in zip(template.entries, template.stamps, strict=True):
         if timed is None or not stamps:
             edges.append(entry.edge)
+            times.append(None)
             continue
         texts = [segments[index] for index in stamps]
         try:
             at = read_header_stamp(*texts) if len(texts) == 2 else read_stamp(texts[0], in_ns=timed.in_ns)
-            edges.append(timed.pose(entry.record.parent.text, at))
+            times.append(at)
+            edges.append(None if request.operation.formula else timed.pose(entry.record.parent.text, at))
         except FrametoolError as error:
             error.column_name = timed.column  # type: ignore[attr-defined]
             raise
-    return edges
+    return edges, times
 
 
 def moved(
-    record: Record, edge: Rigid | None, values: Sequence[float], request: Request, memory: Memory | None = None
+    record: Record, edge: Rigid | None, values: Sequence[float], request: Request, at_ns: int | None = None,
+    memory: Memory | None = None,
 ) -> tuple[Components, bool]:
     """Apply the operation to one record; return also whether its rotation had to be normalised.
 
@@ -81,6 +86,8 @@ def moved(
     """
     shape = record.shape
     own = values[: shape.own_size]
+    if request.operation.formula is not None:
+        return _evaluated(request.operation.formula, record, values, request, at_ns)
     if shape.kind != POSE:
         start = shape.position(own) if shape.unit is not None else tuple(own)
         return request.operation.move(shape, (*start, *values[shape.own_size :]), edge), False
@@ -91,6 +98,22 @@ def moved(
     result = request.operation.pose(poses, edge, floats)
     beside = request.operation.covariance(shape, tuple(values[shape.own_size :]), edge)
     return (*result, *beside), bool(odd)
+
+
+def _evaluated(
+    formula: Formula, record: Record, values: Sequence[float], request: Request, at_ns: int | None
+) -> tuple[Components, bool]:
+    """Return what an expression makes of one record; and whether its rotation had to be normalised."""
+    shape, odd = record.shape, False
+    parts: Components = ()
+    if shape.kind == POSE:
+        rotation, warned = checked_rotation(shape, values[: shape.own_size], normalize=request.normalize)
+        pose: Rigid = pose_of(shape.position(values), rotation)
+        parts, odd = rigid.inverse(*pose) if record.inverse else pose, bool(warned)
+    elif shape.kind:
+        parts = shape.position(values)
+    cells = values[shape.size - shape.beside : shape.size]
+    return formula.result(shape.kind, parts, cells, at_ns, floats), odd
 
 
 def checked_rotation(

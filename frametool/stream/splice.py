@@ -14,7 +14,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import PARENT_KEYS, POINT_KEYS, QUATERNION, STALE, XYZ
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Target
+from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, Target
 from frametool.stream.text_parts import Const, IfLocked, Out
 
 if TYPE_CHECKING:
@@ -45,7 +45,12 @@ def target_of(record: Record, request: Request) -> Target:
     shape, operation = record.shape, request.operation
     if shape.kind in SIX:
         return Target(None, (), plain=True)
-    if shape.kind != POSE:
+    kind = operation.result_kind(shape.kind)
+    if not kind:
+        return Target(None, ())
+    if kind != shape.kind:
+        shape = Shape(kind, shape.unit or 1.0)
+    if kind != POSE:
         return Target(shape.unit, ())
     product = not (operation.keeps_position or operation.only_inverts)
     placed = shape.whole or shape.unit is not None or product
@@ -90,7 +95,7 @@ class Splicer:
         self.node = root.at(record.path)
         self.record = record
         self.target = target
-        self.request = request
+        self.request = request.for_kind(record.shape.kind)
         self.json = json
         self.first = first
         self.edits: list[Edit] = []
@@ -100,9 +105,18 @@ class Splicer:
     def run(self) -> list[Edit]:
         """Return the edits, in no order."""
         shape = self.record.shape
+        if self.request.operation.only_adds:
+            self.node = root_of_extras(self.root, self.record)
+            for member in self._extras(0):
+                self._insert_after(self._last_value(), member)
+            return self.edits
         if type(self.node.value) is not dict or not self.node.value:
+            if self.request.operation.result_kind(shape.kind) != shape.kind:
+                return self._rewritten()
             return self._numbers(range(len(self.slots)), 0) if self._stays_a_list() else self._rewritten()
         self._names()
+        if self.request.operation.result_kind(shape.kind) != shape.kind:
+            return self._of_other_kind()
         if shape.covariance:
             self._numbers(range(shape.own_size, shape.size), self.target.size)
         if shape.kind in SIX:
@@ -118,7 +132,7 @@ class Splicer:
     def _stays_a_list(self) -> bool:
         """Tell whether a result has the numbers of the bare list it comes from and no others."""
         has_place = self.target.unit is None or self.record.shape.unit is not None
-        told = self.request.operation.extras if self.record.shape.kind == POSE else ()
+        told = self.request.operation.extras(self.record.shape.kind)
         return self._same_rotation() and has_place and not told
 
     def _same_rotation(self) -> bool:
@@ -200,7 +214,24 @@ class Splicer:
         return members
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
-        return [self._member({name: 0.5}, first + index) for index, name in enumerate(self.request.operation.extras)]
+        names = self.request.operation.extras(self.record.shape.kind)
+        return [self._member({self.request.prefix + name: 0.5}, first + index) for index, name in enumerate(names)]
+
+    def _of_other_kind(self) -> list[Edit]:
+        """Write what an expression has made of a record in place of all the members that said what it was."""
+        members = self._all_members()
+        record = self.record
+        self.dropped.update({record.key, record.rotation, *record.others, *record.members, *record.flat, *STALE,
+                             "inverse", "angles"})  # fmt: skip
+        if self.dropped.issuperset(self.node.value):
+            between = Const(self._between().encode())
+            pieces = [piece for member in members for piece in (between, *member)][1:]
+            self.edits = [Edit(self._first_key().start, self._last_value().end, tuple(pieces))]
+            return self.edits
+        self._leave_out()
+        for member in members:
+            self._insert_after(self._last_value(), member)
+        return self.edits
 
     def _names(self) -> None:
         """Rename the frames as the operation does."""
@@ -211,7 +242,8 @@ class Splicer:
         if self._has_swapped(name, parent):
             return
         self._name(record.name, name, "name")
-        self._name(record.parent, parent, "parent" if record.shape.kind == POSE else "frame")
+        becomes_pose = self.request.operation.result_kind(record.shape.kind) == POSE
+        self._name(record.parent, parent, "parent" if becomes_pose else "frame")
 
     def _name(self, old: Name, new: str | None, key: str) -> None:
         """Write a frame's name where the record says it, or as a member of its own."""
@@ -303,17 +335,20 @@ class Splicer:
         self.edits.append(Edit(member[0].start, member[1].end, pieces))
 
     def _rewritten(self) -> list[Edit]:
-        """Write a bare matrix as a mapping."""
-        members = self._members(0 if self.target.unit is None else 3)
-        if self.target.unit is not None:
-            members.insert(0, self._member({"xyz": list(SAMPLE[:3])}, 0))
-        members += self._extras(self.target.size)
+        """Write a bare list, a matrix or a point, as a mapping."""
         pieces: list[Piece] = []
-        for member in members:
+        for member in self._all_members():
             conditional = any(isinstance(piece, IfLocked) for piece in member)
             pieces += [IfLocked(b", ") if conditional else Const(b", "), *member]
         self.edits.append(Edit(self.node.start, self.node.end, (Const(b"{"), *pieces[1:], Const(b"}"))))
         return self.edits
+
+    def _all_members(self) -> list[tuple[Piece, ...]]:
+        """Return the members of a result: position, rotation, what comes beside."""
+        placed = self.target.unit is not None
+        kind = self.request.operation.result_kind(self.record.shape.kind)
+        position = [self._member({"xyz" if kind == POSE else kind: list(SAMPLE[:3])}, 0)] if placed else []
+        return [*position, *self._members(3 * placed), *self._extras(self.target.size)]
 
     def _leave_out(self) -> None:
         """Leave members out, with what parts them from their neighbours."""
@@ -327,6 +362,12 @@ class Splicer:
             else:
                 end = members[index + 1][1][0].start if index + 1 < len(members) else value.end
                 self.edits.append(Edit(key_node.start, end, ()))
+
+
+def root_of_extras(root: Node, record: Record) -> Node:
+    """Return the mapping that an expression's results stand in: the outermost that holds this record alone."""
+    lists = [at for at, step in enumerate(record.path) if type(step) is int]
+    return root.at(record.path[: lists[-1] + 1])
 
 
 def _flow(value: Any, text: Any) -> str:

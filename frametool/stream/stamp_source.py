@@ -19,6 +19,7 @@ LARGEST = (1 << 63) - 1
 
 
 HEADER = "header.stamp"
+STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 
 
 class Timed(NamedTuple):
@@ -35,6 +36,11 @@ class Timed(NamedTuple):
     one: Callable[[str | None, int], Rigid]
     moves: Callable[[str | None], bool] = bool
 
+    @classmethod
+    def of_rows(cls, name: str) -> Timed:
+        """Say where the stamps of rows stand for an expression, which knows by itself what they are for."""
+        return cls(name, _by_expression, _by_expression, lambda _: True)
+
     @property
     def in_ns(self) -> bool:
         """Tell whether the name says that stamps are integer nanoseconds."""
@@ -49,6 +55,11 @@ class Timed(NamedTuple):
         """Return the pose at one time, to the bit as `many` does; raises FrametoolError where there is none."""
         tx, ty, tz, x, y, z, w = (float(column[0]) for column in self.many(frame, [stamp_ns]))
         return (tx, ty, tz, x, y, z, w) if w == w else self.one(frame, stamp_ns)  # noqa: PLR0124 - nan is not itself
+
+
+def _by_expression(_frame: str | None, _at: Any) -> Any:
+    """Move nothing: what an expression looks up it looks up itself."""
+    raise ValueInvalid("an expression does its own look-ups")
 
 
 def in_nanoseconds(name: str) -> bool:
@@ -77,8 +88,8 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
     return stamp_ns
 
 
-def stamp_path(document: Any, holder: Path, name: str) -> Path:
-    """Find the stamp of a point or pose: its own key, else that of a mapping around it; raises Misfit."""
+def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 12.5") -> Path:
+    """Find a scalar of a point or pose, its stamp: its own key, else that of a mapping around it; raises Misfit."""
     around = [document]
     for step in holder:
         around.append(around[-1][step])
@@ -86,10 +97,20 @@ def stamp_path(document: Any, holder: Path, name: str) -> Path:
         for keys in ((name,), tuple(name.split("."))):
             if (found := _below(around[depth], keys)) is not None:
                 if type(found[0]) in (dict, list):
-                    raise Misfit(f"expected a time like 12.5, found {kind(found[0])}", (*holder[:depth], *keys))
+                    raise Misfit(f"expected {wanted}, found {kind(found[0])}", (*holder[:depth], *keys))
                 return (*holder[:depth], *keys)
     known = [key for each in around if type(each) is dict for key in each]
     raise Misfit(f"no key {shown(name)}{did_you_mean(name, known)}", holder)
+
+
+def stamp_keys(document: Any, holder: Path) -> Path:
+    """Find the key of a record's stamp by the names such keys have; raises Misfit."""
+    for name in STAMP_KEYS:
+        try:
+            return key_path(document, holder, name)
+        except Misfit:
+            continue
+    raise Misfit(f"@ row: no stamp is found ({', '.join(STAMP_KEYS)}); name its key with --time-column", holder)
 
 
 def _below(value: Any, keys: Sequence[str]) -> tuple[Any] | None:

@@ -76,7 +76,9 @@ class Naming:
         for row in np.flatnonzero(np.array([isinstance(each, FrametoolError) for each in results])[of_row]).tolist():
             bad[row] = self.column, results[of_row[row]]
         emptied = np.array([self._loses(*each) for each in zip(pairs, results, strict=True)])[of_row]
-        lost = [(row, next(filter(None, pairs[of_row[row]]))) for row in np.flatnonzero(emptied)[:1].tolist()]
+        lost = [
+            (row, self._lost(pairs[of_row[row]], results[of_row[row]])) for row in np.flatnonzero(emptied)[:1].tolist()
+        ]
         if self.consecutive:
             bad |= self._breaks([parents.texts[code] for code in parents.codes.tolist()])
         frames = [None if not text or self._is_counter(text) else text for text in parents.texts]
@@ -109,10 +111,12 @@ class Naming:
 
     def _loses(self, pair: Texts, result: Texts | FrametoolError) -> bool:
         """Tell whether a cell that named a frame is empty in the result."""
-        return any(
-            place is not None and bool(old) and not new
-            for place, old, new in zip(self.places, pair, _named(result, pair), strict=True)
-        )
+        return bool(self._lost(pair, result))
+
+    def _lost(self, pair: Texts, result: Texts | FrametoolError) -> str:
+        """Return the frame that a cell named and the result does not; "" if there is none."""
+        named = zip(self.places, pair, _named(result, pair), strict=True)
+        return next((old for place, old, new in named if place is not None and old and not new), "")
 
     def _spans(
         self, cells: Cells, role: int, pairs: Sequence[Texts], results: Sequence[Texts], of_row: Ints

@@ -30,17 +30,18 @@ NAMES = ("child_frame_id", "name")
 
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
-    poses = _find(table, request, source)
+    poses = _find_if_read(table, request, source)
     keeps = request.operation.keeps_position and request.gathered is None
     if request.poses == 1 and not request.operation.moves and keeps:
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
         raise FormatError(wrong, source=source, line=1)
-    kinds = request.kinds or (request.kind,) * len(poses)
-    shapes = tuple(row_shape(pose, request._replace(kind=kind)) for pose, kind in zip(poses, kinds, strict=True))
+    asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
+    shapes = _shapes(poses, request, len(asked))
+    request = request.for_kind(shapes[0].kind) if shapes else request
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(_target([shape], request) for shape in shapes) if several else (_target(shapes, request),)
-    places = tuple(place for pose in poses for columns in pose if columns for place in columns.places)
+    places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *asked)
     frames = _frame_columns(table, request, source)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAMES, table)
@@ -81,6 +82,26 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     )
 
 
+def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:
+    """Find the columns of the poses; an expression that does not read the row needs none."""
+    formula = request.operation.formula
+    try:
+        return _find(table, request, source)
+    except FormatError:
+        if formula is None or formula.reads_row or request.columns:
+            raise
+        return []
+
+
+def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple[Shape, ...]:
+    """Say what the numbers of a row mean; those an expression asks for come last."""
+    kinds = request.kinds or (request.kind,) * len(poses)
+    shapes = tuple(row_shape(pose, request._replace(kind=kind)) for pose, kind in zip(poses, kinds, strict=True))
+    if request.operation.formula is None:
+        return shapes
+    return ((shapes[0] if shapes else Shape("", None))._replace(beside=asked),)
+
+
 def _by_width(width: int, given: Notation | None) -> str:
     """Take all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not."""
     rows = REPRESENTATIONS.values() if given is None else [given.representation]
@@ -115,6 +136,11 @@ def _is_whole(notations: Sequence[Notation]) -> bool:
 def _target(shapes: Sequence[Shape], request: Request) -> Target:
     """Choose how results are written: as they were read unless told."""
     shape = shapes[0] if shapes else Shape(POSE)
+    kind = request.operation.result_kind(shape.kind)
+    if kind != shape.kind:
+        shape = Shape(kind, shape.unit or 1.0)
+    if not kind:
+        return Target(None, ())
     if shape.kind != POSE:
         return Target(shape.unit, ())
     placed = shape.whole or shape.unit is not None
@@ -136,7 +162,8 @@ def _target(shapes: Sequence[Shape], request: Request) -> Target:
 def _only_turns_around(request: Request) -> bool:
     """Tell whether rows without a rotation have none afterwards."""
     operation = request.operation
-    return operation.left is None and not operation.right and not operation.of and not _by_row(request)
+    bare = operation.left is None and not operation.right and not operation.of and operation.formula is None
+    return bare and not _by_row(request)
 
 
 def _by_row(request: Request) -> bool:
@@ -148,7 +175,8 @@ def _shifts(request: Request) -> bool:
     """Tell whether rows without a position may have one afterwards."""
     operation = request.operation
     fixed = (operation.left, *operation.right, operation.fixed)
-    return _by_row(request) or any(pose is not None and any(pose[:3]) for pose in fixed)
+    by_row = _by_row(request) or operation.formula is not None
+    return by_row or any(pose is not None and any(pose[:3]) for pose in fixed)
 
 
 def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ...]:
@@ -189,7 +217,12 @@ def _time_column(table: Table, request: Request, source: str) -> int | None:
     name = request.timed.name if request.timed else request.beside
     if name is None:
         return None
-    return _place(name, table.names or tuple(map(str, range(1, table.width + 1))), source)
+    return _place(name, _names_or_numbers(table), source)
+
+
+def _names_or_numbers(table: Table) -> Sequence[str]:
+    """Return what columns are called: their names, or their numbers from 1."""
+    return table.names or tuple(map(str, range(1, table.width + 1)))
 
 
 def _columns(
@@ -202,10 +235,10 @@ def _columns(
 ) -> list[Column]:
     """Put the results where they belong; `named` are the columns of names and their roles."""
     (target,) = targets
-    position, rotation, extras = _new_columns(poses, target, request)
+    position, rotation, extras = _new_columns(poses, target, request, shapes[0].kind if shapes else POSE)
     ours = [columns for pose in poses for columns in pose if columns is not None]
     columns: list[Column] = [Kept(place) for place in range(table.width)]
-    if request.keep or not ours:
+    if request.keep or request.operation.only_adds or not ours:
         return [*columns, *position, *rotation, *extras]
     if rename_of(request) is not None:
         for place, role in named.items():
@@ -269,8 +302,8 @@ def _same(pose: PoseColumns, target: Target) -> bool:
     return pose.rotation is not None and [notation for notation, _ in target.notations] == [pose.rotation.notation]
 
 
-def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request) -> list[list[New]]:
-    """Name the numbers of the result: position, rotation, what else there is."""
+def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request, kind: str) -> list[list[New]]:
+    """Name the numbers of the result for rows of some kind: position, rotation, what else there is."""
     pose = poses[0] if poses else PoseColumns(None, None)
     rotation, alone = pose.rotation, not request.prefix and len(poses) == 1
     if rotation and alone and _same(pose, target) and rotation.whole == target.whole:
@@ -281,7 +314,7 @@ def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request)
     if moved and pose.position and alone:
         moved = list(pose.position.names)
         moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)
-    extras = [request.prefix + name for name in request.operation.extras]
+    extras = [request.prefix + name for name in request.operation.extras(kind)]
     new = [New(at, name) for at, name in enumerate((*moved, *turned, *extras))]
     first, last = len(moved), len(moved) + len(turned)
     return [new[:first], new[first:last], [each for each in new[last:] if each.name not in turned]]

@@ -7,7 +7,7 @@ from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, FrametoolError
+from frametool.errors import FormatError, FrametoolError, listing
 from frametool.stream.blocks import Run, State
 from frametool.stream.faults import NULL, Fault, Misused
 from frametool.stream.rows import written
@@ -51,14 +51,18 @@ def run_table(
     table, rest = open_table(first, delimiter, header=header, source=source)
     table = _as_tum(table, form, request)
     unasked = None
-    if request.timed is not None and not request.timed.name:  # rows have no header
+    if request.timed is not None and request.operation.formula is not None:
+        name = request.timed.name or _stamp_column(table, source)
+        request = request._replace(timed=request.timed._replace(name=name))
+    elif request.timed is not None and not request.timed.name:  # rows have no header
         unasked, request = _stamps_unasked(table, request.timed), request._replace(timed=None)
     if request.beside == "":
         request = request._replace(beside=_usual_stamps(table, source))
     plan, layout = plan_table(table, request, source)
     taken = len(first) - len(rest)
     yield Outcome(table.opening(layout), lines=first.count(b"\n", 0, taken), size=taken)
-    work = TableWork(table, plan, layout, Naming(table, layout, request), unasked)
+    named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
+    work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
     yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
 
 
@@ -85,6 +89,15 @@ def _as_tum(table: Table, form: str, request: Request) -> Table:
     if table.names or request.given or not (form == "tum" or table.width == len(TUM)):
         return table
     return table._replace(names=TUM, width=len(TUM))
+
+
+def _stamp_column(table: Table, source: str) -> str:
+    """Name the column of stamps that an expression asks for; raises Misused where none looks so."""
+    name = next(filter(STAMPS.fullmatch, table.names or ()), None)
+    if name is None:
+        known = f"; columns: {listing(table.names)}" if table.names else ""
+        raise Misused(f"@ row: no column looks like stamps; name it with --time-column{known}", source=source, line=1)
+    return name
 
 
 def _stamps_unasked(table: Table, timed: Timed) -> Timed | None:

@@ -7,7 +7,6 @@ cuts them all into the same stretches, and nothing has to be parsed again.
 from __future__ import annotations
 
 import re
-from contextlib import suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,9 +19,10 @@ from frametool.grammar.pose import POSE_KEYS
 from frametool.grammar.readers import Misfit, Reading, within
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_records, lost_name, placed
+from frametool.stream.row_layout import COVARIANCE
 from frametool.stream.run import RowNote
 from frametool.stream.splice import OURS, Splicer, target_of
-from frametool.stream.stamp_source import stamp_path
+from frametool.stream.stamp_source import STAMP_KEYS, key_path, stamp_keys
 from frametool.stream.text_parts import In, Out
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape, Target
     from frametool.stream.splice import Edit
+    from frametool.stream.stamp_source import Timed
     from frametool.stream.text_parts import Piece
 
 # what a number looks like: JSON's is exact, YAML's is judged when it is read
@@ -49,7 +50,6 @@ FREE = {
 }
 SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 # scalars under these keys decide what a record is, wherever in it they stand ..
-USUAL_STAMPS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
 # .. and these in the mappings that hold the record
 _WORDS = frozenset(word.partition("_deg")[0].partition("_rad")[0] for word in (*OURS, *POSE_KEYS, "theta"))
@@ -126,6 +126,13 @@ class Template:
         """Return the last key that leads to what is read beside the numbers."""
         return next((str(entry.stamp[0][-1]) for entry in self.entries if entry.stamp), "")
 
+    def timed(self, request: Request) -> Timed | None:
+        """Return where stamps stand; a key that nobody named but was found says by its own name what they are."""
+        found = next((entry.stamp[0][-1] for entry in self.entries if len(entry.stamp) == 1), "")
+        if request.timed is None or request.timed.name or request.operation.formula is None:
+            return request.timed
+        return request.timed._replace(name=str(found))
+
     def segments(self) -> list[str]:
         """Return the text of each stretch."""
         return [self.text[start:end] for start, end in self.stretches]
@@ -173,7 +180,7 @@ def _notes(entries: Sequence[Entry], request: Request) -> Iterator[RowNote]:
     for entry in entries:
         if lost := lost_name(entry.record, request):
             yield RowNote.of_lost_name(0, lost)
-        if not entry.record.values:
+        if not entry.record.values and entry.record.shape.kind:
             yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
 
 
@@ -297,14 +304,17 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     edge = None
     timed = request.timed
     if timed is not None and timed.name:
-        found = within((document.index,), stamp_path, document.value, record.path[1:], timed.name)
+        found = within((document.index,), key_path, document.value, record.path[1:], timed.name)
         stamp = ((document.index, *found),)
     elif timed is not None and record.stamp and timed.moves(record.parent.text):
         stamp = record.stamp
+    elif timed is not None and request.operation.formula is not None:
+        stamp = ((document.index, *within((document.index,), stamp_keys, document.value, record.path[1:])),)
     elif request.beside is not None:
         stamp = beside_path(document, record, request.beside)
     elif request.way is not None:
         edge = request.way(record.parent.text)
+    request = request.for_kind(record.shape.kind)
     if request.rename is not None:
         request.rename(record.parent.text, record.name.text)
     return Entry(record, target_of(record, request), edge, stamp)
@@ -317,13 +327,14 @@ def beside_path(document: Document, record: Record, name: str) -> tuple[Path, ..
     """
     if not name and record.stamp:
         return record.stamp
-    for usual in USUAL_STAMPS if not name else ():
-        with suppress(Misfit):
-            return ((document.index, *stamp_path(document.value, record.path[1:], usual)),)
-    if not name:
-        usual = ", ".join(USUAL_STAMPS)
-        raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path)
-    return ((document.index, *within((document.index,), stamp_path, document.value, record.path[1:], name)),)
+    holder = record.path[1:]
+    if name:
+        return ((document.index, *within((document.index,), key_path, document.value, holder, name)),)
+    try:
+        return ((document.index, *stamp_keys(document.value, holder)),)
+    except Misfit:
+        usual = ", ".join(STAMP_KEYS)
+        raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path) from None
 
 
 def _edits(text: str, entries: Sequence[Entry], root: Node, request: Request, *, json: bool) -> list[Edit]:
@@ -332,6 +343,6 @@ def _edits(text: str, entries: Sequence[Entry], root: Node, request: Request, *,
     for entry in entries:
         shape = entry.record.shape
         edits += Splicer(text, root, entry.record, entry.target, request, json=json, first=first).run()
-        first += entry.target.size + len(request.operation.extras) * (shape.kind == "pose")
-        first += (shape.size - shape.own_size) * shape.covariance
+        first += entry.target.size + len(request.operation.extras(shape.kind))
+        first += COVARIANCE * (shape.covariance and request.operation.formula is None)
     return edits

@@ -10,6 +10,7 @@ import math
 import re
 
 from frametool.errors import ValueInvalid, shown
+from frametool.text.units import LENGTHS
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ _WITH_UNIT = rf"([-+]?{_DECIMAL}) ?(deg|rad|°)"
 _MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
 _BARE_STAR = r"[-+]? ?\*"
 _UNITS = {"deg": "deg", "°": "deg", "rad": "rad"}
+_LENGTH = rf"([-+]?{_DECIMAL}) ?(m|cm|mm|um)"
 _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 
 
@@ -67,6 +69,16 @@ def parse_angle(text: str) -> Angle:
     if (match := re.fullmatch(_MULTIPLE_OF_PI, text)) and not re.match(_BARE_STAR, text):
         return _degrees_of_pi(text, match[1], match[2], match[3]), "deg"
     raise _refusal(text, explain_angle(text))
+
+
+def parse_length(text: str) -> float:
+    """Read a length in metres: a number, or `2cm`, `20 mm`, `0.02m`, `20um`; raises ValueInvalid."""
+    if not _strip(text, _DECIMAL_CHARACTERS):
+        return parse_number(text)
+    if match := re.fullmatch(_LENGTH, text):
+        return parse_number(match[1]) / LENGTHS[match[2]]  # dividing rounds once: 0.02 from 2cm
+    reason = _reason(text)
+    raise _refusal(text, f"{shown(text)} {_NO_LENGTH if reason in {_UNKNOWN, _UNIT} else reason}")
 
 
 def read_number_or_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
@@ -114,6 +126,7 @@ def explain_angle(text: str) -> str:
 
 
 _UNKNOWN = "is not a number"
+_NO_LENGTH = "is not a length; write metres, or a unit: 2cm, 20mm, 0.02m"
 _UNIT = "has a unit; lengths are in metres (or use xyz_mm)"
 
 

@@ -30,7 +30,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 
 @click.command(cls=Command, name="apply")
 @click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
-@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose instead of a lookup")
+@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose, not by a lookup")
 @click.option(
     "--as",
     "kinds",
@@ -47,16 +47,16 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
     "frame_column",
     type=TEXT,
     metavar="NAME",
-    help="without SOURCE, the column that names each row's frame",
+    help="column with each row's frame, without SOURCE",
 )
 @click.option(
     "--time-column",
     "time_column",
     type=TEXT,
     metavar="NAME",
-    help="move each row at its own time: the column or key of its stamp, seconds; nanoseconds where it ends in _ns",
+    help="column or key of each row's own time",
 )
-@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest; messages: their own]")
+@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
 @reading_options(streams=True)
 @stream_options
@@ -81,24 +81,12 @@ def command(
       frametool apply robot.yaml map camera_optical 0 0 1
       frametool apply --transform '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' 1 0 0
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
+      ros2 topic echo /clicked_point | frametool apply tf.txt map
 
     A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
     each record says its own frame; without records standard input is read.
 
-    \b
-      ros2 topic echo /clicked_point | frametool apply tf.txt map
-
-    Records may be ROS messages, as the echo tools print them or as JSON lines: PointStamped, Vector3Stamped,
-    PoseStamped, PoseWithCovarianceStamped, WrenchStamped, TwistStamped, TransformStamped. Frame and stamp are those
-    of each header; the stamp and all other fields stay. Each 3x3 block C of a pose's covariance becomes R C R^T. A
-    wrench is that about TARGET's origin: force R f, torque R m + t x R f. A twist is the velocity of the same rigid
-    body at TARGET's origin: angular R w, linear R v + t x R w.
-
-    \b
-      printf 'stamp,x,y,z\\n0.5,1,0,0\\n2,1,0,0\\n' | frametool apply examples/drive.yaml map lidar --time-column stamp
-
-    Stamps are decimal seconds (12.5) or nanoseconds (12500000000ns, or a name like stamp_ns), exact to the nanosecond.
-    A row at a time without data is a bad row, as --on-error says.
+    Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
 
     \b
       frametool apply robot.yaml base imu -i imu.csv --columns ax,ay,az --as vector --columns gx,gy,gz --as vector

@@ -9,7 +9,7 @@ import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import combinations, one_pose
+from frametool.cli.poses import combinations, factors_of, one_pose
 from frametool.cli.streaming import Stream, stream_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
@@ -28,32 +28,41 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     \b
       frametool compose '{xyz: [1, 2, 3]}' '{rpy_deg: [0, 0, 90]}'
       frametool lookup robot.yaml map base_link | frametool compose - '{xyz: [0, 0, 1]}'
+      frametool compose 'inv({xyz: [1, 2, 3]})' '~{rpy_deg: [0, 0, 90]}'
+      frametool lookup robot.yaml map base_link | frametool compose inv - '{xyz: [14, -4, 0]}'
 
-    POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch.
+    POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch. The
+    inverse of any of them is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
     stream = Stream(options)
     output = Output("poses", deg=deg, **options)
-    if "-" not in poses:
+    factors = factors_of(poses)
+    given = [each.argument for each in factors]
+    if "-" not in given:
         if stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")
-        factors = combinations(poses, stream.given, degrees=deg, normalize=normalize)
-        products = [reduce(product, each) for each in factors]
+        each_product = combinations(factors, stream.given, degrees=deg, normalize=normalize)
+        products = [reduce(product, each) for each in each_product]
         output.poses(Result(each) for each in products)
         return 0
-    if poses.count("-") > 1:
+    if given.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
-    at = poses.index("-")
-    left = [one_pose(each, stream.given, degrees=deg, normalize=normalize) for each in poses[:at]]
-    right = [one_pose(each, stream.given, degrees=deg, normalize=normalize) for each in poses[at + 1 :]]
+    at = given.index("-")
+    left, right = (
+        [each.of(one_pose(each.argument, stream.given, degrees=deg, normalize=normalize)) for each in side]
+        for side in (factors[:at], factors[at + 1 :])
+    )
+    rows = factors[at]
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
     before = reduce(product, left) if left else None
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
-        factors = [*filter(None, [before]), Pose(name=name, parent=parent), *right]
-        result = reduce(product, factors)
+        result = reduce(product, [*filter(None, [before]), rows.of(Pose(name=name, parent=parent)), *right])
         return result.parent, result.name
 
-    operation = Operation(left=before and before.components, right=tuple(each.components for each in right))
+    operation = Operation(
+        before and before.components, tuple(each.components for each in right), inverse=rows.is_inverse
+    )
     return stream.run(Request(operation, degrees=deg, normalize=normalize, rename=rename), output)

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 @click.argument("target", type=FRAME, required=False, metavar="TARGET")
 @click.argument("source", type=FRAME, required=False, metavar="SOURCE")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns, or latest  [default: latest]")
-@click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE, where --at is that at TARGET")
-@click.option("--fixed", type=FRAME, metavar="FRAME", help="the frame that stands between the two times, e.g. map")
+@click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest]")
+@click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE; --at is that at TARGET")
+@click.option("--fixed", type=FRAME, metavar="FRAME", help="what stands still between the two times: map")
 @times_option
 @rules_options
 @reading_options(streams=True)
@@ -49,12 +49,11 @@ def command(
       frametool lookup robot.yaml base_link lidar --to rpy_deg --format json
       frametool lookup drive.yaml map base_link --at 2.5
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
-      frametool lookup drive.yaml base_link base_link --at 4 --source-at 2.5 --fixed map
+      frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. --deg is about the angles of
-    the result; the tree's own are what its file says. Between two samples of a moving frame positions are interpolated
-    along the line and rotations by slerp, edge by edge, as tf2 does; nothing is extrapolated. With --times, --on-error
-    is stop (the default) or skip: times without data are left out; null is for tables.
+    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. Between two samples of a moving
+    frame positions go along the line and rotations by slerp, edge by edge, as in tf2; nothing is extrapolated. With
+    --times and --on-error skip, times without data are left out.
     """
     by_row, stream = RowFrames(options), Stream(options)
     output = Output("poses", **options)

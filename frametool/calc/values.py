@@ -1,0 +1,209 @@
+"""The values of expressions: what kind they are, in which frames and units, and their numbers, or what computes them.
+
+A frame that nobody said is None, shown as `?`, and meets any.  Numbers are components, floats or arrays of one shape.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.calc.tokens import CalcError, frame_text
+from frametool.errors import ValueInvalid, shown
+from frametool.geometry import floats
+from frametool.geometry.validation import single
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Components, Namespace
+
+    Dimension = tuple[float, float, float]  # exponents of metre, radian and second
+    Kernel = Callable[..., Components]
+
+POSE, POINT, VECTOR, NUMBER = "pose", "point", "vector", "number"
+TWIST, ANGLES, LIST, TREE = "twist", "angles", "list", "tree"
+PLAIN: Dimension = (0.0, 0.0, 0.0)
+METRE, RADIAN, SECOND = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+TO_RADIANS = 0.017453292519943295
+# how many of the base unit, as a multiple or a divisor: dividing rounds once, so that 100mm is 0.1m
+UNITS: dict[str, tuple[float, float, Dimension]] = {
+    "m": (1.0, 1.0, METRE), "mm": (1.0, 1e3, METRE), "cm": (1.0, 1e2, METRE), "km": (1e3, 1.0, METRE),
+    "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
+    "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
+}  # fmt: skip
+
+
+class Type(NamedTuple):
+    """What is known of a value without its numbers.
+
+    target, source: the frames of a pose; a point, vector, twist or angles are seen in `target`
+    unit: the dimension of a number; degrees: an angle whose number counts degrees, so that right angles stay exact
+    """
+
+    kind: str
+    target: str | None = None
+    source: str | None = None
+    unit: Dimension = PLAIN
+    degrees: bool = False
+
+    def __str__(self) -> str:
+        """Return the frames of a pose, target<-source."""
+        return f"{frame_text(self.target)}<-{frame_text(self.source)}"
+
+    @property
+    def named(self) -> str:
+        """Return what it is, for a message."""
+        if self.kind == POSE:
+            return f"the pose {self}"
+        if self.kind == NUMBER:
+            return "a number" if self.unit == PLAIN else f"a number in {unit_text(self.unit)}"
+        if self.kind == LIST:
+            return "a list"
+        what = "angles" if self.kind == ANGLES else f"a {self.kind}"
+        return what if self.target is None else f"{what} in {shown(self.target)}"
+
+
+PLAIN_NUMBER = Type(NUMBER)
+
+
+class RowValues:
+    """One row, or a block of rows: its pose, point or vector, the columns asked for, its time, and the functions.
+
+    kept: what bound names came to, so that each is computed once
+    """
+
+    __slots__ = ("cells", "kept", "parts", "times_ns", "xp")
+
+    def __init__(self, parts: Components, cells: Mapping[str, Any], times_ns: Any, xp: Namespace) -> None:
+        """Keep all of it."""
+        self.parts = parts
+        self.cells = cells
+        self.times_ns = times_ns
+        self.xp = xp
+        self.kept: dict[int, Components] = {}
+
+
+class Term:
+    """A part of an expression, understood: its type, and its numbers, or what computes them from a row.
+
+    parts: None where they depend on a row; items: those of a list; tree: what can be asked for look-ups
+    text: as it was written, for suggestions; atomic: it needs no brackets
+    """
+
+    __slots__ = ("atomic", "compute", "items", "parts", "text", "tree", "type")
+
+    def __init__(
+        self,
+        type_: Type,
+        parts: Components | None = None,
+        compute: Callable[[RowValues], Components] | None = None,
+        *,
+        items: tuple[Term, ...] = (),
+        tree: Frames | None = None,
+        text: str = "",
+        atomic: bool = True,
+    ) -> None:
+        """Keep all of it."""
+        self.type = type_
+        self.parts = parts
+        self.compute = compute
+        self.items = items
+        self.tree = tree
+        self.text = text
+        self.atomic = atomic
+
+    def at(self, row: RowValues | None) -> Components:
+        """Return the numbers, of a row where they depend on it."""
+        if self.parts is not None:
+            return self.parts
+        if row is None or self.compute is None:
+            raise CalcError("row is known in streams only: -i FILE, or standard input")
+        return self.compute(row)
+
+    def written(self, text: str, *, atomic: bool) -> Term:
+        """Return the same value as it is written elsewhere."""
+        return Term(
+            self.type, self.parts, self.compute, items=self.items, tree=self.tree, text=text, atomic=atomic
+        )
+
+    def typed(self, type_: Type) -> Term:
+        """Return the same numbers under another type."""
+        return Term(type_, self.parts, self.compute, items=self.items)
+
+    @property
+    def bracketed(self) -> str:
+        """Return its text, in brackets unless it needs none."""
+        return self.text if self.atomic else f"({self.text})"
+
+
+def made(
+    type_: Type, kernel: Kernel, *operands: Term, functions: bool = True, check: Callable[..., str] | None = None
+) -> Term:
+    """Return what a kernel makes of the numbers of all operands: now if they are known, else for each row.
+
+    functions: the kernel takes a namespace last; check: says why floats have no result, "" where they have one
+    """
+
+    def computed(row: RowValues | None) -> Components:
+        given = tuple(part for each in operands for part in each.at(row))
+        if single(given):
+            return _of_floats(kernel, given, check, functions=functions)
+        if row is not None:
+            return kernel(*given, row.xp) if functions else kernel(*given)
+        return _of_arrays(kernel, given, check, functions=functions)
+
+    if all(each.parts is not None for each in operands):
+        return Term(type_, computed(None))
+    return Term(type_, None, computed)
+
+
+def _of_floats(
+    kernel: Kernel, given: Components, check: Callable[..., str] | None, *, functions: bool
+) -> Components:
+    """Run a kernel on floats; what has no finite result is an error."""
+    if check is not None and (reason := check(*given)):
+        raise CalcError(reason)
+    try:
+        result = kernel(*given, floats) if functions else kernel(*given)
+    except ValueInvalid as error:
+        raise CalcError(str(error)) from None
+    except (ZeroDivisionError, OverflowError, ValueError):
+        raise CalcError("the result is not finite") from None
+    if not all(map(isfinite, result)):
+        raise CalcError("the result is not finite: the numbers are too large")
+    return result
+
+
+def _of_arrays(
+    kernel: Kernel, given: Components, check: Callable[..., str] | None, *, functions: bool
+) -> Components:
+    """Run a kernel on arrays of one shape; the first element without a finite result is an error."""
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    with np.errstate(all="ignore"):
+        result = kernel(*given, arrays) if functions else kernel(*given)
+    bad = np.flatnonzero(~np.logical_and.reduce([np.isfinite(np.asarray(part)) for part in result]))
+    if bad.size:
+        full = np.broadcast_arrays(*given)
+        try:
+            _of_floats(kernel, tuple(float(part.reshape(-1)[bad[0]]) for part in full), check, functions=functions)
+        except CalcError as error:
+            raise CalcError(f"{error} (element {bad[0]})") from None
+    return result
+
+
+def meet(a: str | None, b: str | None) -> bool:
+    """Tell whether two frames can be one."""
+    return a is None or b is None or a == b
+
+
+def unit_text(unit: Dimension) -> str:
+    """Write a dimension: `m`, `m^2`, `m/s`; "" for a plain number."""
+    powers = [(name, power) for name, power in zip(("m", "rad", "s"), unit, strict=True) if power]
+    above = [f"{name}^{power:g}" if power != 1.0 else name for name, power in powers if power > 0.0]
+    below = [f"{name}^{-power:g}" if power != -1.0 else name for name, power in powers if power < 0.0]
+    return "/".join(["*".join(above) or "1", *below]) if below else "*".join(above)

@@ -1,0 +1,142 @@
+"""The prompt of `calc`: lines are read and answered until Ctrl-D; with readline where Python has it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.calc.evaluate import evaluate_line, read_line
+from frametool.calc.functions import FUNCTIONS
+from frametool.calc.tokens import frame_text
+from frametool.cli.calc_names import file_named_in
+from frametool.cli.calc_output import value_texts
+from frametool.cli.commands.help import topic
+from frametool.cli.sink import writing
+from frametool.cli.stderr import say_error, tell
+from frametool.errors import FrametoolError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from frametool.calc.evaluate import Scope
+    from frametool.cli.output import Output
+
+PROMPT = "> "
+LONGEST_HISTORY = 1000  # lines
+BETWEEN_WORDS = " \t()[]{},*^@+="
+WORDS = ("row", "pi", "ans", "as ", "in ")
+ENDS = ("exit", "quit")
+
+
+def talk(scope: Scope, output: Output) -> int:
+    """Answer lines until Ctrl-D; errors go on, Ctrl-C forgets the line."""
+    if output.path is not None:
+        raise click.UsageError("-o FILE is for expressions that are given or piped, not for the prompt")
+    prompt = PROMPT if sys.stdout.isatty() else ""
+    with _readline(scope):
+        while True:
+            try:
+                line = input(prompt)
+                if line.strip() in ENDS:
+                    return 0
+                if line.strip():
+                    _answer(line, scope, output)
+            except EOFError:
+                if prompt:
+                    tell("")
+                return 0
+            except KeyboardInterrupt:
+                tell("")
+
+
+def _answer(line: str, scope: Scope, output: Output) -> None:
+    """Print the value of a line, or what is wrong with it."""
+    if line.strip() == "help":
+        with writing(None) as write:
+            write(topic("calc"))
+        return
+    try:
+        found = file_named_in(line, scope)
+        if found is None:
+            output.pieces(value_texts([evaluate_line(read_line(line), scope)], output.style))
+    except click.UsageError as error:
+        tell(f"frametool: {error.format_message()}")
+    except BrokenPipeError:
+        raise
+    except FrametoolError as error:
+        say_error(error, in_json=False)
+
+
+@contextmanager
+def _readline(scope: Scope) -> Iterator[None]:
+    """Complete words and keep a history while lines are read; without readline lines are just read."""
+    try:
+        import readline
+    except ImportError:
+        yield
+        return
+    path = history_path()
+    readline.set_completer_delims(BETWEEN_WORDS)
+    readline.set_completer(Completer(scope, readline))
+    is_editline = "libedit" in (readline.__doc__ or "")
+    readline.parse_and_bind("bind ^I rl_complete" if is_editline else "tab: complete")
+    readline.set_history_length(LONGEST_HISTORY)
+    with suppress(OSError):
+        readline.read_history_file(path)
+    try:
+        yield
+    finally:
+        readline.set_completer(None)
+        with suppress(OSError):
+            os.makedirs(os.path.dirname(path), mode=0o700, exist_ok=True)
+            readline.write_history_file(path)
+
+
+def history_path() -> str:
+    """Return the file of the history, as the XDG base directories have it."""
+    state = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
+    return os.path.join(state, "frametool_history")
+
+
+class Completer:
+    """Completes frames on both sides of an arrow, names, and functions with their bracket."""
+
+    def __init__(self, scope: Scope, line: Any) -> None:
+        """Take what there is to name, and readline, which knows the line."""
+        self.scope = scope
+        self.line = line
+        self.found: list[str] = []
+
+    def __call__(self, text: str, state: int) -> str | None:
+        """Return one completion after the other."""
+        if state == 0:
+            self.found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
+        return self.found[state] if state < len(self.found) else None
+
+    def completions(self, text: str, before: str) -> list[str]:
+        """Return all completions of a word behind the rest of a line."""
+        frames = sorted(frame_text(frame) for frame in self._frames(before))
+        head, arrow, tail = text.partition("<-")
+        if arrow:
+            return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
+        if self._tree_before(before) is not None:
+            words: Iterable[str] = ()
+        else:
+            words = (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
+        known = [*words, *(f"{frame}<-" for frame in frames)]
+        return [word for word in known if word.startswith(text)]
+
+    def _tree_before(self, before: str) -> Any:
+        """Return the tree whose bracket is open right before a word."""
+        name = before[:-1].rstrip().rpartition(" ")[2] if before.endswith("[") else ""
+        bare = name.lstrip("()[]{},*^@+=-/")
+        term = self.scope.names.get(bare)
+        return None if term is None else term.tree
+
+    def _frames(self, before: str) -> Iterable[str]:
+        tree = self._tree_before(before) or self.scope.tree
+        return () if tree is None else tree.frames

@@ -1,0 +1,158 @@
+"""`frametool calc`: expressions over poses, points and numbers."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.calc.evaluate import Scope, evaluate_line, mentions_row, read_line
+from frametool.calc.literals import Literals
+from frametool.calc.parser import walk
+from frametool.cli.calc_names import file_named_in
+from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import load_tree, reading_options
+from frametool.documents.source import read_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from frametool.calc.formula import RowExpressions
+    from frametool.calc.parser import Line
+    from frametool.calc.values import Term
+    from frametool.stream.request import Request
+
+KINDS = ("point", "vector", "pose")
+
+
+@click.command(cls=Command, name="calc")
+@click.argument("arguments", nargs=-1, type=TEXT, metavar="[NAME=FILE ..] [EXPR ..]")
+@click.option("--tree", "trees", multiple=True, type=FILE, metavar="FILE",
+              help="the tree of look-ups; may be repeated, files are merged  [default: FRAMETOOL_TREE]")
+@click.option("-e", "expressions", multiple=True, type=TEXT, metavar="[NAME=]EXPR|@FILE",
+              help="of a stream: a result in columns of its own, NAME or NAME_x ..; may be repeated")
+@click.option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
+@click.option("--time-column", "time_column", type=TEXT, metavar="NAME",
+              help="the column or key of a row's time, for @ row  [default: the one that looks like it]")
+@rotation_options
+@pose_options
+@result_options("points")
+@reading_options(streams=True)
+@stream_options
+def command(
+    arguments: tuple[str, ...], trees: tuple[str, ...], expressions: tuple[str, ...], kind: str | None,
+    time_column: str | None, deg: bool, normalize: bool, **options: Any,
+) -> int:  # fmt: skip
+    """Calculate with poses whose frames are checked like units.
+
+    \b
+      frametool calc --tree robot.yaml 'inv(map<-base_link) * (map<-tool)'
+      frametool calc --tree robot.yaml '(map<-lidar) * [1, 0, 0]' 'dist(map<-tool, map<-lidar)'
+      frametool calc d=drive.yaml 'angle(d[map<-base_link @ 0.5s], d[map<-base_link @ 3.5s])' --deg
+      frametool calc --tree robot.yaml '(map<-lidar) * row' -i cloud.csv
+      frametool calc -e 'd=norm(trans(row))' -e 'heading=rpy(row)' -i walk.tum
+
+    TARGET<-SOURCE is the pose of SOURCE in TARGET; {..} a pose as in files, [x, y, z] a point. Poses are composed
+    with *, and frames must touch. `frametool help calc` is the language on one screen.
+
+    NAME=FILE gives a name to a file: a tree if it holds frames, its pose, or the list of its poses; NAME=EXPR to a
+    value. An expression with row is computed for each row of -i FILE or of standard input: the result replaces what
+    the row was, --keep adds it, -e NAME=EXPR puts it in columns of its own. row.COLUMN is a number of the row, @ row
+    its time. Without an expression a terminal gets a prompt; from a pipe one expression a line is read.
+    """
+    stream = Stream(options)
+    output = Output("points", deg=deg, **options)
+    scope = Scope(literals=Literals(degrees=deg, normalize=normalize))
+    given = list(_given(arguments, expressions, scope))
+    lines = [read_line(text) for text, _ in given]
+    scope.tree = _tree(trees, lines)
+    if not lines:
+        return _without_expression(stream, output, scope)
+    if stream.path is not None or any(mentions_row(line.tree) for line in lines):
+        flags = [is_option for _, is_option in given]
+        formula = _over_rows(lines, flags, scope, output)
+        formula.check((kind,) if kind else ("pose", "point", "vector"))
+        request = _request(formula, kind or "", time_column, degrees=deg, normalize=normalize)
+        return stream.run(request, output)
+    from frametool.cli.calc_output import value_texts
+
+    output.pieces(value_texts(list(_results(lines, scope)), output.style))
+    return 0
+
+
+def _given(arguments: Iterable[str], expressions: Iterable[str], scope: Scope) -> Iterator[tuple[str, bool]]:
+    """Yield the expressions in order, and whether -e gave them; names of files are bound."""
+    for text in arguments:
+        if file_named_in(text, scope) is None:
+            yield text, False
+    for text in expressions:
+        yield read_text(text[1:]) if text.startswith("@") else text, True
+
+
+def _tree(files: Sequence[str], lines: Sequence[Line]) -> Any:
+    """Read the tree of bare look-ups: --tree, else what FRAMETOOL_TREE names, if any is asked for."""
+    if files:
+        return load_tree(files[0], files[1:], streams=True)
+    asks = any(branch.kind == "lookup" and not branch.value[1] for line in lines for branch in walk(line.tree))
+    return load_tree(".", streams=True) if os.environ.get("FRAMETOOL_TREE") and (asks or not lines) else None
+
+
+def _results(lines: Sequence[Line], scope: Scope) -> Iterator[Term]:
+    """Yield the values of expressions; one that is bound to a name is shown only where nothing follows it."""
+    for at, line in enumerate(lines):
+        term = evaluate_line(line, scope)
+        if not line.name or at == len(lines) - 1:
+            yield term
+
+
+def _without_expression(stream: Stream, output: Output, scope: Scope) -> int:
+    """Read expressions from a pipe, one a line, or talk at a terminal."""
+    if stream.path is not None:
+        raise click.UsageError("-i FILE needs an expression over row")
+    if sys.stdin is not None and sys.stdin.isatty():
+        from frametool.cli.calc_prompt import talk
+
+        return talk(scope, output)
+    from frametool.cli.calc_pipe import calculate_lines
+
+    return calculate_lines(stream, output, scope)
+
+
+def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, output: Output) -> RowExpressions:
+    """Part lines into those whose results are written and those that only bind names."""
+    from frametool.calc.formula import RowExpressions
+
+    results = [line for line, is_option in zip(lines, flags, strict=True) if is_option or not line.name]
+    if not results:
+        results = [lines[-1]]
+    unnamed = [line for line in results if not line.name]
+    if unnamed and len(results) > 1:
+        raise click.UsageError("rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
+    names = [line.name for line in results]
+    if twice := next((name for name in names if name and names.count(name) > 1), ""):
+        raise click.UsageError(f"-e {twice}= is given twice")
+    bindings = [line for line in lines if line not in results]
+    return RowExpressions(
+        results, bindings, scope, notations=output.notations, degrees=output.style.degrees,
+        keep_sign=output.style.keep_sign,
+    )  # fmt: skip
+
+
+def _request(formula: RowExpressions, kind: str, time_column: str | None, *, degrees: bool, normalize: bool) -> Request:
+    """Say what is asked of the rows."""
+    from frametool.stream.operation import Operation
+    from frametool.stream.request import Request
+    from frametool.stream.stamp_source import Timed
+
+    if time_column is not None and not formula.needs_time:
+        raise click.UsageError("--time-column is the time of @ row, which no expression asks for")
+    timed = Timed.of_rows(time_column or "") if formula.needs_time else None
+    counters = not any(frame.isdecimal() for _, tree in formula.scope.trees for frame in tree.frames)
+    return Request(
+        Operation(moves=True, formula=formula), kind=kind, degrees=degrees, normalize=normalize, timed=timed,
+        counters=counters,
+    )  # fmt: skip

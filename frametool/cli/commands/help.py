@@ -1,0 +1,73 @@
+"""`frametool help`: a subject on one screen, or the help of a command."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import click
+
+from frametool.cli import COMMANDS
+from frametool.cli.command import TEXT, Command
+from frametool.cli.help import show_help
+from frametool.cli.sink import writing
+from frametool.errors import alternatives, shown
+
+FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "topics")
+
+
+def topics() -> dict[str, str]:
+    """Return the subjects there are: name -> what it is about, the first line of its file."""
+    names = sorted(name.removesuffix(".txt") for name in os.listdir(FOLDER) if name.endswith(".txt"))
+    return {name: topic(name).partition("\n")[0] for name in names}
+
+
+def topic(name: str) -> str:
+    """Return the text of a subject."""
+    with open(os.path.join(FOLDER, f"{name}.txt"), encoding="utf-8") as file:
+        return file.read()
+
+
+class Topic(click.ParamType[str]):
+    """A subject or a command."""
+
+    name = "topic"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Offer the subjects and the commands."""
+        from click.shell_completion import CompletionItem
+
+        known = topics() | {name: row[1] for name, row in COMMANDS.items()}
+        return [CompletionItem(name, help=about) for name, about in known.items() if name.startswith(incomplete)]
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take the word as it is."""
+        converted: str = TEXT.convert(value, param, ctx)
+        return converted
+
+
+@click.command(cls=Command, name="help")
+@click.argument("name", type=Topic(), required=False, metavar="[TOPIC | COMMAND]")
+@click.pass_context
+def command(ctx: click.Context, name: str | None) -> None:
+    """Explain a subject on one screen, or a command.
+
+    \b
+      frametool help
+      frametool help pose
+      frametool help convert
+    """
+    if name in COMMANDS:
+        from frametool.cli.group import group
+
+        found = group.get_command(ctx, name)
+        if found is not None and ctx.parent is not None:
+            show_help(click.Context(found, parent=ctx.parent, info_name=name))
+        return
+    known = topics()
+    if name is not None and name not in known:
+        raise click.UsageError(f"no topic {shown(name)}{alternatives(name, (*known, *COMMANDS), 'topics')}")
+    width = max(map(len, known))
+    listed = "".join(f"  {each:{width}}  {about}\n" for each, about in known.items())
+    with writing(None) as write:
+        write(topic(name) if name else f"Topics (frametool help TOPIC):\n\n{listed}\nCommands: {', '.join(COMMANDS)}\n")
