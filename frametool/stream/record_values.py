@@ -6,6 +6,7 @@ The records, the operation and what is said of them are those of streams; only t
 from __future__ import annotations
 
 import re
+from collections import Counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import parse_documents
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     Value = Result | dict[str, Any]
 
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
+MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
 
@@ -79,15 +81,26 @@ def pose_of(record: Record, request: Request) -> Pose:
 
 
 def documents(source: Source, request: Request) -> Iterator[tuple[Document, list[Record]]]:
-    """Yield the documents of a text with their records, and warn of what is odd in them, each with its place."""
+    """Yield the documents of a text with their records, and warn of what is odd in them, with its place.
+
+    What is odd in many poses, by one rule, is told of the first few and then counted.
+    """
+    told: Counter[str] = Counter()
     for document in parse_documents(source.text, source.name):
         reading = Reading(source, degrees=request.degrees, normalize=request.normalize)
         try:
             records = list(find_records(document.value, request, reading, (document.index,)))
         except Misfit as misfit:
             raise placed(misfit, source) from misfit
-        tell(source, reading.notes)
+        new = []
+        for note in reading.notes:
+            told[note.rule] += 1
+            if told[note.rule] <= MOST_TOLD:
+                new.append(note)
+        tell(source, new)
         yield document, records
+    if more := sum(max(count - MOST_TOLD, 0) for count in told.values()):
+        warn(f"{source.name}: {more} more like these")
 
 
 def results(source: Source, request: Request, style: Style, memory: Memory | None = None) -> Iterator[Value]:

@@ -273,6 +273,9 @@ def _several(
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     for place, role in named.items() if rename_of(request) is not None else ():
         columns[place] = Named(place, role)
+    ours = [place for pose in poses for each in pose if each for place in each.places]
+    if twice := sorted({table.name(place) for place in ours if ours.count(place) > 1}):
+        raise Misused(f"--columns: {', '.join(twice)} stands twice")
     first = 0
     for pose, shape, target in zip(poses, shapes, targets, strict=True):
         if request.notations or not _in_place(pose, shape, target, request._replace(poses=1)):
