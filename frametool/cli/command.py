@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
-# an argument that begins like this is a number, whatever short options there are
+# an argument that begins like this is a number; no short option begins so, but that -j is one where joints are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+]| +(Translation|Rotation):)", re.IGNORECASE)
 READ = readers("tree", "records", "rows", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file."
@@ -39,7 +39,9 @@ class Command(WithHelp):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers, then parse."""
-        return super().parse_args(ctx, [f" {each}" if NEGATIVE.match(each) else each for each in args])
+        options = {name for each in self.get_params(ctx) for name in each.opts}
+        shielded = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
+        return super().parse_args(ctx, shielded)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """End every help with the exit codes."""

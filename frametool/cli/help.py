@@ -21,8 +21,8 @@ def _help(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # clic
 
 def _has_many_choices(option: click.Option, ctx: click.Context) -> bool:
     """Tell whether the choices of an option are too long to stand beside it."""
-    metavar = option.make_metavar(ctx)
-    return metavar.startswith("[") and len(metavar) > LONGEST_CHOICE
+    has_choices = isinstance(option.type, click.Choice) and not option.metavar
+    return has_choices and len(option.make_metavar(ctx)) > LONGEST_CHOICE
 
 
 def _spelled(option: click.Option, ctx: click.Context) -> str:

@@ -167,10 +167,10 @@ def test_two_forms_that_fit_are_both_named(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_the_root_element_of_xml_is_a_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "robot"),)))
-    for head in (b"<robot name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<robot>", b"\xef\xbb\xbf<robot/>"):
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "toys"),)))
+    for head in (b"<toys name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<toys>", b"\xef\xbb\xbf<toys/>"):
         assert by_sign(head, "tree") == "toy"
-    assert by_sign(b"<robots>", "tree") is None
+    assert by_sign(b"<toy>", "tree") is None
 
 
 @pytest.mark.parametrize("name", FORMATS)

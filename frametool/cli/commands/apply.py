@@ -87,11 +87,7 @@ def command(
     each record says its own frame; without records standard input is read.
 
     Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
-
-    \b
-      frametool apply robot.yaml base imu -i imu.csv --columns ax,ay,az --as vector --columns gx,gy,gz --as vector
-
-    Each of several --columns of a row is moved by itself.
+    Several vectors of a row are several --columns: --columns ax,ay,az --columns gx,gy,gz --as vector.
     """
     stream = Stream(options)
     output = Output("points", deg=deg, **options)

@@ -32,12 +32,12 @@ KINDS = ("point", "vector", "pose")
 @click.command(cls=Command, name="calc")
 @click.argument("arguments", nargs=-1, type=TEXT, metavar="[NAME=FILE ..] [EXPR ..]")
 @click.option("--tree", "trees", multiple=True, type=FILE, metavar="FILE",
-              help="the tree of look-ups; may be repeated, files are merged  [default: FRAMETOOL_TREE]")
+              help="tree of look-ups; may be repeated")
 @click.option("-e", "expressions", multiple=True, type=TEXT, metavar="[NAME=]EXPR|@FILE",
-              help="of a stream: a result in columns of its own, NAME or NAME_x ..; may be repeated")
+              help="result in columns NAME or NAME_x ..; may be repeated")
 @click.option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
 @click.option("--time-column", "time_column", type=TEXT, metavar="NAME",
-              help="the column or key of a row's time, for @ row  [default: the one that looks like it]")
+              help="column or key of a row's time, for @ row")
 @rotation_options
 @pose_options
 @result_options("points")

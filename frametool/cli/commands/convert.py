@@ -15,7 +15,7 @@ from frametool.cli.stderr import say
 from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
-from frametool.geometry.representations import notation
+from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.text.numbers import parse_angle
@@ -31,22 +31,26 @@ AXES = 3
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
-@click.command(cls=Command, name="convert", short_help="one rotation or pose in other representations")
+class ConvertCommand(Command):
+    """A command whose help lists the representations."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List them, then the exit codes."""
+        formatter.write_paragraph()
+        formatter.write_text(f"Representations: {', '.join(row.spelling for row in REPRESENTATIONS.values())}.")
+        super().format_epilog(ctx, formatter)
+
+
+@click.command(cls=ConvertCommand, name="convert", short_help="one rotation or pose in other representations")
 @click.argument("values", nargs=-1, type=TEXT, metavar="[VALUES.. | POSE]")
 @click.option(
     "--axes",
     type=TEXT,
     metavar="NAME",
-    help="the pose at the same place with these axes; alone, the pose of such axes on a ROS body: "
-    "optical (opencv), opengl, frd, flu (ros), enu, ned, or A_from_B; mirrored ones, unity, on both sides only",
+    help="other axes of the frame it is the pose of: optical, A_from_B .. (help axes); alone, their pose on a ROS body",
 )
 @click.option(
-    "--world-axes",
-    "world",
-    type=TEXT,
-    metavar="A_from_B",
-    help="change the axes of the frame that poses are seen from, as --axes does those of the frame they are the pose "
-    "of: NED to ENU is --world-axes enu_from_ned --axes frd_from_flu",
+    "--world-axes", "world", type=TEXT, metavar="A_from_B", help="other axes of the frame it is seen from (help axes)"
 )
 @click.option(
     "--find",
@@ -81,13 +85,13 @@ def command(
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
       frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle --format json
       frametool convert --axes optical --to rpy_deg
-      frametool convert '{xyz: [1, 2, -3], rpy_deg: [0, 0, 0]}' --world-axes enu_from_ned --axes frd_from_flu
+      frametool convert '[[0. -1. 0. 0.5] [1. 0. 0. 0.] [0. 0. 1. 2.]]' --to rpy_deg
       frametool convert --from rpy_deg 10 20 30 --to euler:all
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
-    its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
-    poses; without any argument standard input is read.
+    its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, what another tool printed (help pose), a file, or - for
+    standard input, also with several poses; without any argument standard input is read.
     """
     values = rejoined(values)
     stream = Stream(options)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     "--weights",
     type=TEXT,
     metavar="NAME | W,W,..",
-    help="the column or key of each pose's weight; or the weights of the POSEs, parted by commas",
+    help="column or key of each pose's weight, or the weights of the POSEs",
 )
 @rotation_options
 @pose_options

@@ -24,21 +24,20 @@ if TYPE_CHECKING:
 @pose_options
 @result_options("poses")
 @click.option(
-    "--consecutive", is_flag=True, help="of a stream, each row seen from the row before; the first is the identity"
+    "--consecutive", is_flag=True, help="of a stream, each row seen from the row before it"
 )
-@click.option("--first", is_flag=True, help="of a stream, each row seen from the first one, which is the identity")
+@click.option("--first", is_flag=True, help="of a stream, each row seen from the first")
 @click.option(
     "--velocity",
     is_flag=True,
-    help="with --consecutive, also the twist in each step's time: m/s and rad/s, seen in the row before",
+    help="with --consecutive, also the twist from row to row, m/s and rad/s",
 )
 @click.option(
     "--time-column",
     "time_column",
     type=TEXT,
     metavar="NAME",
-    help="with --velocity, the column or key of the stamps, seconds; nanoseconds where it ends in _ns  "
-    "[default: stamp, time, t, or the header's]",
+    help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
 )
 @stream_options
 def command(
