@@ -40,7 +40,7 @@ def is_pasted(text: str, given: Notation | None = None) -> bool:
         return is_inline(text)
     if os.path.exists(text):
         return False
-    return "\n" in text or rewritten(Source(INLINE, text), given) is not None
+    return "\n" in text or re.match(r"\w+: *[\[{]", text) is not None or rewritten(Source(INLINE, text), given) is not None
 
 
 def rewritten(
