@@ -26,7 +26,6 @@ from frametool.stream.request import Request
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
 from frametool.stream.stamp_source import in_nanoseconds, key_path, read_header_stamp, read_stamp, stamp_keys
-from frametool.stream.template import beside_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -161,6 +160,8 @@ def _answer(
 
 def _beside_ns(document: Document, record: Record, request: Request) -> int:
     """Return the stamp that stands beside a record."""
+    from frametool.stream.template import beside_path
+
     paths = beside_path(document, record, request.beside or "")
     texts = [str(value_at(document.value, path[1:])) for path in paths]
     return read_header_stamp(*texts) if len(texts) > 1 else read_stamp(*texts, in_ns=in_nanoseconds(str(paths[0][-1])))
