@@ -29,6 +29,10 @@ def stamps_of(block: Block, name: str, blame: Blame) -> Ints:
     count = len(block.places)
     if not count:
         return np.zeros(0, np.int64)
+    if block.times is not None:
+        return block.times
+    if not block.stamps or not block.stamps[0]:
+        raise ValueInvalid("rows have no stamps; there is no velocity")
     spans = block.stamps[0]
     if len(spans) == 2:
         stamps, reasons = parse_header_stamps(*spans)

@@ -79,7 +79,8 @@ class Operation(NamedTuple):
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
-    mirrors: the row is seen in a mirror across y, before all else
+    mirrors: the row is seen in a mirror across y, before all that stands on its left
+    before: each pose is multiplied with this one from the right before anything else: the axes of a camera
     formula: an expression, instead of all this
     """
 
@@ -92,6 +93,7 @@ class Operation(NamedTuple):
     turns: bool = False
     mirrors: bool = False
     velocity: bool = False
+    before: Rigid | None = None
     formula: Formula | None = None
 
     def extras(self, kind: str) -> tuple[str, ...]:
@@ -136,7 +138,7 @@ class Operation(NamedTuple):
 
     @property
     def _is_bare(self) -> bool:
-        return not (self.left or self.right or self.of or self.moves or self.mirrors)
+        return not (self.left or self.right or self.of or self.moves or self.mirrors or self.before)
 
     def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
         """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
@@ -158,6 +160,8 @@ class Operation(NamedTuple):
 
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
         """Return the resulting pose, and what else is known about it."""
+        if self.before is not None:
+            poses = [rigid.compose(*pose, *self.before) for pose in poses]
         result: Rigid = rigid.inverse(*poses[0]) if self.inverse else poses[0]
         if self.mirrors:
             result = rigid.mirrored(*result)

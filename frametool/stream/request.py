@@ -36,6 +36,7 @@ class Request(NamedTuple):
     unwrap: angles go on beyond half a turn
     beside: the column or key of a number that is read beside the pose: its stamp or weight; "" is the usual stamp
     gathered: takes the poses, nothing is written then
+    whole: all numbers of a result are wanted, also those that do not change
     """
 
     operation: Operation = Operation()
@@ -62,6 +63,7 @@ class Request(NamedTuple):
     beside: str | None = None
     gathered: Gathered | None = None
     on_error: str = STOP
+    whole: bool = False
 
     @property
     def in_order(self) -> bool:

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
+from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options, one_argument
+from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
-from frametool.cli.poses import pose_from_numbers, values_of
+from frametool.cli.poses import pose_from_numbers, pose_source, source_from_numbers, values_of
 from frametool.cli.stderr import say
 from frametool.cli.streaming import Stream, one_notation, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, notation
@@ -23,6 +26,7 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.documents.source import Source
     from frametool.geometry.representations import Notation
     from frametool.stream.operation import Operation
 
@@ -64,8 +68,10 @@ class ConvertCommand(Command):
 @rotation_options
 @pose_options
 @result_options("poses")
+@explain_options
 @click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
 @stream_options
+@pose_reading_options
 def command(
     values: tuple[str, ...],
     given: tuple[Notation, ...] | None,
@@ -88,14 +94,20 @@ def command(
       frametool convert '[[0. -1. 0. 0.5] [1. 0. 0. 0.] [0. 0. 1. 2.]]' --to rpy_deg
       frametool convert --from rpy_deg 10 20 30 --to euler:all
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
+      frametool convert --from rpy_deg 10 20 30 --to matrix --explain
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, what another tool printed (help pose), a file, or - for
     standard input, also with several poses; without any argument standard input is read.
     """
     values = rejoined(values)
-    stream = Stream(options)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
+    if explaining:
+        if world is not None:
+            raise click.UsageError("--explain derives a change of axes on one side; leave --world-axes out")
+        explaining.plan(output, stream)
+        one_argument(values[0] if values else axes)
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
@@ -113,21 +125,38 @@ def command(
         _say_other_side(axes, world)
     is_numbers = _are_numbers(values, told=bool(given))
     if len(values) == 1 and not (is_numbers or stream.path) and _is_table(values[0], stream):
+        if explaining:
+            raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
         values = ()
-    if stream.path or values == ("-",) or not (values or (operation.turns and not stream.has_input())):
+    is_alone = operation.turns and (explaining or not stream.has_input())
+    if stream.path or values == ("-",) or not (values or is_alone):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
         return stream.run(request, output)
+    sources: list[Source] = []
     if not values:
-        results: list[Any] = [Result(_changed(Pose(rotation=IDENTITY), operation))]
+        alone = _changed(Pose(rotation=IDENTITY), operation)
+        if explaining and alone.rotation:
+            sources = [source_from_numbers(list(map(repr, alone.rotation)), (notation("xyzw"),))]
+        results: list[Any] = [Result(alone)]
     elif is_numbers:
         pose = pose_from_numbers(values, given, degrees=deg, normalize=normalize)
+        sources = [source_from_numbers(values, given)] if explaining else []
         results = [Result(_changed(pose, operation))]
     else:
-        results = list(values_of(values, request, output))
+        sources = [pose_source(each, request.given, normalize=normalize) for each in values] if explaining else []
+        results = list(values_of(sources or values, request, output))
     poses = [each.pose for each in results if isinstance(each, Result)]
     if find is not None:
         output.use(_found(poses, find, tolerance, degrees=deg))
+    if explaining:
+        if len(poses) != 1:
+            raise click.UsageError(f"--explain derives one pose, found {len(results)}")
+        from frametool.calc.explain.derive import derive_convert
+
+        written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
+        change = (axes or "", operation.right[0][3:]) if operation.right and values else None
+        return explaining.write(derive_convert(written, explaining.plan(output), own=poses[0], turn=change), output)
     output.values(results)
     output.tell_of_lock(poses)
     return 0

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, all_given, explain_options, one_argument
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose, write_results
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
 
@@ -39,7 +41,9 @@ if TYPE_CHECKING:
     metavar="NAME",
     help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
 )
+@explain_options
 @stream_options
+@pose_reading_options
 def command(
     a: str | None,
     b: str | None,
@@ -67,8 +71,17 @@ def command(
     The twist from A to B in dt seconds is that of the body, seen in A: linear R_A' (p_B - p_A) / dt, angular the
     rotation vector of A^-1 B over dt. The first row has none and is left out.
     """
-    stream = Stream(options)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
+    if explaining:
+        plan = explaining.plan(output, stream)
+        if consecutive or first:
+            raise click.UsageError("--consecutive and --first are about the rows of a stream; leave --explain out")
+        from frametool.calc.explain.derive import derive_relative
+
+        arguments = [str(one_argument(each)) for each in (a, b)]
+        given_a, given_b = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
+        return explaining.write(derive_relative(given_a, given_b, plan), output)
     from frametool.stream.request import Request
 
     if velocity and not consecutive:
