@@ -8,7 +8,6 @@ ROS REP 103: a body at rest, facing east, has its axes along ENU.
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 from frametool.errors import ValueInvalid, nearest, shown
 from frametool.geometry import euler, floats, quaternion
@@ -56,21 +55,25 @@ def named_rotation(text: str) -> Rotation:
     return axes_change(target, source) if joint else axes_change("flu", text)
 
 
-class AxesChange(NamedTuple):
+class AxesChange:
     """A change of axes that may be a mirror too: first y is turned around if it is one, then comes the rotation."""
 
-    rotation: Rotation
-    mirrors: bool = False
+    __slots__ = ("mirrors", "rotation")
+
+    def __init__(self, rotation: Rotation, *, mirrors: bool = False) -> None:
+        """Keep the two together."""
+        self.rotation = rotation
+        self.mirrors = mirrors
 
     def inverse(self) -> AxesChange:
         """Return the change back."""
         back = self.rotation.inverse()
-        return AxesChange(_in_mirror(back) if self.mirrors else back, self.mirrors)
+        return AxesChange(_in_mirror(back) if self.mirrors else back, mirrors=self.mirrors)
 
     def after(self, other: AxesChange) -> AxesChange:
         """Return the change by another and then by this one."""
         second = _in_mirror(other.rotation) if self.mirrors else other.rotation
-        return AxesChange(self.rotation @ second, self.mirrors != other.mirrors)
+        return AxesChange(self.rotation @ second, mirrors=self.mirrors != other.mirrors)
 
     def behind(self) -> Rotation:
         """Return the rotation that follows the mirror where this change stands on the right of a pose."""

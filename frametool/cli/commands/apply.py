@@ -39,7 +39,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
     "kinds",
     type=click.Choice(CHOICES),
     multiple=True,
-    help="what the records are; once for each --columns  [default: as they look]",
+    help="what the records are, once for each --columns",
 )
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
@@ -87,11 +87,9 @@ def command(
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
       ros2 topic echo /clicked_point | frametool apply tf.txt map
 
-    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
-    each record says its own frame; without records standard input is read.
-
-    Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
-    Several vectors of a row are several --columns: --columns ax,ay,az --columns gx,gy,gz --as vector.
+    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point; ROS messages go
+    by their headers (frametool help records). Without SOURCE each record says its own frame; without records standard
+    input is read.
     """
     stream, explaining = Stream(options), Explaining(options)
     output = Output("points", "trajectory", deg=deg, **options)

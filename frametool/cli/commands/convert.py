@@ -51,7 +51,7 @@ class ConvertCommand(Command):
     "--axes",
     type=TEXT,
     metavar="NAME",
-    help="other axes of the frame it is the pose of: optical, A_from_B .. (help axes); alone, their pose on a ROS body",
+    help="the pose at the same place in these axes (help axes)",
 )
 @click.option(
     "--world-axes", "world", type=TEXT, metavar="A_from_B", help="other axes of the frame it is seen from (help axes)"
@@ -60,7 +60,7 @@ class ConvertCommand(Command):
     "--find",
     type=TEXT,
     metavar="A,B,C",
-    help="show the Euler conventions in which these angles are the rotation, radians or with --deg degrees",
+    help="Euler conventions with these angles (help euler)",
 )
 @click.option(
     "--tolerance", type=Number(), default=1e-6, metavar="RAD", help="how near --find wants it  [default: 1e-06]"
@@ -69,7 +69,7 @@ class ConvertCommand(Command):
 @pose_options
 @result_options("poses")
 @explain_options
-@click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
+@click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
 @stream_options
 @pose_reading_options
 def command(
@@ -91,7 +91,6 @@ def command(
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
       frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle --format json
       frametool convert --axes optical --to rpy_deg
-      frametool convert '[[0. -1. 0. 0.5] [1. 0. 0. 0.] [0. 0. 1. 2.]]' --to rpy_deg
       frametool convert --from rpy_deg 10 20 30 --to euler:all
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
       frametool convert --from rpy_deg 10 20 30 --to matrix --explain

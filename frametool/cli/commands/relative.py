@@ -68,8 +68,7 @@ def command(
       frametool relative --first -i walk.tum
       frametool relative --consecutive --velocity -i walk.tum
 
-    The twist from A to B in dt seconds is that of the body, seen in A: linear R_A' (p_B - p_A) / dt, angular the
-    rotation vector of A^-1 B over dt. The first row has none and is left out.
+    The twist in dt seconds is the body's, seen in A: linear R_A' (p_B - p_A) / dt, angular rotvec(A^-1 B) / dt.
     """
     stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
