@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.calc.evaluate import Scope, evaluate_line, mentions_row, read_line
+from frametool.calc.evaluate import evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.literals import Literals
-from frametool.calc.parser import walk
+from frametool.calc.parser import mentions_row, walk
+from frametool.calc.scope import Scope
 from frametool.cli.calc_names import file_named_in
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
