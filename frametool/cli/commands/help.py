@@ -58,7 +58,7 @@ def command(ctx: click.Context, name: str | None) -> None:
       frametool help convert
     """
     known = topics()
-    if name in COMMANDS and name not in known:  # the language of calc is a subject of its own
+    if name in COMMANDS and name not in known:  # calc and formats are subjects too
         from frametool.cli.group import group
 
         found = group.get_command(ctx, name)
