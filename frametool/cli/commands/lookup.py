@@ -53,9 +53,8 @@ def command(
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
       frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. Between two samples of a moving
-    frame positions go along the line and rotations by slerp, edge by edge, as in tf2; nothing is extrapolated. With
-    --times and --on-error skip, times without data are left out.
+    TREE is a file, - for stdin, . for that in FRAMETOOL_TREE. Between samples positions go along the line, rotations
+    by slerp, edge by edge, as in tf2; nothing is extrapolated. --on-error skip leaves out times without data.
     """
     by_row, stream, explaining = RowFrames(options), Stream(options), Explaining(options)
     output = Output("poses", **options)
