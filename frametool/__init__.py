@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.formats import FORMATS as FORMATS
     from frametool.formats.load import load as load
+    from frametool.formats.robot import load_robot as load_robot
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.tree import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
@@ -53,6 +54,7 @@ _HOMES = {
     "explain": "frametool.calc.explain.api",
     "follow_steps": "frametool.sim.followed",
     "load": "frametool.formats.load",
+    "load_robot": "frametool.formats.robot",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
     "tutorial": "frametool.sim.scene",
@@ -73,6 +75,7 @@ __all__ = [
     "explain",
     "follow_steps",
     "load",
+    "load_robot",
     "simulate",
     "simulate_many",
     "tutorial",

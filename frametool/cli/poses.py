@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -165,6 +166,19 @@ def one_pose(argument: str | Source, given: Notation | None = None, *, degrees: 
     return poses[0]
 
 
+@contextmanager
+def misuse_unless_rotations(reading: Reading) -> Iterator[None]:
+    """Turn what cannot be read of arguments into misuse, but not what is no rotation; then warn of what was noted."""
+    try:
+        yield
+    except NotARotation:
+        raise
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+    for note in reading.notes:
+        warn(note.message)
+
+
 def pose_from_numbers(
     texts: Sequence[str],
     given: tuple[Notation, ...] | None,
@@ -181,7 +195,7 @@ def pose_from_numbers(
         return _pose_of_rows(texts, form, told=bool(given), normalize=normalize)
     size = len(form.representation.columns)
     reading = Reading(Source(INLINE, ""), degrees=degrees, normalize=normalize)
-    try:
+    with misuse_unless_rotations(reading):
         if (whole := form.representation.whole) and len(texts) == len(whole.columns):
             return Pose(*read_spelled(form, texts, INDICES, reading))
         if len(texts) not in (size, size + 3):
@@ -189,12 +203,6 @@ def pose_from_numbers(
             raise click.UsageError(f"{form.spec} has {expected}; found {len(texts)}")
         x, y, z = map(read_number, texts[:-size] or ("0", "0", "0"))
         rotation = rotation_of(form, texts[-size:], INDICES, reading)
-    except NotARotation:
-        raise
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
-    for note in reading.notes:
-        warn(note.message)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
@@ -204,15 +212,8 @@ def _pose_of_rows(texts: Sequence[str], form: Notation, *, told: bool, normalize
     from frametool.grammar.pose import read_pose
 
     reading = Reading(Source(INLINE, ""), normalize=normalize)
-    try:
-        pose = read_pose(matrix_pose([list(texts)], form, told=told) or {}, reading)
-    except NotARotation:
-        raise
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
-    for note in reading.notes:
-        warn(note.message)
-    return pose
+    with misuse_unless_rotations(reading):
+        return read_pose(matrix_pose([list(texts)], form, told=told) or {}, reading)
 
 
 def source_from_numbers(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Source:

@@ -67,7 +67,7 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
 def remember(notes: Iterable[Note], lines: Iterable[int], tally: Tally) -> None:
     """Keep what was odd, each with its line and behind the keys that lead to it."""
     for note, line in zip(notes, lines, strict=True):
-        tally.remark(line, f"{dotted(note.path)}: {note.message}" if note.path else note.message, note.rule)
+        tally.note_each(f"{dotted(note.path)}: {note.message}" if note.path else note.message, line, note.rule)
 
 
 def dotted(path: Path) -> str:

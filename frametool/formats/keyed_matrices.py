@@ -62,7 +62,7 @@ class Matrices:
 
     def edges(self) -> list[Edge]:
         """Return the edges that the poses make; raises Misfit where they contradict each other."""
-        return list(edges_of(self.poses, self.reading))
+        return edges_of(self.poses, self.reading)
 
     def about(self, edges: list[Edge]) -> str:
         """Say how many poses there are, and what was left out."""

@@ -10,16 +10,15 @@ from __future__ import annotations
 from math import degrees
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import LookupFailed, shown
+from frametool.errors import shown
 from frametool.formats.document_edges import dotted
-from frametool.frames.tree import FrameTree
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Misfit
 from frametool.grammar.rotation import AGREEMENT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
 
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path, Reading
@@ -31,6 +30,7 @@ class Stated(NamedTuple):
     """One pose as it is stated: target_from_source; in a tree `child` hangs under the other one.
 
     chained: it is about neighbours in a chain, and only a check where both are known otherwise
+    firm: what the child hung under before hangs under the child from now on, never the other way round
     """
 
     target: str
@@ -39,53 +39,77 @@ class Stated(NamedTuple):
     components: Rigid
     path: Path
     chained: bool = False
+    firm: bool = False
 
     @property
-    def edge(self) -> Edge:
-        """Return the edge, turned round if the child is its target."""
-        if self.child == self.source:
-            return Edge(self.target, self.source, self.components, path=self.path)
-        return Edge(self.source, self.target, rigid.inverse(*self.components), path=self.path)
+    def parent(self) -> str:
+        """Return the frame that is not the child."""
+        return self.target if self.child == self.source else self.source
 
 
-def edges_of(statements: Iterable[Stated], reading: Reading) -> Iterator[Edge]:
-    """Yield the edges, and check what is stated again against them.
+class _Forest:
+    """Edges by their child, so far."""
+
+    def __init__(self) -> None:
+        self.edges: dict[str, Edge] = {}
+
+    def hang(self, each: Stated) -> None:
+        """Add a pose that connects two trees."""
+        child, parent = each.child, each.parent
+        if child in self.edges and parent not in self.edges and not each.firm:
+            child, parent = parent, child
+        self._make_root(child)
+        pose = each.components if child == each.source else rigid.inverse(*each.components)
+        self.edges[child] = Edge(parent, child, pose, path=each.path)
+
+    def _make_root(self, frame: str) -> None:
+        """Turn the edges above a frame round, so that all of its tree hangs under it."""
+        way = []
+        while frame in self.edges:
+            way.append(self.edges.pop(frame))
+            frame = way[-1].parent or ""
+        for edge in way:
+            parent = edge.parent or ""
+            self.edges[parent] = Edge(edge.child, parent, rigid.inverse(*edge.components), path=edge.path)
+
+    def lookup(self, target: str, source: str) -> Rigid | None:
+        """Return target_from_source; None where the two are not connected."""
+        (root, root_from_target), (other, other_from_source) = map(self._above, (target, source))
+        return rigid.compose(*rigid.inverse(*root_from_target), *other_from_source) if root == other else None
+
+    def _above(self, frame: str) -> tuple[str, Rigid]:
+        """Return the root above a frame, and the pose of the frame in it."""
+        pose: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        while frame in self.edges:
+            edge = self.edges[frame]
+            pose, frame = rigid.compose(*edge.components, *pose), edge.parent or ""
+        return frame, pose
+
+
+def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
+    """Return the edges, and check what is stated again against them.
 
     Raises Misfit where a pose and its inverse contradict each other; other contradictions are noted.
     """
-    known = FrameTree()
+    forest = _Forest()
     first: dict[frozenset[str], Stated] = {}
-    order = sorted(statements, key=lambda each: (each.chained, each.child != each.source))
-    for each in order:
+    for each in sorted(statements, key=lambda each: (each.chained, each.child != each.source)):
         if each.target == each.source:
             raise Misfit(f"frame {shown(each.source)} is its own parent", each.path, key=True)
-        pair = frozenset((each.target, each.source))
-        if (stated := _lookup(known, each)) is not None:
-            _compare(stated, each, first.get(pair), reading)
-            continue
-        first[pair] = each
-        edge = each.edge
-        if known.parent(edge.child) is not None and edge.parent is not None and known.parent(edge.parent) is None:
-            edge = each._replace(child=edge.parent).edge
-        if known.parent(edge.child) is None and edge.parent is not None:
-            known.add_components(edge.parent, edge.child, edge.components)
-        yield edge
+        if (known := forest.lookup(each.target, each.source)) is None:
+            first[frozenset((each.target, each.source))] = each
+            forest.hang(each)
+        else:
+            _compare(known, each, first.get(frozenset((each.target, each.source))), reading)
+    return list(forest.edges.values())
 
 
-def _lookup(known: FrameTree, each: Stated) -> Rigid | None:
-    """Return target_from_source as the edges so far have it; None if they do not connect the two."""
-    try:
-        return known.lookup_components(each.target, each.source)
-    except LookupFailed:
-        return None
-
-
-def _compare(stated: Rigid, each: Stated, first: Stated | None, reading: Reading) -> None:
+def _compare(known: Rigid, each: Stated, first: Stated | None, reading: Reading) -> None:
     """Check a pose that is stated again."""
-    metres, radians = rigid.distance(*stated, *each.components, floats)
+    metres, radians = rigid.distance(*known, *each.components, floats)
     if metres <= AGREEMENT and radians <= AGREEMENT:
         return
-    other = f"{dotted(first.path)}" if first else "the other matrices"
+    other = f"{dotted(first.path)}" if first else "the others"
     message = f"differs from {other} by {metres * 1000.0:.6g} mm and {degrees(radians):.6g} degrees"
     if first and (metres > TOLERATED or radians > TOLERATED):
         raise Misfit(f"{dotted(each.path)} {message}; keep one", each.path, key=True)

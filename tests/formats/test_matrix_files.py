@@ -185,7 +185,7 @@ def test_a_chain_that_disagrees_is_told_with_millimetres_and_degrees(tmp_path: P
     chain = rigid(0)
     chain[:3, :3] = Peer.from_euler("z", 0.5, degrees=True).as_matrix()
     text = f"cam0:\n  T_cam_imu:\n{rows(np.eye(4))}cam1:\n  T_cam_imu:\n{rows(np.eye(4))}  T_cn_cnm1:\n{rows(chain)}"
-    with pytest.warns(UserWarning, match=r"a.yaml:14: cam1.T_cn_cnm1: differs from the other matrices by 308.058 mm and 0.5 degrees"):
+    with pytest.warns(UserWarning, match=r"a.yaml:14: cam1.T_cn_cnm1: differs from the others by 308.058 mm and 0.5 degrees"):
         tree = read(tmp_path, text)
     assert matrix(tree, "cam1", "imu") == pytest.approx(np.eye(4))
 

@@ -38,7 +38,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
 @pose_options
-@result_options("points")
+@result_options("points", "trajectory")
 @explain_options
 @click.option(
     "--frame-column",
@@ -87,7 +87,7 @@ def command(
     Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
     """
     stream, explaining = Stream(options), Explaining(options)
-    output = Output("points", deg=deg, **options)
+    output = Output("points", "trajectory", deg=deg, **options)
     plan = explaining.plan(output, stream) if explaining else None
     if pose is None:
         way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize), at)
@@ -181,11 +181,11 @@ def _way_by_tree(
     """
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
-    tree = load_tree(arguments[0], more, chosen_rules, streams=True)
-    target, rest = frame_name(arguments[1], tree), arguments[2:]
-    source = None
-    if rest and not _is_record(rest[0]):
-        source, rest = frame_name(rest[0], tree), rest[1:]
+    named = arguments[2:3] if len(arguments) > 2 and not _is_record(arguments[2]) else ()
+    rest = arguments[2 + len(named) :]
+    tree = load_tree(arguments[0], more, chosen_rules, streams=rest in ((), ("-",)))
+    target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
+    source = next(iter(sources), None)
 
     if not {target, source or target} <= set(tree.frames):
         tree.lookup(target, source or target)  # raises, and names the nearest frames

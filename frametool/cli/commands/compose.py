@@ -12,6 +12,7 @@ from frametool.cli.explaining import Explaining, all_given, explain_options
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, factors_of, one_pose
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 from frametool.grammar.result import Result
@@ -24,6 +25,7 @@ from frametool.grammar.result import Result
 @result_options("poses")
 @explain_options
 @stream_options
+@pose_reading_options
 def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 

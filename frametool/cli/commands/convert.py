@@ -14,6 +14,7 @@ from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
 from frametool.cli.poses import pose_from_numbers, pose_source, source_from_numbers, values_of
 from frametool.cli.streaming import Stream, one_notation, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
 from frametool.geometry.representations import REPRESENTATIONS, notation
@@ -65,8 +66,9 @@ class ConvertCommand(Command):
 @pose_options
 @result_options("poses")
 @explain_options
-@click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
+@click.option("--unwrap", is_flag=True, help="let the angles of a stream go on beyond half a turn")
 @stream_options
+@pose_reading_options
 def command(
     values: tuple[str, ...],
     given: tuple[Notation, ...] | None,

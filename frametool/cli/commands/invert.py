@@ -11,6 +11,7 @@ from frametool.cli.explaining import Explaining, explain_options, given
 from frametool.cli.output import Output
 from frametool.cli.poses import write_results
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 
 
 @click.command(cls=Command, name="invert")
@@ -20,6 +21,7 @@ from frametool.cli.streaming import Stream, stream_options
 @result_options("poses")
 @explain_options
 @stream_options
+@pose_reading_options
 def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.
 

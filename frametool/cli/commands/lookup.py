@@ -14,7 +14,7 @@ from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, Skipped, at_ns, read_times, rules, rules_options, times_option
 from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.grammar.edges import stop
-from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, why_missing
+from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,8 +53,8 @@ def command(
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
       frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, - for stdin, . for that in FRAMETOOL_TREE. Between samples positions go along the line, rotations
-    by slerp, edge by edge, as in tf2; nothing is extrapolated. --on-error skip leaves out times without data.
+    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp;
+    nothing is extrapolated. Trajectories (-f tum, kitti ..) hold all samples of the way without --times.
     """
     by_row, stream, explaining = RowFrames(options), Stream(options), Explaining(options)
     output = Output("poses", **options)
@@ -78,7 +78,9 @@ def command(
 
         found = derive_lookup(frames, target, source, plan, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
         return explaining.write(found, output)
-    if times is not None:
+    output.style.axes = frames.camera_axes.get(source, "")
+    every = output.is_trajectory and at is None and fixed is None and frames.latest(target, source) is not None
+    if times is not None or every:
         skip = stream.options["on_error"] == "skip"
         return _many(output, frames, target, source, times, skip=skip)
     if fixed is not None:
@@ -96,10 +98,10 @@ def _check(at: int | str | None, source_at: int | str | None, fixed: str | None,
         raise click.UsageError("--times says all the times; leave --at, --source-at and --fixed out")
 
 
-def _many(output: Output, frames: Frames, target: str, source: str, times: str, *, skip: bool) -> int:
-    """Print the results at many times; with `skip` those without data are left out and reported."""
+def _many(output: Output, frames: Frames, target: str, source: str, times: str | None, *, skip: bool) -> int:
+    """Print the results at many times, or at those of all samples; with `skip` the others are left out and reported."""
     skipped = Skipped(in_json=output.told == "json")
-    asked = read_times(times, skipped.add if skip else stop)
+    asked = sample_stamps(frames, target, source) if times is None else read_times(times, skipped.add if skip else stop)
 
     def miss(at_ns: int) -> None:
         skipped.add(None if skipped.is_full else why_missing(frames, target, source, at_ns))

@@ -11,6 +11,7 @@ from frametool.cli.explaining import Explaining, all_given, explain_options, one
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 )
 @explain_options
 @stream_options
+@pose_reading_options
 def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutive: bool, **options: Any) -> int:
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
