@@ -151,6 +151,9 @@ def result_lines(rows: Sequence[Row]) -> list[str]:
         line = head + "  ".join(cells) + unit
         if len(line) <= WIDTH:
             lines.append(line)
-        else:
+        elif any(name for name, _ in row.cells):
             lines += [(head if at == 0 else " " * len(head)) + cell + unit for at, cell in enumerate(cells)]
+        else:
+            filled = wrap("  ".join(cells), WIDTH - len(head), break_on_hyphens=False, break_long_words=False)
+            lines += [(head if at == 0 else " " * len(head)) + part for at, part in enumerate(filled)]
     return lines
