@@ -61,7 +61,7 @@ def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of cameras alone,
     cam0, cam1 .., gets T_cn_cnm1.
     """
-    edges = list(standing_edges(tree, NAME))
+    edges = standing_edges(tree, NAME)
     if len(tree.roots) != 1:
         raise ValueInvalid(f"{NAME} holds one tree of cameras; the roots here: {listing(tree.roots)}")
     precision = Precision(NAME, "matrices")

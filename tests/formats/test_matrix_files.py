@@ -336,6 +336,7 @@ def test_positions_are_written_to_the_same_bits_for_an_imu(run: Callable[..., An
 @pytest.mark.parametrize(
     ("tree", "form", "said"),
     [
+        *(("{frames: {alone: {}}}", form, f"{form} holds poses, and there is none: alone") for form in ("autoware", "camchain", "opencv", "handeye")),
         ("{frames: {a: {b: {xyz: [1, 0, 0]}}, c: {d: {xyz: [1, 0, 0]}}}}", "camchain", "camchain holds one tree of cameras; the roots here: a, c"),
         ("{frames: {a/x: {b: {xyz: [1, 0, 0]}}}}", "opencv", "opencv cannot name the pose of 'b' in 'a/x'"),
         ("{frames: {a_T_b: {c: {xyz: [1, 0, 0]}}}}", "opencv", "opencv cannot name the pose of 'c' in 'a_T_b'"),
