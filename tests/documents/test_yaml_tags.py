@@ -30,7 +30,7 @@ def test_other_tags_and_other_values_are_refused(text: str) -> None:
 
 
 def test_without_tags_named_every_tag_is_refused() -> None:
-    with pytest.raises(FormatError, match="^f:1:4: tag !Rpy is not read here$"):
+    with pytest.raises(FormatError, match=r"^f:1:4: tag !Rpy is not read here$"):
         parse_documents("a: !Rpy {deg: 1}\n", "f")
 
 
