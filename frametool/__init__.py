@@ -18,16 +18,19 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from frametool.calc.explain.api import explain as explain
     from frametool.calc.python_face import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.formats import FORMATS as FORMATS
     from frametool.formats.load import load as load
+    from frametool.formats.robot import load_robot as load_robot
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.tree import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
     from frametool.sim.controllers import FollowController as FollowController
+    from frametool.sim.followed import follow_steps as follow_steps
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
     from frametool.sim.sweep import simulate_many as simulate_many
@@ -48,7 +51,10 @@ _HOMES = {
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
     "diff": "frametool.lint.tree_diff",
+    "explain": "frametool.calc.explain.api",
+    "follow_steps": "frametool.sim.followed",
     "load": "frametool.formats.load",
+    "load_robot": "frametool.formats.robot",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
     "tutorial": "frametool.sim.scene",
@@ -66,7 +72,10 @@ __all__ = [
     "__version__",
     "calc",
     "diff",
+    "explain",
+    "follow_steps",
     "load",
+    "load_robot",
     "simulate",
     "simulate_many",
     "tutorial",

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
-# an argument that begins like this is a number; no short option begins so, but that -j is one where joints are
-NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+]| +(Translation|Rotation):)", re.IGNORECASE)
+# an argument that begins like this is a number, whatever short options there are
+NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation|Rotation):)", re.IGNORECASE)
+STREAMED = ("records", "rows")
 READ = readers("tree", "records", "rows", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file."
 
@@ -38,16 +39,29 @@ class Command(WithHelp):
     exit_codes = EXIT_CODES
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Shield negative numbers, then parse."""
+        """Shield negative numbers (-j is an option where joints are), give a bare --explain its form, then parse."""
         options = {name for each in self.get_params(ctx) for name in each.opts}
         shielded = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
-        return super().parse_args(ctx, shielded)
+        return super().parse_args(ctx, _with_form(shielded) if "--explain" in shielded else shielded)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """End every help with the exit codes."""
         super().format_epilog(ctx, formatter)
         formatter.write_paragraph()
         formatter.write_text(self.exit_codes)
+
+
+def _with_form(args: list[str]) -> list[str]:
+    """Join --explain with the form behind it, or with `text`: click would take any argument there for its value."""
+    joined: list[str] = []
+    for each in args:
+        if joined and joined[-1] == "--explain":
+            is_form = each in ("text", "markdown", "latex")
+            joined[-1] = f"--explain={each if is_form else 'text'}"
+            if is_form:
+                continue
+        joined.append(each)
+    return [f"{each}=text" if each == "--explain" else each for each in joined]
 
 
 class Text(click.ParamType[str]):
@@ -154,6 +168,7 @@ verbose_option = click.option(
 
 
 READING = "frametool.reading"  # where a command's context keeps the options about files of frames
+TREES_OPENED = "frametool.trees_opened"  # set in a command's context once it reads files of frames
 FORMS = "frametool.forms"  # where a command's context keeps those of --in
 
 
@@ -190,10 +205,18 @@ def _keep_forms(context: click.Context, _: click.Parameter, chosen: Sequence[str
     context.meta[FORMS] = chosen
 
 
-def forms_told() -> tuple[str, ...]:
-    """Return the forms that --in names."""
+def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
+    """Return the forms that --in names for files of frames, in their order, and the form of the stream.
+
+    streams: there is a stream; its form is the last one that can be streamed, "" if there is none
+    """
     context = click.get_current_context(silent=True)
-    return () if context is None else tuple(context.meta.get(FORMS, ()))
+    told = [] if context is None else list(context.meta.get(FORMS, ()))
+    streamed = [form for form in told if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
+    if not streamed:
+        return told, ""
+    last = len(told) - 1 - told[::-1].index(streamed[-1])
+    return told[:last] + told[last + 1 :], streamed[-1]
 
 
 in_option = click.option(
@@ -220,10 +243,10 @@ _PLACE = (
 )
 
 
-def result_options(what: str) -> Callable[[Function], Function]:
+def result_options(*what: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     form = click.option(
-        "-f", "--format", "format_name", type=click.Choice(("text", *writers(what))),
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers(*what))),
         help="form of the result",
     )  # fmt: skip
     return lambda function: decorated(function, (form, _PRECISION, *_PLACE))

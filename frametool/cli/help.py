@@ -52,7 +52,7 @@ HELP_OPTION = click.Option(
 
 # heading -> names of the parameters under it; all others stand first, they are what the command is about
 GROUPS = {
-    "Files": ("more", "input_forms", "topics", "quiet", "verbose"),
+    "Files": ("more", "with_a", "with_b", "input_forms", "topics", "quiet", "verbose"),
     "Time (help time)": ("at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2"),
     "Rotations (help rotations)": ("given", "notations", "deg", "keep_sign", "normalize"),
     "Rows (help streams)": (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -13,7 +14,7 @@ from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import inverse
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
-from frametool.grammar.rotation import read_spelled, rotation_of
+from frametool.grammar.rotation import read_spelled, rotation_of, spelled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -156,12 +157,26 @@ def combinations(
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 
 
-def one_pose(argument: str, given: Notation | None = None, *, degrees: bool, normalize: bool) -> Pose:
+def one_pose(argument: str | Source, given: Notation | None = None, *, degrees: bool, normalize: bool) -> Pose:
     """Read the one pose of an argument."""
     poses = poses_from(argument, given, degrees=degrees, normalize=normalize)
     if len(poses) != 1:
-        raise click.UsageError(f"one pose is wanted here, {argument} holds {len(poses)}")
+        name = argument if isinstance(argument, str) else argument.name
+        raise click.UsageError(f"one pose is wanted here, {name} holds {len(poses)}")
     return poses[0]
+
+
+@contextmanager
+def misuse_unless_rotations(reading: Reading) -> Iterator[None]:
+    """Turn what cannot be read of arguments into misuse, but not what is no rotation; then warn of what was noted."""
+    try:
+        yield
+    except NotARotation:
+        raise
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+    for note in reading.notes:
+        warn(note.message)
 
 
 def pose_from_numbers(
@@ -180,7 +195,7 @@ def pose_from_numbers(
         return _pose_of_rows(texts, form, told=bool(given), normalize=normalize)
     size = len(form.representation.columns)
     reading = Reading(Source(INLINE, ""), degrees=degrees, normalize=normalize)
-    try:
+    with misuse_unless_rotations(reading):
         if (whole := form.representation.whole) and len(texts) == len(whole.columns):
             return Pose(*read_spelled(form, texts, INDICES, reading))
         if len(texts) not in (size, size + 3):
@@ -188,12 +203,6 @@ def pose_from_numbers(
             raise click.UsageError(f"{form.spec} has {expected}; found {len(texts)}")
         x, y, z = map(read_number, texts[:-size] or ("0", "0", "0"))
         rotation = rotation_of(form, texts[-size:], INDICES, reading)
-    except NotARotation:
-        raise
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
-    for note in reading.notes:
-        warn(note.message)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
@@ -203,15 +212,23 @@ def _pose_of_rows(texts: Sequence[str], form: Notation, *, told: bool, normalize
     from frametool.grammar.pose import read_pose
 
     reading = Reading(Source(INLINE, ""), normalize=normalize)
-    try:
-        pose = read_pose(matrix_pose([list(texts)], form, told=told) or {}, reading)
-    except NotARotation:
-        raise
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
-    for note in reading.notes:
-        warn(note.message)
-    return pose
+    with misuse_unless_rotations(reading):
+        return read_pose(matrix_pose([list(texts)], form, told=told) or {}, reading)
+
+
+def source_from_numbers(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Source:
+    """Write bare numbers, read by `pose_from_numbers` before, as the mapping that says the same."""
+    from frametool.documents.json_writer import Verbatim, dump
+
+    form = _form_of(texts, given)
+    size = len(form.representation.columns)
+    whole = form.representation.whole
+    own = texts if whole and len(texts) == len(whole.columns) else texts[-size:]
+    unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
+    # the texts stand in the places of numbers, and are read as such
+    mapping = {"xyz": list(map(Verbatim, texts[: len(texts) - len(own)]))} if len(texts) > len(own) else {}
+    mapping[form.representation.name + unit] = spelled(form, list(map(Verbatim, own)))  # type: ignore[arg-type]
+    return Source(INLINE, dump(mapping))
 
 
 def _form_of(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Notation:

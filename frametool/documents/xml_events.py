@@ -7,6 +7,7 @@ are read too.
 from __future__ import annotations
 
 import re
+from functools import partial
 from math import inf, isfinite
 from typing import NamedTuple
 from xml.parsers import expat
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 DEEPEST_ELEMENT = 100_000
 _BLOCK = 1 << 16
+_OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s;]+;")
 _DECIMALS = "0123456789.-+eE \t\r\n"
 
 
@@ -100,6 +102,7 @@ class XmlFile:
         parser.StartElementHandler, parser.EndElementHandler = start, end
         if ends:
             parser.CharacterDataHandler = read_text
+        parser.StartDoctypeDeclHandler = partial(self._check_doctype, parser)
         parser.EntityDeclHandler = refuse
         parser.ExternalEntityRefHandler = refuse
         for begin in range(0, len(self.data) or 1, _BLOCK):
@@ -115,6 +118,12 @@ class XmlFile:
                 raise self._at(1, 1, f"not XML: {error}") from None
             yield from found
             found.clear()
+
+    def _check_doctype(self, parser: expat.XMLParserType, _: str, file: str | None, *_more: object) -> None:
+        """Refuse entities of another file, which expat would leave out in silence."""
+        if file and _OTHER_ENTITY.search(self.data.replace(b"\0", b"")):
+            message = f"XML with entities of {shown(file)} is not read; expand them: xmllint --noent --loaddtd FILE"
+            raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
 
     def _broken(self, error: expat.ExpatError) -> FormatError:
         """Say in one line what is no XML."""

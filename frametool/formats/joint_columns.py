@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _STAMP = re.compile(
     r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_(n?s))?(?:\s*[\[(]\s*(n?s)\s*[\])])?", re.IGNORECASE
 )
+_HOLDERS = ("joint", "joints", "position", "positions", "joint_positions")  # before a dot
 _UNIT = re.compile(rf"_({'|'.join((*ANGLES, *filter(None, LENGTHS)))})$")
 
 
@@ -69,6 +70,9 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
     """Part a column's name into a joint and a unit; a joint's own name is taken whole."""
     if name in joints:
         return name, ""
+    holder, dot, rest = name.partition(".")
+    if dot and holder in _HOLDERS:
+        return _with_unit(rest, joints)
     if match := BRACKETS.search(name):
         return name[: match.start()], match[1]
     if match := _UNIT.search(name):

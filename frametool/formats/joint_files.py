@@ -15,7 +15,6 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.chunks import lines
 from frametool.documents.input_file import InputFile
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, listing, shown, warn
@@ -24,9 +23,10 @@ from frametool.formats.detect import detect
 from frametool.formats.joint_columns import find_joint_columns, misspelt, no_joints, stamp_column
 from frametool.formats.joints import JointValue
 from frametool.frames.stamps import parse_stamp
+from frametool.grammar.edges import Tally
 from frametool.grammar.readers import Misfit, as_mapping, kind
 from frametool.ros import joint_state, messages
-from frametool.ros.message_stream import Message, read_messages
+from frametool.ros.message_stream import Message, line_texts, read_messages
 from frametool.text.csv_line import split_line
 from frametool.text.numbers import parse_number
 
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from frametool.formats.joints import Joint
-    from frametool.grammar.edges import Tally
     from frametool.grammar.readers import Path
 
 TIMES = ("stamp", "stamp_ns", "time", "t")
@@ -54,18 +53,26 @@ class Setting(NamedTuple):
 class JointFile:
     """One file of joint values, and the joints of the robot that it may speak of."""
 
-    def __init__(self, path: str, joints: Mapping[str, Joint], tally: Tally) -> None:
+    def __init__(self, path: str, joints: Mapping[str, Joint]) -> None:
         """Open it: a file, or FILE:STATE for a state that it has a name for; raises FileProblem."""
         self.path, self.state = _parted(path)
         self.joints = joints
-        self.tally = tally
+        self.tally = Tally()
         self.file = InputFile(self.path)
 
     def settings(self) -> Iterator[Setting]:
-        """Yield what it says, in order.
+        """Yield what it says, in order, and close it.
 
         Raises FormatError.
         """
+        try:
+            yield from self._settings()
+        finally:
+            self.file.close()
+        for told in self.tally.told():
+            warn(f"{self.file.name}:{told.line}: {told.message}")
+
+    def _settings(self) -> Iterator[Setting]:
         head = self.file.head()
         name = self.file.name
         form = detect(head, "joints", "records", "rows", name=self.path, otherwise="yaml")[0]
@@ -133,7 +140,7 @@ class JointFile:
             for message in read_messages(self.file.stream, name, "csv1", self.tally):
                 yield from self._message(message, self._numbered)
         elif joint_state.looks_like_row(first):
-            for line, text in self._lines():
+            for line, text in line_texts(self.file.stream, name, self.tally):
                 yield from self._message(Message(text, Source(name, text), line, cells=True), self._row)
         else:
             yield from self._columns(form)
@@ -144,13 +151,6 @@ class JointFile:
     def _row(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
         return self._state(joint_state.of_row(joint_state.unquoted(value)), path, message)
 
-    def _lines(self) -> Iterator[tuple[int, str]]:
-        """Yield the lines that are not blank, with their numbers."""
-        for piece in lines(self.file.stream, self.file.name):
-            for number, line in enumerate(piece.text.split("\n"), piece.line):
-                if line.strip():
-                    yield number, line.strip("\r\ufeff")
-
     def _cells(self, form: str, line: str) -> list[str]:
         if form == "csv":
             return [cell.text for cell in split_line(line)]
@@ -158,9 +158,9 @@ class JointFile:
 
     def _columns(self, form: str) -> Iterator[Setting]:
         """Yield the settings of a table whose header names joints."""
-        rows = self._lines()
+        rows = line_texts(self.file.stream, self.file.name, self.tally)
         number, header = next(rows, (1, ""))
-        names = self._cells(form, header)
+        names = self._cells(form, header.strip("\r\ufeff"))
         try:
             columns = find_joint_columns(names, self.joints)
             if problem := misspelt(names, self.joints) if columns else no_joints(names, self.joints):
@@ -175,7 +175,7 @@ class JointFile:
         for number, line in rows:
             if line.lstrip().startswith("#"):
                 continue
-            cells = self._cells(form, line)
+            cells = self._cells(form, line.rstrip("\r"))
             refuse = partial(_refused_row, self.file.name, number)
             if len(cells) != len(names):
                 raise refuse(f"expected {len(names)} cells, found {len(cells)}", ())

@@ -12,7 +12,7 @@ from frametool.errors import FormatError, ValueInvalid, alternatives
 from frametool.formats import readers
 from frametool.formats.assembly import Assembly, Rules
 from frametool.formats.recordings import Recording, close_all, opened_together, refuse_unknown_joints
-from frametool.grammar.edges import Answers
+from frametool.grammar.edges import Answers, Samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -40,6 +40,17 @@ class EdgePlace(NamedTuple):
         line = locate(self.file.text, self.edge.path)[0] if self.edge.path else self.edge.line
         same = isinstance(other, EdgePlace) and other.file.name == self.file.name
         return f"line {line}" if same else f"{self.file.name}:{line}"
+
+
+class SamplesOfFile(NamedTuple):
+    """Poses of one frame, and the file they were read from."""
+
+    file: Recording
+    samples: Samples
+
+    def place(self, at: int) -> EdgePlace:
+        """Return where one of them was read."""
+        return EdgePlace(self.file, self.samples.edge(at))
 
 
 def load(
@@ -110,12 +121,15 @@ def lines_of(places: Sequence[Place]) -> list[tuple[str, int]]:
 
 
 def _add(assembly: Assembly, file: Recording) -> None:
-    edge = None
+    piece = None
     rules = assembly.rules
-    for edge in file.edges(raw=rules.policy != "frametool", normalize=rules.normalize):
-        if edge.parent is None:
-            assembly.add_root(edge.child)
+    for piece in file.pieces(raw=rules.policy != "frametool", normalize=rules.normalize):
+        if isinstance(piece, Samples):
+            assembly.add_samples(SamplesOfFile(file, piece))
+        elif piece.parent is None:
+            assembly.add_root(piece.child)
         else:
-            assembly.add(edge.parent, edge.child, edge.components, edge.stamp_ns, EdgePlace(file, edge))
-    if edge is None:
+            assembly.add(piece.parent, piece.child, piece.components, piece.stamp_ns, EdgePlace(file, piece))
+    if piece is None:
         raise FormatError("no frames in it", source=file.name)
+    assembly.axes |= file.tally.axes

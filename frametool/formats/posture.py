@@ -33,7 +33,11 @@ STATES = "--joint NAME=VALUE"
 
 
 class Posture:
-    """The values of all joints of a robot: one each, or samples over time."""
+    """The values of all joints of a robot: one each, or samples over time.
+
+    still, moving: values by name, or by name and stamp
+    given: names of the joints told of; the others follow them, or are at rest
+    """
 
     def __init__(self, joints: Iterable[Joint], options: Options, fail: Fail, *, fixed: Collection[str] = ()) -> None:
         """Take what options and files say.
@@ -53,6 +57,8 @@ class Posture:
         self._take_files()
         self._take_options()
         self._tell_limits()
+        self.given = frozenset((*self.still, *self.moving))
+        self.told = set(self.given)
         self._follow(fail)
         options.tally.has_joints = True
         options.tally.about = options.tally.about or self._about()
@@ -102,7 +108,7 @@ class Posture:
         for path in self._options.answers.joint_files:
             found: dict[str, list[tuple[int | None, Value]]] = {}
             setting = None
-            for setting in JointFile(path, self.joints, self._options.tally).settings():
+            for setting in JointFile(path, self.joints).settings():
                 if setting.joint in self.joints:
                     found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting)))
                 else:
@@ -152,7 +158,6 @@ class Posture:
 
     def _follow(self, fail: Fail) -> None:
         """Give each joint that nobody told of its leader's value, along chains of any length, or that at rest."""
-        self.told = {*self.still, *self.moving}
         for name in self.joints:
             chain = {name: None}
             last = name
@@ -175,6 +180,9 @@ class Posture:
             return None
         if mimic.joint not in self.joints:
             raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is no joint")
+        if self.joints[mimic.joint].posed:
+            kind = self.joints[mimic.joint].kind
+            raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {kind}")
         return mimic.joint
 
     def _settle(self, joint: Joint) -> None:

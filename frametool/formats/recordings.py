@@ -11,7 +11,7 @@ from frametool.documents.input_file import InputFile
 from frametool.errors import BadAnswer, FileProblem, FormatError, warn
 from frametool.formats import BAG, FORMATS
 from frametool.formats.detect import detect, of_folder
-from frametool.grammar.edges import Answers, Edge, Options, Tally, Topics, stop
+from frametool.grammar.edges import Answers, Edge, Options, Samples, Tally, Topics, stop
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -44,7 +44,9 @@ class Recording(InputFile):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
         try:
-            self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
+            self.form, self.known_by = form or folder or "", "what it holds" if folder else ""
+            if not self.form:
+                self.form, self.known_by = detect(self.head(), "tree", name=self.path, empty="yaml")
         except BaseException:
             self.close()
             raise
@@ -70,15 +72,31 @@ class Recording(InputFile):
         return f"{self.name}: {FORMATS[self.form].summary}"
 
     @property
+    def known(self) -> str:
+        """Say what the file was taken for, and by what it was known, unless that was told."""
+        return f"{self.described}{f', known by {self.known_by}' if self.known_by else ''}"
+
+    @property
     def stated(self) -> str:
         """Say what a file that was read means, if its form is not one of ours: directions, units, what was assumed."""
-        states = FORMATS[self.form].states
-        return f"{self.described}{', ' if self.tally.about else ''}{self.tally.about}; {states}" if states else ""
+        states, about = FORMATS[self.form].states, self.tally.about
+        said = f"{self.described}{', ' if about else ''}{about}" if states or about else ""
+        return f"{said}; {states}" if states else said
 
     def edges(
         self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
     ) -> Iterator[Edge]:
-        """Yield the edges in the order they were written, then warn of what was odd.
+        """Yield the edges in the order they were written, then warn of what was odd; otherwise as `pieces`."""
+        for piece in self.pieces(report, tell=tell, raw=raw, normalize=normalize):
+            if isinstance(piece, Samples):
+                yield from piece.edges()
+            else:
+                yield piece
+
+    def pieces(
+        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
+    ) -> Iterator[Edge | Samples]:
+        """Yield edges, and the poses of one frame that come in bulk as one piece, in the order they were written.
 
         report: takes the errors, and reading goes on behind them where it can; without it the first one is raised.
         tell: without it what was odd is only kept, in `tally`.  raw: messages as tf2 receives them, unchecked.
@@ -92,7 +110,12 @@ class Recording(InputFile):
             self.close()
         if missing := self.topics.missing():
             report(FormatError(missing, source=self.name))
-        for told in self.tally.told() if tell else ():
+        if tell:
+            self.tell()
+
+    def tell(self) -> None:
+        """Warn of what was odd in the file, once it was read."""
+        for told in self.tally.told():
             warn(f"{self.name}:{told.line}: {told.message}")
 
     def _scoped(self, edges: Iterable[Edge]) -> Iterator[Edge]:

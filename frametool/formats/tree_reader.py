@@ -88,8 +88,21 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
     else:
         raise Misfit(
             f"no frame tree: expected frames:, transforms: or an entry with name: and parent:; "
-            f"found the keys {', '.join(map(repr, list(value)[:8]))}",
+            f"found the keys {shown_keys(value)}",
         )
+
+
+def shown_keys(value: dict[str, Any]) -> str:
+    """Name the first keys of a mapping in quotes, within some sixty characters."""
+    named = ""
+    for key in value:
+        if len(more := f"{named}{', ' * bool(named)}{shown(key)}") > MOST_SHOWN and named:
+            return f"{named} .."
+        named = more
+    return named
+
+
+MOST_SHOWN = 70  # characters of the keys found
 
 
 def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:

@@ -48,10 +48,12 @@ def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
 def _joint(parent: str, child: str, components: Rigid, style: Style) -> str:
     """Write one edge."""
     pose = Pose.of(components)
+    exact = tuple(rotation_numbers(pose, notation("xyzw"), style))
     angles = rotation_numbers(pose, notation("rpy_rad"), style)
-    origin = f'xyz="{_numbers(components[:3], style)}" rpy="{_numbers(angles, style)}"'
-    exact = rotation_numbers(pose, notation("xyzw"), style)
-    if style.precision is None and tuple(exact) != _from_rpy(angles):
+    short = [float(f"{angle:.15g}") for angle in angles]  # as people write them
+    said = next((each for each in (short, angles) if _from_rpy(each) == exact), None)
+    origin = f'xyz="{_numbers(components[:3], style)}" rpy="{_numbers(said or angles, style)}"'
+    if said is None and style.precision is None:
         origin += f' quat_xyzw="{_numbers(exact, style)}"'
     return (
         f'  <joint name="{_attribute(child)}_joint" type="fixed">\n    <origin {origin}/>\n'
@@ -60,7 +62,7 @@ def _joint(parent: str, child: str, components: Rigid, style: Style) -> str:
 
 
 def _from_rpy(angles: Sequence[float]) -> tuple[float, ...]:
-    """Return the quaternion that readers make of the angles."""
+    """Return the quaternion that `frametool.formats.urdf` makes of the angles."""
     roll, pitch, yaw = angles
     return quaternion.canonical(*euler.to_quaternion(roll, pitch, yaw, "sxyz", floats), floats)
 

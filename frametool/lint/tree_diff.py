@@ -337,11 +337,8 @@ def _covered(track: MovingTrack) -> str:
 
 
 def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
-    """Say at which times the two are compared, if anything moves."""
-    if not (a.moves or b.moves):
-        return
-    if at_ns is not None:
-        yield f"what moves is compared at {format_stamp(at_ns)}"
+    """Say at which times the two are compared, if anything moves and no time was told."""
+    if at_ns is not None or not (a.moves or b.moves):
         return
     told = " and ".join(f"{name} {format_stamp(_newest(tree))}" for name, tree in (("A", a), ("B", b)) if tree.moves)
     yield f"what moves is compared at its latest ({told}), and sample by sample; --at TIME compares at one time"

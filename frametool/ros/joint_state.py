@@ -54,6 +54,15 @@ def positions(value: dict[str, Any]) -> Iterator[tuple[str, Any, Path]]:
         yield name, position, ("position", index)
 
 
+def position_of(joint: str, value: Any) -> Path | None:
+    """Return the path to the position of a joint below a JointState; None for what is none, or has no such joint."""
+    if type(value) is not dict or type(value.get("name")) is not list or joint not in value["name"]:
+        return None
+    index = value["name"].index(joint)
+    listed = value.get("position")
+    return ("position", index) if type(listed) is list and index < len(listed) else None
+
+
 def of_numbered(message: dict[str, Any]) -> dict[str, Any]:
     """Return the JointState of a row of `rostopic echo -p`, which numbers the entries of lists."""
     lists: dict[str, list[Any]] = {"name": [], "position": []}

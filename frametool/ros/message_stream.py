@@ -18,7 +18,7 @@ from frametool.ros import topic_csv
 from frametool.ros.noise import NOISE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from typing import BinaryIO
 
     from frametool.grammar.edges import Tally
@@ -117,14 +117,12 @@ def line_messages(text: str, line: int, name: str, tally: Tally) -> Iterator[Mes
         yield Message(value, source, line, index)
 
 
-def _by_line(
-    stream: BinaryIO, name: str, tally: Tally, read: Callable[[str, int], Iterator[Message | FormatError]],
-) -> Iterator[Message | FormatError]:
-    """Read what stands on each line that is neither blank nor noise."""
+def line_texts(stream: BinaryIO, name: str, tally: Tally) -> Iterator[tuple[int, str]]:
+    """Yield the lines that are neither blank nor noise, with their numbers."""
     for piece in lines(stream, name):
         for number, line in enumerate(piece.text.split("\n"), piece.line):
             if _is_data(line, number, tally):
-                yield from read(line, number)
+                yield number, line
 
 
 def _is_data(line: str, number: int, tally: Tally) -> bool:
@@ -138,19 +136,15 @@ def _is_data(line: str, number: int, tally: Tally) -> bool:
 def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:
     """Read rows; a line that begins with `%time` is the header of those below it."""
     header: list[str] = []
-
-    def read(line: str, number: int) -> Iterator[Message | FormatError]:
-        nonlocal header
+    for number, line in line_texts(stream, name, tally):
         cells = line.split(",")
         if cells[0] == "%time":
             header = cells
-            return
+            continue
         try:
             value = topic_csv.message1(cells, header) if form == "csv1" else topic_csv.message2(cells)
         except Misfit as misfit:
             yield FormatError(str(misfit), source=name, line=number)
-            return
+            continue
         received = int(cells[0]) if form == "csv1" and cells[0].isdecimal() else None
         yield Message(value, Source(name, line), number, cells=True, received_ns=received)
-
-    yield from _by_line(stream, name, tally, read)

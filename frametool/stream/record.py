@@ -17,6 +17,7 @@ from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
+from frametool.ros import joint_state
 from frametool.ros.message_parts import read_stamp, whole_list
 from frametool.stream.row_layout import COVARIANCE, POINT, POSE, TWIST, VECTOR, WRENCH, Shape
 from frametool.stream.stamp_source import key_path
@@ -84,8 +85,9 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
     """
     formula = request.operation.formula
     try:
-        found = list(_search(document, (), ()))
-        if not found and type(document) is dict and NOTHING_BUT.issuperset(document) and not request.operation.moves:
+        found = list(_search(document, (), ())) if request.poses else []
+        is_bare = request.poses and not request.operation.moves
+        if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
             reading.here = path
             reading.note("neither position nor rotation: taken as the identity", rule="identity")
             found = [((), ())]
@@ -223,8 +225,8 @@ def _record(
     try:
         if type(value) is list:
             return _bare_list(value, here, reading, request)
-        record = _mapping(value, here, reading, request)
-        if request.operation.formula is not None:
+        record = _mapping(value, here, reading, request) if request.poses else _only_asked(value, here, request)
+        if request.poses and request.operation.formula is not None:
             record = _for_formula(record, value, request.operation.formula)
     except Misfit as misfit:
         raise misfit.below(*here) from None
@@ -233,9 +235,27 @@ def _record(
         record = _with_asked(record, document, path, above, request)
         if request.operation.only_adds:
             _refuse_repeated(record, document, path, request)
-        return _with_names(record, document, path, outer, above, request)
+        return _with_names(record, document, path, outer, above, request) if request.poses else record
     except Misfit as misfit:
         raise misfit.below(*above) from None
+
+
+def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
+    """Return a record of which only what is asked for counts; what a result adds must not be there.
+
+    A JointState gives way to the pose, and the frame in its header becomes that of the pose.
+    """
+    if joint_state.is_joint_state(value):
+        members = tuple(key for key in joint_state.LISTS if key in value)
+        header, parent = value.get("header"), Name()
+        stamp: tuple[Path, ...] = ()
+        if type(header) is dict:
+            parent = _named(header, ("frame_id",), (*path, "header"), parent, request)
+            stamp = _stamp_paths(header["stamp"], ("header", "stamp"), path) if "stamp" in header else ()
+        return Record(path, Shape("", None), members=members, parent=parent, stamp=stamp)
+    if there := next((key for key in value if key in (*POSITION_KEYS, *ROTATION_KEYS)), None):
+        raise Misfit(f"key {shown(there)} is there already, where the result would stand", (there,), key=True)
+    return Record(path, Shape("", None))
 
 
 def _for_formula(record: Record, value: dict[str, Any], formula: Formula) -> Record:

@@ -238,6 +238,8 @@ class Splicer:
         if self.request.rename is None:
             return
         record = self.record
+        if not self.request.poses and {"name", "parent"} & self.node.value.keys() - {*record.members}:
+            return  # in a row that was no pose they say something else
         parent, name = self.request.rename(record.parent.text, record.name.text)
         if self._has_swapped(name, parent):
             return

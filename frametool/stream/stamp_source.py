@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.frames.stamps import BILLION, parse_stamp
 from frametool.grammar.readers import Misfit, kind
+from frametool.ros import joint_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -79,16 +80,22 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
         bare += "ns"
     stamp_ns = parse_stamp(bare)
     if abs(stamp_ns) > LARGEST:
-        raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds")
+        remedy = "; are these some? then call them stamp_ns"
+        raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds{remedy}")
     return stamp_ns
 
 
 def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 12.5") -> Path:
-    """Find a scalar of a point or pose, its stamp: its own key, else that of a mapping around it; raises Misfit."""
+    """Find a scalar of a point or pose, its stamp: its own key, else that of a mapping around it; raises Misfit.
+
+    The name of a joint leads to its position in a JointState.
+    """
     around = [document]
     for step in holder:
         around.append(around[-1][step])
     for depth in range(len(holder), -1, -1):
+        if (position := joint_state.position_of(name, around[depth])) is not None:
+            return (*holder[:depth], *position)
         for keys in ((name,), tuple(name.split("."))):
             if (found := _below(around[depth], keys)) is not None:
                 if type(found[0]) in (dict, list):

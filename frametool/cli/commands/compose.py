@@ -8,9 +8,11 @@ from typing import Any
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, all_given, explain_options
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, factors_of, one_pose
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 from frametool.grammar.result import Result
@@ -21,7 +23,9 @@ from frametool.grammar.result import Result
 @rotation_options
 @pose_options
 @result_options("poses")
+@explain_options
 @stream_options
+@pose_reading_options
 def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 
@@ -34,10 +38,17 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch. The
     inverse of any of them is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
-    stream = Stream(options)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
     factors = factors_of(poses)
     given = [each.argument for each in factors]
+    if explaining:
+        plan = explaining.plan(output, stream)
+        from frametool.calc.explain.derive import derive_compose
+
+        written = all_given(given, stream.given, degrees=deg, normalize=normalize)
+        turned = [each.turned() if factor.is_inverse else each for each, factor in zip(written, factors, strict=True)]
+        return explaining.write(derive_compose(turned, plan), output)
     if "-" not in given:
         if stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
+from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options, one_argument
+from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
-from frametool.cli.poses import pose_from_numbers, values_of
+from frametool.cli.poses import pose_from_numbers, pose_source, source_from_numbers, values_of
 from frametool.cli.streaming import Stream, one_notation, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
 from frametool.geometry.representations import REPRESENTATIONS, notation
@@ -22,6 +25,7 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.documents.source import Source
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Quaternion
@@ -61,8 +65,10 @@ class ConvertCommand(Command):
 @rotation_options
 @pose_options
 @result_options("poses")
+@explain_options
 @click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
 @stream_options
+@pose_reading_options
 def command(
     values: tuple[str, ...],
     given: tuple[Notation, ...] | None,
@@ -83,14 +89,18 @@ def command(
       frametool convert --axes optical --to rpy_deg
       frametool convert --from rpy_deg 10 20 30 --to euler:all
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
+      frametool convert --from rpy_deg 10 20 30 --to matrix --explain
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
     poses; without any argument standard input is read.
     """
     values = rejoined(values)
-    stream = Stream(options)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
+    if explaining:
+        explaining.plan(output, stream)
+        one_argument(values[0] if values else axes)
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
@@ -106,21 +116,35 @@ def command(
     )
     is_numbers = _are_numbers(values, told=bool(given))
     if len(values) == 1 and not (is_numbers or stream.path) and _is_table(values[0], stream):
+        if explaining:
+            raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
         values = ()
-    if stream.path or values == ("-",) or not (values or (turn and not stream.has_input())):
+    if stream.path or values == ("-",) or not (values or (turn and (explaining or not stream.has_input()))):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
         return stream.run(request, output)
+    sources: list[Source] = []
     if not values:
+        sources = [source_from_numbers(list(map(repr, turn[0][3:])), (notation("xyzw"),))] if explaining else []
         results: list[Any] = [Result(Pose.of((0.0, 0.0, 0.0, *turn[0][3:]))._replace(position=None))]
     elif is_numbers:
         pose = pose_from_numbers(values, given, degrees=deg, normalize=normalize)
+        sources = [source_from_numbers(values, given)] if explaining else []
         results = [Result(_turned(pose, turn))]
     else:
-        results = list(values_of(values, request, output))
+        sources = [pose_source(each, request.given, normalize=normalize) for each in values] if explaining else []
+        results = list(values_of(sources or values, request, output))
     poses = [each.pose for each in results if isinstance(each, Result)]
     if find is not None:
         output.use(_found(poses, find, tolerance, degrees=deg))
+    if explaining:
+        if len(poses) != 1:
+            raise click.UsageError(f"--explain derives one pose, found {len(results)}")
+        from frametool.calc.explain.derive import derive_convert
+
+        written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
+        change = (axes or "", turn[0][3:]) if turn and values else None
+        return explaining.write(derive_convert(written, explaining.plan(output), own=poses[0], turn=change), output)
     output.values(results)
     output.tell_of_lock(poses)
     return 0

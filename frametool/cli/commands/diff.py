@@ -31,7 +31,7 @@ DIFFERENT, TROUBLE = 1, 2
 class DiffCommand(Command):
     """A command with the exit codes of diff(1)."""
 
-    exit_codes = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too, 130 interrupted."
+    exit_codes = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
 
 
 class ToleranceOption(Text):

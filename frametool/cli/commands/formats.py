@@ -25,7 +25,7 @@ def command(name: str | None, **options: Any) -> None:
 
     The names are those of --in and of -f. `asks for` names the option that says what the form leaves open. A form is
     known by its content first, then by the suffix of the file; --in NAME decides otherwise. With NAME all is said of
-    one form, with an example where there is one.
+    one form, with an example where there is one. `frametool help formats` is about the options that files need.
     """
     output = Output("report", **options, otherwise="text")
     entries = list(map(form_entry, FORMATS if name is None else [name]))

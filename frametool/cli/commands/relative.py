@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, all_given, explain_options, one_argument
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
 
@@ -26,7 +28,9 @@ if TYPE_CHECKING:
 @click.option(
     "--consecutive", is_flag=True, help="of a stream, each row seen from the row before; the first is the identity"
 )
+@explain_options
 @stream_options
+@pose_reading_options
 def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutive: bool, **options: Any) -> int:
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
@@ -37,8 +41,17 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
     A and B are poses in one frame: mappings, files, or - for standard input. distance in metres; angle in radians,
     angle_deg in degrees.
     """
-    stream = Stream(options)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
+    if explaining:
+        plan = explaining.plan(output, stream)
+        if consecutive:
+            raise click.UsageError("--consecutive is about the rows of a stream; leave it or --explain out")
+        from frametool.calc.explain.derive import derive_relative
+
+        arguments = [str(one_argument(each)) for each in (a, b)]
+        first, second = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
+        return explaining.write(derive_relative(first, second, plan), output)
     from frametool.stream.request import Request
 
     given = [each for each in (a, b) if each is not None]

@@ -1,0 +1,66 @@
+"""`frametool fk`: forward kinematics, rows of joint values to rows of poses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from frametool.cli.command import FILE, STREAMED, Command, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.streaming import RECORDS, Stream, stream_options
+from frametool.cli.trees import FRAME, frame_name, opened, reading_options, state
+from frametool.formats.detect import detect
+from frametool.formats.robot import robot_of
+from frametool.stream.faults import ROWS_SKIPPED
+from frametool.stream.joint_rows import JointRows, echoed, names_in
+from frametool.stream.operation import Operation
+from frametool.stream.request import Request
+
+
+@click.command(cls=Command, name="fk")
+@click.argument("tree", type=FILE, metavar="URDF")
+@click.argument("base", type=FRAME, metavar="BASE")
+@click.argument("tip", type=FRAME, metavar="TIP")
+@reading_options(streams=True)
+@pose_options
+@rotation_options
+@result_options("poses")
+@stream_options
+def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **options: Any) -> int:
+    """Add the pose of TIP in BASE to rows of joint values.
+
+    \b
+      frametool fk arm.urdf base tool -i joints.csv
+      frametool fk arm.urdf base tool -i joints.csv -j gripper=2cm --to rpy_deg
+      ros2 topic echo /joint_states | frametool fk arm.urdf base tool -f csv
+
+    Rows are a table with a column for each joint, JSON lines or YAML documents with a key for each, or JointState
+    messages. Columns are called as the joints: radians and metres, or elbow_deg, elbow [deg], finger_mm. All other
+    columns pass.  A joint on the way that has no column needs --joint or --joints; one that mimics another follows
+    it. For one posture there is `frametool lookup URDF BASE TIP -j elbow=30deg`.
+    """
+    stream = Stream(options)
+    output = Output("poses", deg=deg, **options)
+    if stream.options["columns"] or stream.given:
+        raise click.UsageError("columns of joints are found by their names; leave --columns and --from out")
+    (file,) = opened((tree,), streams=True)
+    robot, posture = robot_of(file)
+    rows = JointRows(robot, posture, frame_name(base, robot), frame_name(tip, robot))
+    name = stream.path or "stdin"
+    begin = stream.opened().peek()
+    form = stream.told_form() or detect(begin, *STREAMED, name=stream.path or "")[0]
+    names = names_in(begin, form, name, header=stream.options["header"])
+    rows.bind(names, name, fixed=frozenset(file.answers.joints))
+    file.tally.about = f"{len(rows.columns)} of {len(robot.joints)} joints from the rows"
+    state([file])
+    echo_form = "" if form in RECORDS else echoed(begin)
+    if not echo_form:
+        operation = Operation(moves=True, formula=rows)
+        return stream.run(Request(operation, poses=0, degrees=deg, normalize=normalize), output)
+    from frametool.stream.joint_messages import joint_poses
+
+    bad = stream.policy(name)
+    with stream.opened() as source:
+        output.poses_as_they_come(joint_poses(source, rows, bad, numbered=echo_form == "csv1"))
+    return ROWS_SKIPPED if bad.count else 0

@@ -1,0 +1,188 @@
+"""Forward kinematics over rows: values of joints in columns or under keys, a pose beside them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.document import parse_documents
+from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
+from frametool.formats import FORMATS
+from frametool.formats.joint_columns import find_joint_columns
+from frametool.formats.joints import TURNING, JointValue
+from frametool.grammar.readers import Misfit
+from frametool.ros import joint_state, messages
+from frametool.stream.faults import Misused
+from frametool.stream.row_layout import POSE
+from frametool.stream.splitter import Splitter
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.formats.joints import Joint
+    from frametool.formats.posture import Posture
+    from frametool.formats.robot import Robot
+    from frametool.geometry.types import Components, Namespace, Number
+
+SLACK = 1e-9  # by which a value may lie beyond a limit
+
+
+class JointRows:
+    """The pose of a robot's frame for each row: a `Formula` of streams.
+
+    base, tip: the pose is that of tip in base
+    """
+
+    reads_row = False
+    needs_time = False
+    adds = False
+
+    def __init__(self, robot: Robot, posture: Posture, base: str, tip: str) -> None:
+        """Find the way; the joints that the posture was told of need no column.
+
+        Raises UnknownFrame, NotConnected; BadAnswer for joints that were told to move over time.
+        """
+        self.chain = robot.chain(base, tip)
+        self.joints = robot.joints
+        self.base = base
+        self.tip = tip
+        if posture.moving:
+            raise BadAnswer(f"--joints: {listing(posture.moving)} moves over time; stream that file with -i")
+        self.constants = {name: posture.still[name] for name in posture.given}
+        self.columns: tuple[str, ...] = ()
+        self._read: tuple[tuple[str, bool, float], ...] = ()
+        self._beyond: set[str] = set()
+
+    def bind(self, names: Sequence[str], source: str, *, fixed: frozenset[str] = frozenset()) -> None:
+        """Choose the columns of the joints on the way.
+
+        fixed: the joints that nothing but `constants` may tell.
+        Raises Misused for a joint that has none or several, FormatError for a unit it cannot have.
+        """
+        try:
+            found = find_joint_columns(names, self.joints)
+        except ValueInvalid as error:
+            raise FormatError(str(error), source=source, line=1) from None
+        columns = [column for column in found if self.chain.uses(column.joint)]
+        told = {**self.constants, **{column.joint: None for column in columns}}
+        if twice := next((column for column in columns if column.joint in fixed), None):
+            problem = f"joint {shown(twice.joint)} has a column, {shown(names[twice.place])}, and a value by --joint"
+            raise Misused(f"{problem}; keep one", source=source)
+        if missing := self.chain.missing(told):
+            others = [name for place, name in enumerate(names) if place not in {column.place for column in found}]
+            raise Misused(_about_missing(missing, names, others), source=source, line=1)
+        self.columns = tuple(names[column.place] for column in columns)
+        self._read = tuple((column.joint, column.degrees, column.per_metre) for column in columns)
+
+    def kind(self, row: str) -> str:  # noqa: ARG002 - whatever a row is
+        """Return that rows get a pose."""
+        return POSE
+
+    def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002
+        """Name no further numbers."""
+        return ()
+
+    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
+        """Return the frames of the pose."""
+        return self.base, self.tip
+
+    def result(
+        self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace  # noqa: ARG002
+    ) -> Components:
+        """Return the pose for the cells of a block, or of one row."""
+        values = dict(self.constants)
+        for (joint, degrees, per_metre), cell in zip(self._read, cells, strict=True):
+            values[joint] = JointValue(cell / per_metre if per_metre != 1.0 else cell, degrees)
+            self._look_at_limits(self.joints[joint], values[joint], xp)
+        return self.chain.pose(values, xp)
+
+    def _look_at_limits(self, joint: Joint, value: Any, xp: Namespace) -> None:
+        """Warn once of a joint that goes beyond its limits."""
+        if joint.lower is None or joint.upper is None or joint.lower > joint.upper or joint.name in self._beyond:
+            return
+        middle = 0.5 * (joint.lower + joint.upper)
+        if xp.largest(value.plain - middle) > joint.upper - middle + SLACK:
+            self._beyond.add(joint.name)
+            unit = "rad" if joint.kind in TURNING else "m"
+            warn(f"joint {shown(joint.name)} goes beyond its limits {joint.lower:g} .. {joint.upper:g} {unit}")
+
+
+def _about_missing(missing: Sequence[str], names: Sequence[str], others: Sequence[str]) -> str:
+    """Say which joints have no column; one of the others may be meant."""
+    near = did_you_mean(missing[0], others)
+    plural = "s" * (len(missing) > 1)
+    columns = f"{', '.join(map(bare, names[:12]))}{', ..' * (len(names) > 12)}"
+    example = f"give --joint {missing[0]}=VALUE" if not near else "or give it by --joint"
+    return f"no column for joint{plural} {listing(missing)}{near or ';'} {example}; columns: {columns}"
+
+
+def names_in(begin: bytes, form: str, source: str, *, header: bool = True) -> list[str]:
+    """Return the names of a table's columns, or the keys of the first record; of a JointState the joints it names.
+
+    begin: the first bytes of the stream, of one of the forms that are streamed.
+    Raises FormatError where nothing has a name.
+    """
+    if "records" in FORMATS[form].reads:
+        return _keys(begin, form, source)
+    if echoed(begin):
+        return _echoed_names(begin, source)
+    from frametool.stream.table import open_table
+    from frametool.stream.table_stream import DELIMITERS
+
+    table, _ = open_table(begin, DELIMITERS[form], header=header, source=source)
+    if table.names is None:
+        raise FormatError("the columns have no names, so that none is a joint", source=source, line=1)
+    return list(table.names)
+
+
+def echoed(begin: bytes) -> str:
+    """Return which echo tool wrote a table: `csv1` with a header, `csv2` without; "" for any other."""
+    first = _lines_of(begin)[:1] or [""]
+    if first[0].startswith("%time,"):
+        return "csv1"
+    return "csv2" if joint_state.looks_like_row(first[0]) else ""
+
+
+def _lines_of(begin: bytes) -> list[str]:
+    return [line for line in begin.decode("utf-8", "replace").splitlines() if line.strip()]
+
+
+def _echoed_names(begin: bytes, source: str) -> list[str]:
+    """Return the joints that the first row names."""
+    lines = _lines_of(begin)
+    try:
+        if echoed(begin) == "csv2":
+            state = joint_state.of_row(joint_state.unquoted(lines[0]))
+        else:
+            header = lines[0].split(",")
+            cells = lines[1].split(",") if len(lines) > 1 else []
+            names = [name.removeprefix("field.") for name in header]
+            state = joint_state.of_numbered(dict(zip(names, cells, strict=False)))
+        return [joint for joint, *_ in joint_state.positions(state)]
+    except Misfit as misfit:
+        raise FormatError(str(misfit), source=source, line=1) from None
+
+
+def _keys(begin: bytes, form: str, source: str) -> list[str]:
+    """Return the keys of the first record, those further in with dots."""
+    part = next(iter(Splitter(form).parts(begin).parts), None)
+    text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")
+    documents = parse_documents(text, source)
+    value: Any = documents[0].value if documents else {}
+    value = value[0] if type(value) is list and value else value
+    if type(value) is not dict:
+        raise FormatError("expected a mapping with a key for each joint, or JointState messages", source=source, line=1)
+    inner = value["msg"] if messages.is_envelope(value) else value
+    if joint_state.is_joint_state(inner):
+        return [joint for joint, *_ in joint_state.positions(inner)]
+    return list(_flat_keys(value))
+
+
+def _flat_keys(value: dict[str, Any], prefix: str = "") -> dict[str, None]:
+    """Return the keys of numbers, in order."""
+    found: dict[str, None] = {}
+    for key, each in value.items():
+        if type(each) is dict:
+            found |= _flat_keys(each, f"{prefix}{key}.")
+        else:
+            found[prefix + key] = None
+    return found
