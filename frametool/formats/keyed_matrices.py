@@ -56,8 +56,7 @@ class Matrices:
         self.reading = reading
         self.left: list[str] = []
         self.asked = 0
-        self.blocks = list(_renamed(_blocks(document, "", ()), naming))
-        self.names = [block.name for block in self.blocks]
+        self.blocks = _renamed(_blocks(document, "", ()), naming)
         self.poses = [pose for block in self.blocks for pose in self._of_block(block)]
 
     def edges(self) -> list[Edge]:
@@ -121,11 +120,12 @@ class Matrices:
 
     def _before(self, block: MatrixBlock) -> str:
         """Return the camera before this one: cam0 of cam1; else the block before it; "" if there is none."""
-        at = self.names.index(block.name)
-        if not self.naming.blocks and (match := re.fullmatch(r"(.*?)([0-9]+)", block.name)):
-            lower = f"{match[1]}{int(match[2]) - 1}"
-            return lower if lower in self.names else ""
-        return self.names[at - 1] if at > 0 else ""
+        around, own = block.path[:-1], block.path[-1] if block.path else ""
+        beside = {each.path[-1]: each.name for each in self.blocks if each.path and each.path[:-1] == around}
+        if match := re.fullmatch(r"(.*?)([0-9]+)", str(own)):
+            return beside.get(f"{match[1]}{int(match[2]) - 1}", "")
+        earlier = [*beside.values()][: [*beside].index(own)] if own in beside else []
+        return earlier[-1] if earlier else ""
 
     def _directed(
         self, block: MatrixBlock, key: str, path: Path, named: Meaning | Ambiguous | None
@@ -184,16 +184,18 @@ class Matrices:
             self.left.append(f"{bare(dotted(path))} ({what})" if what else bare(dotted(path)))
 
 
-def _renamed(blocks: Iterator[MatrixBlock], naming: FrameNames) -> Iterator[MatrixBlock]:
-    """Yield the blocks, those that hold cameras under the names that were told."""
-    names = iter(naming.blocks)
-    for block in blocks:
-        is_camera = block.name and not block.name.startswith("imu") and any(map(_is_pose, block.entries))
-        yield block._replace(name=next(names, block.name)) if is_camera else block
+def _renamed(blocks: Iterator[MatrixBlock], naming: FrameNames) -> list[MatrixBlock]:
+    """Return the blocks, those of cameras under the names that were told: cam0 has the first of them."""
+    found = list(blocks)
+    cameras = [block for block in found if block.name and not block.name.startswith("imu") and _looks_posed(block)]
+    numbered = sorted(cameras, key=lambda block: [int(number) for number in re.findall(r"[0-9]{1,9}", block.name)])
+    told = {block.path: name for block, name in zip(numbered, naming.blocks, strict=False)}
+    return [block._replace(name=told.get(block.path, block.name)) for block in found]
 
 
-def _is_pose(key: str) -> bool:
-    return key.startswith("T_")
+def _looks_posed(block: MatrixBlock) -> bool:
+    """Tell whether a block has a pose or is that of a camera, whose first in a chain has none."""
+    return any(key.startswith("T_") for key in block.entries) or block.name.startswith("cam")
 
 
 def _blocks(entries: dict[str, Any], name: str, path: Path, depth: int = 0) -> Iterator[MatrixBlock]:
