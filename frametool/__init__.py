@@ -5,6 +5,11 @@
     map_from_camera = tree.lookup("map", "camera_optical")      # the pose of camera_optical in map
     point_in_map = map_from_camera.apply([0.0, 0.0, 1.0])
 
+`FORMATS` is the table of the forms of files, name -> row: what is read from a form and written in it, how it is
+recognised, what its numbers mean; `frametool formats` prints it.
+
+    [name for name, row in frametool.FORMATS.items() if "tree" in row.reads]    # what `load` takes as its format
+
 Arguments are always in the order (target, source). Metres, radians, quaternions x, y, z, w, stamps in integer
 nanoseconds. Names are loaded when first used: `import frametool` alone loads neither numpy nor yaml.
 """
@@ -13,25 +18,30 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from frametool.calc.explain.api import explain as explain
     from frametool.calc.python_face import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
+    from frametool.formats import FORMATS as FORMATS
     from frametool.formats.load import load as load
     from frametool.formats.robot import load_robot as load_robot
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.tree import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
+    from frametool.lint.tree_diff import diff as diff
     from frametool.sim.controllers import FollowController as FollowController
+    from frametool.sim.followed import follow_steps as follow_steps
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
     from frametool.sim.sweep import simulate_many as simulate_many
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "calc": "frametool.calc",
+    "FORMATS": "frametool.formats",
     "FollowController": "frametool.sim.controllers",
     "FrameTree": "frametool.frames.tree",
     "FrametoolError": "frametool.errors",
@@ -40,6 +50,9 @@ _HOMES = {
     "TransformBuffer": "frametool.frames.buffer",
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
+    "diff": "frametool.lint.tree_diff",
+    "explain": "frametool.calc.explain.api",
+    "follow_steps": "frametool.sim.followed",
     "load": "frametool.formats.load",
     "load_robot": "frametool.formats.robot",
     "simulate": "frametool.sim.simulate",
@@ -47,6 +60,7 @@ _HOMES = {
     "tutorial": "frametool.sim.scene",
 }
 __all__ = [
+    "FORMATS",
     "FollowController",
     "FrameTree",
     "FrametoolError",
@@ -57,6 +71,9 @@ __all__ = [
     "Twist",
     "__version__",
     "calc",
+    "diff",
+    "explain",
+    "follow_steps",
     "load",
     "load_robot",
     "simulate",

@@ -44,7 +44,7 @@ def _of_command(name: str, about: str, command: click.Command) -> str:
         for each in ours:
             left, text = option_row(each, context)
             lines += [".TP", f".B {escaped(left)}", escaped(text)]
-    return "\n".join([*lines, *_ending()]) + "\n"
+    return "\n".join([*lines, *_ending(getattr(command, "exit_codes", EXIT_CODES))]) + "\n"
 
 
 def _overview() -> str:
@@ -64,8 +64,8 @@ def _heading(name: str, about: str) -> list[str]:
     return [f'.TH {name.upper()} 1 "" "frametool {__version__}" "frametool"', ".SH NAME", f"{name} \\- {escaped(about)}"]
 
 
-def _ending() -> list[str]:
-    return [".SH EXIT STATUS", escaped(EXIT_CODES.removeprefix("Exit codes: ").rstrip(".")) + ", 130 interrupted."]
+def _ending(exit_codes: str = EXIT_CODES) -> list[str]:
+    return [".SH EXIT STATUS", escaped(exit_codes.removeprefix("Exit codes: ").rstrip(".")) + ", 130 interrupted."]
 
 
 def _prose(text: str) -> list[str]:

@@ -151,7 +151,7 @@ def test_monitor_names_each_parent_once_and_counts_the_changes(run: Run) -> None
     entry = json.loads(run("monitor", "-", "-f", "json", stdin=moving(*STEADY, parents="mo")).out)
     assert (entry["parents"], entry["parent_changes"]) == ("map, odom", 19)
     header, row = run("monitor", "-", "-f", "text", stdin=moving(*STEADY, parents="mo")).out.splitlines()
-    assert (header.split()[-1], row.split()[-1]) == ("reparented", "19")
+    assert (header.split()[-1], row.split()[-1]) == ("parents", "19")
 
 
 @pytest.mark.parametrize("begin", [1, 9])
@@ -320,8 +320,10 @@ def test_a_sound_tree_and_a_sound_recording_have_no_findings(run: Run) -> None:
     assert findings(run, moving(*STEADY)) == []
 
 
-def test_every_rule_but_the_rest_is_tested() -> None:
-    assert {*TREES, *RECORDINGS} == set(RULES) - {"odd"}
+def test_every_rule_but_the_rest_is_tested(run: Run) -> None:
+    robot = '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"><parent link="a"/><child link="b"/><limit lower="-1" upper="1"/></joint></robot>'
+    assert [each["rule"] for each in findings(run, robot, "-j", "j=2")] == ["limit"]
+    assert {*TREES, *RECORDINGS, "limit"} == set(RULES) - {"odd"}
 
 
 @pytest.mark.parametrize("turn", [0, 1, 2])

@@ -12,7 +12,7 @@ from frametool.calc import frame_rules as rules
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.literals import Literals
 from frametool.calc.parser import RESERVED, parse_line, walk
-from frametool.calc.tokens import CalcError, NoTree, frames_of
+from frametool.calc.tokens import CalcError, NoTree
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POSE, UNITS, Term, Type
 from frametool.errors import FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
@@ -33,6 +33,7 @@ class Scope:
     """What an expression may name: values, trees, the tree of bare look-ups, the row of a stream.
 
     row: the type of a row; None outside of streams
+    seen: the frames of all that was evaluated
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Scope:
         self.names = {} if names is None else names
         self.literals = literals or Literals()
         self.row = row
+        self.seen: set[str | None] = {None}
 
     def with_row(self, row: Type) -> Scope:
         """Return the same scope for rows of a type, its names its own."""
@@ -93,6 +95,7 @@ def pointed(error: FrametoolError, text: str) -> FrametoolError:
 
         ((row, column),) = places_of(f"{text}.", [at]) if at < len(text) else [_end_of(text)]
         shown_line = pointer(line_of(text, row), column)
+        error.fields = {**error.fields, "column": column}
         error.snippet = "\n".join(f"  {each}" for each in shown_line.split("\n"))  # type: ignore[attr-defined]
     return error
 
@@ -143,6 +146,7 @@ class _Walk:
             if getattr(error, "at", None) is None:
                 error.at = branch.at  # type: ignore[attr-defined]
             raise
+        self.scope.seen.update((found.type.target, found.type.source))
         return found.written(self.text[branch.start : branch.end], atomic=branch.is_atom)
 
     def _value(self, branch: Branch) -> Term:
@@ -157,8 +161,9 @@ class _Walk:
     def _number(self, branch: Branch) -> Term:
         text, unit = branch.value
         if unit and unit not in UNITS:
-            hint = f"; write {text} * {unit}" if unit in ("pi", *self.scope.names) else did_you_mean(unit, UNITS)
-            raise CalcError(f"unknown unit {shown(unit)}{hint or ';'} units: {' '.join(UNITS)}".replace("'; w", "; w"))
+            if unit in ("pi", *self.scope.names):
+                raise CalcError(f"{shown(unit)} is no unit; write {text} * {unit}")
+            raise CalcError(f"unknown unit {shown(unit)}{did_you_mean(unit, UNITS) or ';'} units: {' '.join(UNITS)}")
         value = float(text)
         if value == float("inf"):
             raise CalcError(f"{shown(text)} is not finite")
@@ -255,7 +260,7 @@ class _Walk:
         return rules.power(base, exponent)
 
     def _as(self, branch: Branch) -> Term:
-        target, source = map(self._bare, frames_of(branch.value))
+        target, source = map(self._bare, branch.value)
         return rules.as_frames(self._value(branch.parts[0]), target, source)
 
     def _in(self, branch: Branch) -> Term:
@@ -272,9 +277,9 @@ class _Walk:
         return name[1:]
 
     def _lookup(self, branch: Branch) -> Term:
-        text, named, when = branch.value
+        frames, named, when = branch.value
         tree = self._tree(named)
-        target, source = (self._bare(each, tree) for each in frames_of(text))
+        target, source = (self._bare(each, tree) for each in frames)
         type_ = Type(POSE, target, source)
         if when == "row":
             if self.scope.row is None:

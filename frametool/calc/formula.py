@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.calc.evaluate import columns_of, evaluate_line, kept, mentions_row, needs_time
+from frametool.calc.evaluate import columns_of, evaluate_line, kept, needs_time
 from frametool.calc.frame_rules import in_radians
 from frametool.calc.parser import walk
 from frametool.calc.tokens import CalcError
@@ -34,11 +34,16 @@ NAMES = {TWIST: ("vx", "vy", "vz", "wx", "wy", "wz"), ANGLES: ("roll", "pitch", 
          VECTOR: tuple("xyz")}  # fmt: skip
 
 
+SOME, OTHER = "\0some", "\0other"
+"""Stand for the frames of rows that no expression names: whatever they are called, the result is the same."""
+
+
 class Bound(NamedTuple):
-    """Lines understood for rows of one type: the results by name, and what their numbers are called."""
+    """Lines understood for rows of one type: the results by name, what their numbers are called, all their frames."""
 
     terms: tuple[tuple[str, Term], ...]
     extras: tuple[str, ...]
+    frames: frozenset[str | None]
 
 
 class RowExpressions:
@@ -99,19 +104,27 @@ class RowExpressions:
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         """Return the frames of the result of a row with these; raise CalcError where the expressions do not fit."""
-        type_ = Type(POSE, parent, name) if row == POSE else Type(row, parent)
-        bound = self._for(type_)
+        known = self._plainly(row).frames
+        first = parent if parent in known else SOME
+        second = name if name in known else SOME if name == parent else OTHER
+        try:
+            bound = self._for(_row_type(row, first, second))
+        except FrametoolError:
+            self._bind_all(_row_type(row, parent, name))  # raises the same under the names there are
+            raise
         if self.adds or not self.kind(row):
             return parent, name
         result = bound.terms[0][1].type
-        return result.target, result.source if result.kind == POSE else name
+        meant = {first: parent, second: name}
+        target, source = (meant.get(each, each) for each in (result.target, result.source))
+        return target, source if result.kind == POSE else name
 
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
     ) -> Components:
         """Return the components of the result and then the extras; of floats raises CalcError where none are."""
         bound = self._plainly(row)
-        values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp, {})
+        values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp)
         if self.kind(row):
             return bound.terms[0][1].at(values)
         numbers = [number for _, term in bound.terms for number in self._numbers(term, values)]
@@ -126,14 +139,17 @@ class RowExpressions:
     def _for(self, type_: Type) -> Bound:
         """Understand the lines for rows of a type."""
         if type_ not in self._bound:
-            scope = self.scope.with_row(type_)
-            for line in self.bindings:
-                self._bind(line, scope)
-            terms = tuple((line.name, self._bind(line, scope)) for line in self.lines)
-            named = terms if self.adds or terms[0][1].type.kind not in (POSE, POINT, VECTOR) else ()
-            extras = tuple(name for own, term in named for name in self._names(own, term.type))
-            self._bound[type_] = Bound(terms, extras)
+            self._bound[type_] = self._bind_all(type_)
         return self._bound[type_]
+
+    def _bind_all(self, type_: Type) -> Bound:
+        scope = self.scope.with_row(type_)
+        for line in self.bindings:
+            self._bind(line, scope)
+        terms = tuple((line.name, self._bind(line, scope)) for line in self.lines)
+        named = terms if self.adds or terms[0][1].type.kind not in (POSE, POINT, VECTOR) else ()
+        extras = tuple(name for own, term in named for name in self._names(own, term.type))
+        return Bound(terms, extras, frozenset(scope.seen))
 
     def _bind(self, line: Line, scope: Scope) -> Term:
         term = evaluate_line(line, scope)
@@ -168,6 +184,5 @@ class RowExpressions:
         return numbers
 
 
-def wants_rows(lines: Sequence[Line]) -> bool:
-    """Tell whether any of some lines needs rows."""
-    return any(mentions_row(line.tree) for line in lines)
+def _row_type(row: str, parent: str | None, name: str | None) -> Type:
+    return Type(POSE, parent, name) if row == POSE else Type(row, parent)

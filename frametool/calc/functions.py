@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from frametool.calc.frame_rules import (
     PLACED,
@@ -44,17 +44,23 @@ if TYPE_CHECKING:
 MANY = 1 << 16
 
 
-class Builtin(NamedTuple):
+class Builtin:
     """A function: how many values it takes, in words what and what for, and its rule.
 
     rule: from its name, its values and the trees there are to the result
     """
 
-    least: int
-    most: int
-    takes: str
-    gives: str
-    rule: Callable[[str, Sequence[Term], Trees], Term]
+    __slots__ = ("gives", "least", "most", "rule", "takes")
+
+    def __init__(
+        self, least: int, most: int, takes: str, gives: str, rule: Callable[[str, Sequence[Term], Trees], Term]
+    ) -> None:
+        """Keep all of it."""
+        self.least = least
+        self.most = most
+        self.takes = takes
+        self.gives = gives
+        self.rule = rule
 
 
 def need(term: Term, kinds: Sequence[str], what: str) -> Term:

@@ -9,7 +9,6 @@ atom    = NUMBER[UNIT] | LOOKUP ["@" time] | NAME "[" LOOKUP ["@" time] "]" | NA
 
 from __future__ import annotations
 
-import re
 from typing import Any, NamedTuple
 
 from frametool.calc.tokens import CalcError, Token, tokens_of
@@ -26,7 +25,6 @@ RESERVED = ("row", "as", "in", "ans", "pi")
 SUM, PRODUCT = ("+", "-"), ("*", "/")
 TIME_UNITS = {"s": "", "ms": "e-3", "us": "e-6", "ns": "ns"}
 ATOMS = frozenset(("number", "lookup", "name", "column", "call", "pose", "list"))
-_BINDING = re.compile(r"\s*([^\W\d]\w*+)\s*=")
 
 
 class Branch(NamedTuple):
@@ -53,23 +51,28 @@ class Branch(NamedTuple):
         return self.kind in ATOMS
 
 
-class Line(NamedTuple):
+class Line:
     """A line: the name it binds, if it does, and its expression with the whole text it stands in."""
 
-    name: str
-    tree: Branch
-    text: str
+    __slots__ = ("name", "text", "tree")
+
+    def __init__(self, name: str, tree: Branch, text: str) -> None:
+        """Keep all of it."""
+        self.name = name
+        self.tree = tree
+        self.text = text
 
 
 def parse_line(text: str, taken: frozenset[str] = frozenset()) -> Line:
     """Read `NAME = expression` or an expression; `taken` are names that cannot be bound."""
-    if (match := _BINDING.match(text)):
-        name = match[1]
-        if name in RESERVED or name in taken:
-            message = f"{shown(name)} has a meaning of its own and cannot be bound; take another name"
-            raise CalcError(message, match.start(1))
-        return Line(name, _Parser(text, match.end()).whole(), text)
-    return Line("", _Parser(text).whole(), text)
+    head, equals, _ = text.partition("=")
+    name = head.strip() if equals else ""
+    if not name.isidentifier():
+        return Line("", _Parser(text).whole(), text)
+    if name in RESERVED or name in taken:
+        message = f"{shown(name)} has a meaning of its own and cannot be bound; take another name"
+        raise CalcError(message, head.index(name))
+    return Line(name, _Parser(text, len(head) + 1).whole(), text)
 
 
 def walk(tree: Branch) -> Iterator[Branch]:
@@ -186,7 +189,7 @@ class _Parser:
                 raise CalcError("as names both frames: .. as TARGET<-SOURCE", token.start)
             if word.text == "in" and token.kind != "frame":
                 raise CalcError("in names one frame: .. in FRAME", token.start)
-            value, end = token.text, token.end
+            value, end = token.frames or token.text, token.end
             branch = Branch(word.text, word.start, branch.left, end, branch.left, end, value, (branch,))
         self.depth = before
         return branch
@@ -252,7 +255,7 @@ class _Parser:
         if self.has("@"):
             self.take()
             when, end = self._time()
-        return Branch("lookup", token.start, start, end, start, end, (token.text, tree, when))
+        return Branch("lookup", token.start, start, end, start, end, (token.frames, tree, when))
 
     def _time(self) -> tuple[int | str, int]:
         """Read a time as nanoseconds, never through a float, or one of the words."""

@@ -24,6 +24,7 @@ from frametool.errors import ValueInvalid, shown
 from frametool.frames.lookups import Frames
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -165,7 +166,7 @@ def _term(name: str, value: Any) -> Term:
     elif isinstance(value, Measure):
         found = Term(_type_of(value), (float(value),))
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
-        found = Term(PLAIN_NUMBER, (float(value),))
+        found = Term(PLAIN_NUMBER, (parse_number(repr(float(value))),))  # refuses what is not finite
     elif isinstance(value, (list, tuple)) and value and isinstance(value[0], (Transform, Framed)):
         found = Term(Type(LIST), (), items=tuple(_term(name, each) for each in value))
     else:
@@ -187,7 +188,7 @@ def _of_numbers(name: str, value: Any) -> Term:
     import numpy as np
 
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = np.asarray(None if isinstance(value, bool) else value, dtype=np.float64)
     except (TypeError, ValueError):
         raise ValueInvalid(f"{name}: an expression knows nothing of {shown(type(value).__name__)}") from None
     if not np.isfinite(array).all():

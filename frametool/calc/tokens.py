@@ -18,18 +18,12 @@ if TYPE_CHECKING:
 LONGEST = 1 << 16
 """Most characters of an expression."""
 
-FRAME = r'(?:"[^"\n]*"|[^\W\d][\w/:.]*+(?:-++(?![<>])[\w/:.]*+)*+|/[\w/:.]++(?:-++(?![<>])[\w/:.]*+)*+)'
-_WORD = re.compile(
-    rf"""(?P<lookup>{FRAME}\s*+<-\s*+{FRAME})
-    |(?P<number>(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+)(?P<unit>[^\W\d]\w*+)?+
-    |(?P<column>row\s*+\.\s*+(?:"[^"\n]*"|\w++(?:\.\w++)*+))
-    |(?P<name>[^\W\d]\w*+)
-    |(?P<text>"[^"\n]*")
-    |(?P<op>[-+*/^@()\[\],=])""",
-    re.VERBOSE,
-)
-_FRAMES = re.compile(rf"({FRAME})\s*+<-\s*+({FRAME})")
-_PLAIN = re.compile(FRAME)
+_FRAME = re.compile(r'"[^"\n]*"|/?[^\W\d][\w/:.]*+(?:-++(?![<>])[\w/:.]*+)*+')
+_NUMBER = re.compile(r"((?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+)(\w*+)")
+_NAME = re.compile(r"[^\W\d]\w*+")
+_COLUMN = r'\s*+\.\s*+(?:"[^"\n]*"|\w++(?:\.\w++)*+)'
+ARROW = "<-"
+_OPERATORS = "-+*/^@()[],="
 _BEFORE_QUOTE = "{[,: \t\r\n"
 
 
@@ -54,13 +48,18 @@ class NoTree(CalcError):
 
 
 class Token(NamedTuple):
-    """A word: its kind (a group of the pattern, `pose` for braces, `end`), its text and where it stands."""
+    """A word: its kind, its text and where it stands.
+
+    kind: lookup, number, name, column, text (in quotes), frame (behind `in`), pose (in braces), op, end
+    unit: what stands close behind a number; frames: target and source of a look-up
+    """
 
     kind: str
     text: str
     start: int
     end: int
     unit: str = ""
+    frames: tuple[str, ...] = ()
 
 
 def tokens_of(text: str) -> list[Token]:
@@ -73,28 +72,56 @@ def tokens_of(text: str) -> list[Token]:
 def _words(text: str) -> Iterator[Token]:
     at, end, before = 0, len(text), ""
     while True:
-        while at < end and text[at].isspace():
-            at += 1
+        at = _behind_blanks(text, at)
         if at == end:
             return
-        if text[at] == "{":
-            close = closing_brace(text, at)
-            yield Token("pose", text[at:close], at, close)
-            at = close
-            continue
-        if before == "in" and (frame := _PLAIN.match(text, at)):
-            yield Token("frame", frame[0], at, frame.end())
-            at, before = frame.end(), ""
-            continue
-        match = _WORD.match(text, at)
-        if match is None:
-            raise CalcError(_unexpected(text, at), at)
-        before = match[0]
-        kind = match.lastgroup or ""
-        unit = match["unit"] or "" if kind == "unit" else ""
-        kind = "number" if kind == "unit" else kind
-        yield Token(kind, match[kind], at, match.end(), unit)
-        at = match.end()
+        token = _word(text, at, before)
+        yield token
+        at, before = token.end, token.text
+
+
+def _behind_blanks(text: str, at: int) -> int:
+    while at < len(text) and text[at].isspace():
+        at += 1
+    return at
+
+
+def _word(text: str, at: int, before: str) -> Token:
+    """Read the word at a place."""
+    first = text[at]
+    if first == "{":
+        close = closing_brace(text, at)
+        return Token("pose", text[at:close], at, close)
+    if (frame := _FRAME.match(text, at)) is not None:
+        if before == "in":
+            return Token("frame", frame[0], at, frame.end())
+        if (lookup := _lookup(text, frame)) is not None:
+            return lookup
+        if first == '"':
+            return Token("text", frame[0], at, frame.end())
+    if (number := _NUMBER.match(text, at)) is not None:
+        return Token("number", number[1], at, number.end(), number[2])
+    if (name := _NAME.match(text, at)) is not None:
+        column = re.compile(_COLUMN).match(text, name.end()) if name[0] == "row" else None
+        if column is not None:
+            return Token("column", text[at : column.end()], at, column.end())
+        return Token("name", name[0], at, name.end())
+    if first in _OPERATORS:
+        return Token("op", first, at, at + 1)
+    raise CalcError(_unexpected(text, at), at)
+
+
+def _lookup(text: str, target: re.Match[str]) -> Token | None:
+    """Read a look-up whose target was found."""
+    arrow = _behind_blanks(text, target.end())
+    if not text.startswith(ARROW, arrow):
+        return None
+    begin = _behind_blanks(text, arrow + len(ARROW))
+    source = _FRAME.match(text, begin)
+    if source is None:
+        raise CalcError("a frame is missing behind <-: TARGET<-SOURCE", begin)
+    frames = tuple(each[0][1:-1] if each[0].startswith('"') else each[0] for each in (target, source))
+    return Token("lookup", text[target.start() : source.end()], target.start(), source.end(), frames=frames)
 
 
 def _unexpected(text: str, at: int) -> str:
@@ -134,16 +161,8 @@ def _is_escaped(text: str, place: int) -> bool:
     return (len(before) - len(before.rstrip("\\"))) % 2 == 1 if before.endswith("\\") else False
 
 
-def frames_of(lookup: str) -> tuple[str, str]:
-    """Return target and source of a look-up's text, without their quotes."""
-    match = _FRAMES.fullmatch(lookup)
-    assert match is not None  # noqa: S101 - the text of a token
-    target, source = (each[1:-1] if each.startswith('"') else each for each in match.groups())
-    return target, source
-
-
 def frame_text(name: str | None) -> str:
     """Write a frame's name as an expression has it; a name that is not known is `?`."""
     if name is None:
         return "?"
-    return name if not name.startswith(('"', "/")) and _PLAIN.fullmatch(name) else f'"{name}"'
+    return name if not name.startswith(('"', "/")) and _FRAME.fullmatch(name) else f'"{name}"'

@@ -68,17 +68,21 @@ class Type(NamedTuple):
 PLAIN_NUMBER = Type(NUMBER)
 
 
-class RowValues(NamedTuple):
+class RowValues:
     """One row, or a block of rows: its pose, point or vector, the columns asked for, its time, and the functions.
 
     kept: what bound names came to, so that each is computed once
     """
 
-    parts: Components
-    cells: Mapping[str, Any]
-    times_ns: Any
-    xp: Namespace
-    kept: dict[int, Components]
+    __slots__ = ("cells", "kept", "parts", "times_ns", "xp")
+
+    def __init__(self, parts: Components, cells: Mapping[str, Any], times_ns: Any, xp: Namespace) -> None:
+        """Keep all of it."""
+        self.parts = parts
+        self.cells = cells
+        self.times_ns = times_ns
+        self.xp = xp
+        self.kept: dict[int, Components] = {}
 
 
 class Term:

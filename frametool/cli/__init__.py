@@ -32,10 +32,13 @@ COMMANDS = {
     "monitor": ("frametool.cli.commands.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
     "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
     "check": ("frametool.cli.commands.check", "what is wrong or odd in trees and recordings"),
+    "diff": ("frametool.cli.commands.diff", "what differs between two trees, calibrations or recordings"),
+    "formats": ("frametool.cli.commands.formats", "the forms of files that are read and written, and what they mean"),
     "help": ("frametool.cli.commands.help", "a subject on one screen: pose, euler, axes, time, streams and more"),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 IN_OUT, INTERRUPTED = 5, 130  # exit codes
+TROUBLE = {"diff": 2}  # command -> its one exit code for whatever goes wrong, as that of diff(1)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -57,9 +60,10 @@ def run(arguments: list[str]) -> int:
     from frametool.documents.limits import DEEPEST
     from frametool.errors import heard_by
 
+    in_out = TROUBLE.get(arguments[0] if arguments else "", IN_OUT)
     if sys.stdout is None:
         say("standard output is closed")
-        return IN_OUT
+        return in_out
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.encoding.lower() != "utf-8":
         sys.stdout.reconfigure(encoding="utf-8")  # the same bytes in every locale
     sys.setrecursionlimit(max(sys.getrecursionlimit(), 20 * DEEPEST))  # a document may be so deep, a walk some calls
@@ -74,15 +78,15 @@ def run(arguments: list[str]) -> int:
         status = die_of(SIGPIPE)  # as `cat` does when its reader is gone
     except MemoryError:
         say("out of memory")
-        status = IN_OUT
+        status = in_out
     except ImportError as error:  # numpy's tells of missing memory and files in many lines, the cause in the last one
         say(f"a library cannot be loaded: {str(error).strip().splitlines()[-1]}")
-        status = IN_OUT
+        status = in_out
     except OSError as error:
-        if status != IN_OUT:  # else it was told, and what is still in the buffer fails again
+        if status != in_out:  # else it was told, and what is still in the buffer fails again
             say((error.strerror or str(error)).lower())
         discard(sys.stdout)
-        status = IN_OUT
+        status = in_out
     return status
 
 
@@ -110,7 +114,7 @@ def _run(arguments: list[str]) -> int:
     except FrametoolError as error:
         problem = error
     say_error(problem, in_json=wants_json(arguments))
-    return problem.exit_code
+    return TROUBLE.get(arguments[0] if arguments else "", problem.exit_code)
 
 
 def _usage(error: click.ClickException, arguments: list[str]) -> str:

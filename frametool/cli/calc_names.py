@@ -11,12 +11,8 @@ from frametool.calc.literals import PLACED, term_of_pose
 from frametool.calc.values import LIST, TREE, Term, Type
 from frametool.cli.poses import source_of
 from frametool.cli.trees import load_tree
-from frametool.documents.document import parse_documents
-from frametool.documents.input_file import InputFile
 from frametool.errors import FormatError
 from frametool.formats import FORMATS
-from frametool.formats.detect import detect
-from frametool.formats.recordings import Recording
 
 if TYPE_CHECKING:
     from frametool.calc.evaluate import Scope
@@ -26,8 +22,7 @@ if TYPE_CHECKING:
 OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
 
 
-NAMED = re.compile(r"\s*([^\W\d]\w*)\s*=\s*(.*?)\s*", re.DOTALL)
-LIKE_A_FILE = re.compile(r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*")
+LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
 LONGEST_PATH = 4096
 
 
@@ -36,17 +31,19 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
 
     What looks like a file and is none is refused as one.
     """
-    match = NAMED.fullmatch(text[:LONGEST_PATH]) if len(text) < LONGEST_PATH else None
-    if match is None or not (match[2] == "-" or _is_file(match[2]) or LIKE_A_FILE.fullmatch(match[2])):
+    head, equals, tail = text.partition("=")
+    name, path = head.strip(), tail.strip()
+    if not equals or not name.isidentifier() or not 0 < len(path) < LONGEST_PATH:
         return None
-    read_line(f"{match[1]}=0")  # refuses a name that is taken
-    found = named_file(match[1], match[2], scope.literals).written(match[1], atomic=True)
-    scope.names[match[1]] = found
-    return found
+    if path != "-" and not _is_file(path) and not re.fullmatch(LIKE_A_FILE, path):
+        return None
+    read_line(f"{name}=0")  # refuses a name that is taken
+    scope.names[name] = named_file(name, path, scope.literals).written(name, atomic=True)
+    return scope.names[name]
 
 
 def _is_file(path: str) -> bool:
-    return bool(path) and "\0" not in path and os.path.exists(path)
+    return "\0" not in path and os.path.exists(path)
 
 
 def named_file(name: str, path: str, literals: Literals) -> Term:
@@ -56,6 +53,7 @@ def named_file(name: str, path: str, literals: Literals) -> Term:
         found = _values(source, literals)
         if found is None:
             from frametool.formats.load import load_sources
+            from frametool.formats.recordings import Recording
 
             return Term(Type(TREE), (), tree=load_sources([Recording.inline(source)]), text=name)
         return found
@@ -70,6 +68,9 @@ def named_file(name: str, path: str, literals: Literals) -> Term:
 
 def _form(path: str) -> str:
     """Find the form of a file; what is none of tables and documents may be a tree."""
+    from frametool.documents.input_file import InputFile
+    from frametool.formats.detect import detect
+
     file = InputFile(path)
     try:
         return detect(file.head(), "tree", "rows", "records", name=path, otherwise="yaml")[0]
@@ -79,6 +80,7 @@ def _form(path: str) -> str:
 
 def _values(source: Source, literals: Literals) -> Term | None:
     """Read the poses or points of a document; None for a tree."""
+    from frametool.documents.document import parse_documents
     from frametool.stream.record_values import read_poses
 
     documents = [document.value for document in parse_documents(source.text, source.name)]

@@ -16,14 +16,15 @@ from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, nota
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from frametool.geometry.representations import Notation
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 # an argument that begins like this is a number, whatever short options there are
-NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b)", re.IGNORECASE)
+NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation|Rotation):)", re.IGNORECASE)
+STREAMED = ("records", "rows")
 READ = readers("tree", "records", "rows", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup failed, 5 file."
 
@@ -35,15 +36,32 @@ class Command(WithHelp):
     own check of misspelled options; `Text` takes the blank off again.
     """
 
+    exit_codes = EXIT_CODES
+
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Shield negative numbers, then parse."""
-        return super().parse_args(ctx, [f" {each}" if NEGATIVE.match(each) else each for each in args])
+        """Shield negative numbers (-j is an option where joints are), give a bare --explain its form, then parse."""
+        options = {name for each in self.get_params(ctx) for name in each.opts}
+        shielded = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
+        return super().parse_args(ctx, _with_form(shielded) if "--explain" in shielded else shielded)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """End every help with the exit codes."""
         super().format_epilog(ctx, formatter)
         formatter.write_paragraph()
-        formatter.write_text(EXIT_CODES)
+        formatter.write_text(self.exit_codes)
+
+
+def _with_form(args: list[str]) -> list[str]:
+    """Join --explain with the form behind it, or with `text`: click would take any argument there for its value."""
+    joined: list[str] = []
+    for each in args:
+        if joined and joined[-1] == "--explain":
+            is_form = each in ("text", "markdown", "latex")
+            joined[-1] = f"--explain={each if is_form else 'text'}"
+            if is_form:
+                continue
+        joined.append(each)
+    return [f"{each}=text" if each == "--explain" else each for each in joined]
 
 
 class Text(click.ParamType[str]):
@@ -150,40 +168,60 @@ verbose_option = click.option(
 
 
 READING = "frametool.reading"  # where a command's context keeps the options about files of frames
+TREES_OPENED = "frametool.trees_opened"  # set in a command's context once it reads files of frames
 FORMS = "frametool.forms"  # where a command's context keeps those of --in
 
 
 class Form(Text):
-    """The name of a form of text from which something is read."""
+    """The name of a form of text, of any or of those from which something is read."""
 
     name = "form"
 
+    def __init__(self, names: Collection[str], are: str) -> None:
+        """Keep the forms that may be named, and what they are in an error: `read`, `known`."""
+        self.names = names
+        self.are = are
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Refuse what is none, with the nearest names."""
-        if value not in READ:
-            near = did_you_mean(value, READ)
-            self.fail(f"no form {shown(value)} is read{near}; `frametool formats` lists all", param, ctx)
+        """Refuse what is none, with the nearest name; of a form that is known and not read, say what to do."""
+        if value not in self.names:
+            self.fail(self._problem(value), param, ctx)
         return value
+
+    def _problem(self, value: str) -> str:
+        if value in FORMATS and (instead := FORMATS[value].instead):
+            return f"{value} ({FORMATS[value].summary}) is not read: {instead}"
+        near = did_you_mean(value, self.names)
+        return f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
         """Offer the forms."""
         from click.shell_completion import CompletionItem
 
-        return [CompletionItem(name, help=FORMATS[name].summary) for name in READ if name.startswith(incomplete)]
+        return [CompletionItem(name, help=FORMATS[name].summary) for name in self.names if name.startswith(incomplete)]
 
 
 def _keep_forms(context: click.Context, _: click.Parameter, chosen: Sequence[str]) -> None:
     context.meta[FORMS] = chosen
 
 
-def forms_told() -> tuple[str, ...]:
-    """Return the forms that --in names."""
+def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
+    """Return the forms that --in names for files of frames, in their order, and the form of the stream.
+
+    streams: there is a stream; its form is the last one that can be streamed, "" if there is none
+    """
     context = click.get_current_context(silent=True)
-    return () if context is None else tuple(context.meta.get(FORMS, ()))
+    told = [] if context is None else list(context.meta.get(FORMS, ()))
+    streamed = [form for form in told if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
+    if not streamed:
+        return told, ""
+    last = len(told) - 1 - told[::-1].index(streamed[-1])
+    return told[:last] + told[last + 1 :], streamed[-1]
 
 
 in_option = click.option(
-    "--in", "input_forms", type=Form(), multiple=True, metavar="FORM", expose_value=False, callback=_keep_forms,
+    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM", expose_value=False,
+    callback=_keep_forms,
     help="form of the input (`frametool formats`), once a file",
 )  # fmt: skip
 
@@ -195,28 +233,35 @@ def say_if_verbose(text: str) -> None:
         say(text)
 
 
-def result_options(what: str) -> Callable[[Function], Function]:
+_PRECISION = click.option(
+    "--precision", type=Digits(), metavar="N|full",
+    help="digits after the point  [default: full; overviews 6]",
+)  # fmt: skip
+_PLACE = (
+    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
+    click.option("--force", is_flag=True, help="let --output replace a file"),
+)
+
+
+def result_options(*what: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
-    options = [
-        click.option(
-            "-f",
-            "--format",
-            "format_name",
-            type=click.Choice(("text", *writers(what))),
-            help="form of the result",
-        ),
-        click.option(
-            "--precision",
-            type=Digits(),
-            metavar="N|full",
-            help="digits after the point  [default: full; overviews 6]",
-        ),
-        click.option(
-            "-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"
-        ),
-        click.option("--force", is_flag=True, help="let --output replace a file"),
-    ]
-    return lambda function: decorated(function, options)
+    form = click.option(
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers(*what))),
+        help="form of the result",
+    )  # fmt: skip
+    return lambda function: decorated(function, (form, _PRECISION, *_PLACE))
+
+
+def list_options(*more: str) -> Callable[[Function], Function]:
+    """Add to a command the options that shape and place a list for people, which is text wherever it goes.
+
+    more: forms beside text and those of reports
+    """
+    form = click.option(
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers("report"), *more)),
+        help="form of the result  [default: text]",
+    )  # fmt: skip
+    return lambda function: decorated(function, (form, *_PLACE))
 
 
 def rotation_options(function: Function) -> Function:

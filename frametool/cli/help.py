@@ -21,8 +21,8 @@ def _help(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # clic
 
 def _has_many_choices(option: click.Option, ctx: click.Context) -> bool:
     """Tell whether the choices of an option are too long to stand beside it."""
-    metavar = option.make_metavar(ctx)
-    return metavar.startswith("[") and len(metavar) > LONGEST_CHOICE
+    has_choices = isinstance(option.type, click.Choice) and not option.metavar
+    return has_choices and len(option.make_metavar(ctx)) > LONGEST_CHOICE
 
 
 def _spelled(option: click.Option, ctx: click.Context) -> str:
@@ -52,7 +52,7 @@ HELP_OPTION = click.Option(
 
 # heading -> names of the parameters under it; all others stand first, they are what the command is about
 GROUPS = {
-    "Files": ("more", "input_forms", "topics", "quiet", "verbose"),
+    "Files": ("more", "with_a", "with_b", "input_forms", "topics", "quiet", "verbose"),
     "Time (help time)": ("at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2"),
     "Rotations (help rotations)": ("given", "notations", "deg", "keep_sign", "normalize"),
     "Rows (help streams)": (

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from frametool.cli.command import FULL
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.errors import printable
-from frametool.formats import FORMATS, by_suffix, writers
+from frametool.errors import ValueInvalid, printable, shown
+from frametool.formats import FORMATS, by_name, is_trajectory, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 
 BATCH = 256  # poses
+BLOCK = 1 << 13  # poses of a trajectory
 
 
 class Output:
@@ -32,8 +33,7 @@ class Output:
 
     def __init__(
         self,
-        what: str,
-        *,
+        *what: str,
         format_name: str | None = None,
         precision: int | None = None,
         output: str | None = None,
@@ -41,18 +41,27 @@ class Output:
         notations: tuple[Notation, ...] | None = None,
         deg: bool = False,
         keep_sign: bool = False,
+        otherwise: str | None = None,
     ) -> None:
-        """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+        """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe.
+
+        otherwise: the form that stands in the place of these two
+        """
         self.path = output
         self.force = force
-        self.told = format_name or by_suffix(output, writers(what))
+        self.told = format_name or by_name(output, writers(*what))
         self.notations = notations or ()
-        form = self.told or ("text" if output is None and sys.stdout.isatty() else "yaml")
+        form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
         full = precision == FULL
         digits = None if full else precision
         self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
+
+    @property
+    def is_trajectory(self) -> bool:
+        """Tell whether the form is that of the poses of one frame over time."""
+        return is_trajectory(self.style.form)
 
     def use(self, notations: tuple[Notation, ...]) -> None:
         """Write rotations in these notations."""
@@ -71,6 +80,9 @@ class Output:
 
         In every form the text of several results begins with that of the first: what follows it is the batch's.
         """
+        if self.is_trajectory:
+            yield from self._blocks(results)
+            return
         write_poses = self._module("frametool.view.pose_text").write_poses
         size = 2
         begin = list(islice(results, size))
@@ -80,8 +92,20 @@ class Output:
             yield write_poses([begin[0], *batch], self.style)[known:]
             size = min(2 * size, BATCH)
 
+    def _blocks(self, results: Iterator[Result]) -> Iterator[str]:
+        """Yield the text of the poses of a trajectory, block after block."""
+        from frametool.stream.pose_writer import PoseWriter, block_of
+
+        writer = PoseWriter(self.style)
+        while batch := list(islice(results, BLOCK)):
+            yield writer.of_block(block_of(batch)).decode()
+        yield writer.end().decode()
+
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
+        if self.is_trajectory:
+            self.poses_as_they_come(map(_as_pose, values))
+            return
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) == len(found):
@@ -91,8 +115,12 @@ class Output:
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
-        if tree.moves and "poses" in self._writes and self.style.form not in ("yaml", "json"):
-            self.poses(sample_results(tree))
+        if self.style.form not in ("yaml", "json") and (
+            "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
+        ):
+            if self.is_trajectory:
+                self.style.axes = _axes_of_only_mover(tree, self.style.form)
+            self.poses_as_they_come(sample_results(tree)) if self.is_trajectory else self.poses(sample_results(tree))
             return
         if self.style.form != "text":
             self.text(self._module("").write_tree(tree, self.style))
@@ -112,6 +140,8 @@ class Output:
     def points(self, records: Iterable[dict[str, Any]]) -> None:
         """Write points; for a person one a line, but what has more than three numbers as a mapping."""
         found = list(records)
+        if self.style.form in FORMATS and "points" not in self._writes:
+            raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
         is_plain = all(any(isinstance(value, list) for value in each.values()) for each in found)
         text_module = "frametool.view.pose_text" if is_plain else FORMATS["yaml"].writer
         self.text(self._module(text_module).write_points(found, self.style))
@@ -143,3 +173,18 @@ class Output:
         self.pieces([text])
 
 
+def _as_pose(value: Result | dict[str, Any]) -> Result:
+    """Take a result for a pose; raise ValueInvalid for a point or a message."""
+    if not isinstance(value, Result):
+        raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+    return value
+
+
+def _axes_of_only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
+    """Return the camera axes of the one frame of a tree, "" if it is no camera; raise ValueInvalid for several."""
+    children = [track.child for track in tree.tracks()]
+    if len(children) != 1:
+        frames = ", ".join(map(shown, children[:8])) or "none"
+        instead = f"name two: lookup TREE TARGET SOURCE -f {form}"
+        raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; {instead}")
+    return tree.camera_axes.get(children[0], "")

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import sys
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from frametool.cli.pasted_input import INLINE, is_inline, is_pasted, rewritten
 from frametool.documents.source import Source, read_text
 from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import inverse
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
-from frametool.grammar.rotation import read_spelled, rotation_of
+from frametool.grammar.rotation import read_spelled, rotation_of, spelled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -23,13 +25,8 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Result
     from frametool.stream.request import Request
 
-INLINE = "argument"
 INVERSE = "inv"
-
-
-def is_inline(text: str) -> bool:
-    """Tell a mapping or list written on the command line from a file's name."""
-    return text.startswith(("{", "["))
+ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
 
 
 def source_of(argument: str | Source) -> Source:
@@ -45,19 +42,37 @@ def source_of(argument: str | Source) -> Source:
     return Source("stdin", read_text("-"))
 
 
-def poses_from(argument: str | Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
-    """Read the poses of one argument: inline, `-` for standard input, or a file."""
+def pose_source(
+    argument: str | Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
+) -> Source:
+    """Take an argument as text of the grammar of poses: what was pasted is rewritten, else as `source_of`.
+
+    points: three numbers are a point.
+    """
+    if not isinstance(argument, Source) and is_pasted(argument, given):
+        argument = Source(INLINE, argument)
+    source = source_of(argument)
+    return rewritten(source, given, normalize=normalize, points=points) or source
+
+
+def poses_from(
+    argument: str | Source, given: Notation | None = None, *, degrees: bool = False, normalize: bool = False
+) -> list[Pose]:
+    """Read the poses of one argument: inline, `-` for standard input, or a file.
+
+    given: the notation of numbers that do not say theirs.
+    """
     from frametool.stream.record_values import read_poses
 
     try:
-        return read_poses(source_of(argument), degrees=degrees, normalize=normalize)
+        return read_poses(pose_source(argument, given, normalize=normalize), degrees=degrees, normalize=normalize)
     except FormatError as error:
         raise usage_if_inline(error) from None
 
 
 def write_results(argument: str, stream: Stream, request: Request, output: Output) -> int:
     """Write the results of the records of one argument: inline, a file, or the stream of the command."""
-    if stream.is_wanted(argument):
+    if stream.is_wanted(argument) or (not is_pasted(argument, request.given) and stream.takes_rows(argument)):
         return stream.run(request, output)
     output.values(values_of([argument], request, output))
     return 0
@@ -70,7 +85,9 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
     request = request._replace(notations=request.notations or output.notations)
     for argument in arguments:
         try:
-            yield from results(source_of(argument), request, output.style)
+            points = request.operation.moves
+            source = pose_source(argument, request.given, normalize=request.normalize, points=points)
+            yield from results(source, request, output.style)
         except FormatError as error:
             raise usage_if_inline(error) from None
 
@@ -122,7 +139,7 @@ def _factor(text: str, *, is_inverse: bool) -> Factor:
 
 
 def combinations(
-    arguments: Sequence[str | Source | Factor], *, degrees: bool, normalize: bool
+    arguments: Sequence[str | Source | Factor], given: Notation | None = None, *, degrees: bool, normalize: bool
 ) -> list[tuple[Pose, ...]]:
     """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
     factors = [each if isinstance(each, Factor) else Factor(each) for each in arguments]  # type: ignore[arg-type]
@@ -130,7 +147,7 @@ def combinations(
     if list(arguments).count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
     read = [
-        list(map(each.of, poses_from(each.argument, degrees=degrees, normalize=normalize))) for each in factors
+        list(map(each.of, poses_from(each.argument, given, degrees=degrees, normalize=normalize))) for each in factors
     ]
     several = [index for index, poses in enumerate(read) if len(poses) > 1]
     if len(several) > 1:
@@ -140,12 +157,26 @@ def combinations(
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 
 
-def one_pose(argument: str, *, degrees: bool, normalize: bool) -> Pose:
+def one_pose(argument: str | Source, given: Notation | None = None, *, degrees: bool, normalize: bool) -> Pose:
     """Read the one pose of an argument."""
-    poses = poses_from(argument, degrees=degrees, normalize=normalize)
+    poses = poses_from(argument, given, degrees=degrees, normalize=normalize)
     if len(poses) != 1:
-        raise click.UsageError(f"one pose is wanted here, {argument} holds {len(poses)}")
+        name = argument if isinstance(argument, str) else argument.name
+        raise click.UsageError(f"one pose is wanted here, {name} holds {len(poses)}")
     return poses[0]
+
+
+@contextmanager
+def misuse_unless_rotations(reading: Reading) -> Iterator[None]:
+    """Turn what cannot be read of arguments into misuse, but not what is no rotation; then warn of what was noted."""
+    try:
+        yield
+    except NotARotation:
+        raise
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+    for note in reading.notes:
+        warn(note.message)
 
 
 def pose_from_numbers(
@@ -160,9 +191,11 @@ def pose_from_numbers(
     Raises click.UsageError for what is no such list of numbers, ValueInvalid for what is no rotation.
     """
     form = _form_of(texts, given)
+    if form.representation.whole and len(texts) == ROWS_OF_A_POSE:
+        return _pose_of_rows(texts, form, told=bool(given), normalize=normalize)
     size = len(form.representation.columns)
     reading = Reading(Source(INLINE, ""), degrees=degrees, normalize=normalize)
-    try:
+    with misuse_unless_rotations(reading):
         if (whole := form.representation.whole) and len(texts) == len(whole.columns):
             return Pose(*read_spelled(form, texts, INDICES, reading))
         if len(texts) not in (size, size + 3):
@@ -170,13 +203,32 @@ def pose_from_numbers(
             raise click.UsageError(f"{form.spec} has {expected}; found {len(texts)}")
         x, y, z = map(read_number, texts[:-size] or ("0", "0", "0"))
         rotation = rotation_of(form, texts[-size:], INDICES, reading)
-    except NotARotation:
-        raise
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
-    for note in reading.notes:
-        warn(note.message)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
+
+
+def _pose_of_rows(texts: Sequence[str], form: Notation, *, told: bool, normalize: bool) -> Pose:
+    """Read the rows of a 3x4 pose one after the other."""
+    from frametool.grammar.pasted import matrix_pose
+    from frametool.grammar.pose import read_pose
+
+    reading = Reading(Source(INLINE, ""), normalize=normalize)
+    with misuse_unless_rotations(reading):
+        return read_pose(matrix_pose([list(texts)], form, told=told) or {}, reading)
+
+
+def source_from_numbers(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Source:
+    """Write bare numbers, read by `pose_from_numbers` before, as the mapping that says the same."""
+    from frametool.documents.json_writer import Verbatim, dump
+
+    form = _form_of(texts, given)
+    size = len(form.representation.columns)
+    whole = form.representation.whole
+    own = texts if whole and len(texts) == len(whole.columns) else texts[-size:]
+    unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
+    # the texts stand in the places of numbers, and are read as such
+    mapping = {"xyz": list(map(Verbatim, texts[: len(texts) - len(own)]))} if len(texts) > len(own) else {}
+    mapping[form.representation.name + unit] = spelled(form, list(map(Verbatim, own)))  # type: ignore[arg-type]
+    return Source(INLINE, dump(mapping))
 
 
 def _form_of(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Notation:
@@ -187,7 +239,7 @@ def _form_of(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Notati
         return given[0]
     if given:
         raise click.UsageError("--from takes one representation")
-    if len(texts) in (9, 16):
+    if len(texts) in (9, ROWS_OF_A_POSE, 16):
         return notation("matrix")
     choices = ", ".join(REPRESENTATIONS)
     raise click.UsageError(f"{len(texts)} numbers do not say what they are; add --from with one of {choices}")

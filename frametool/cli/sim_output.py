@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, decorated
+from frametool.cli.command import FULL, TEXT, Digits, decorated
 from frametool.cli.pictures import PICTURES, drawn
 from frametool.cli.sim_options import REACH
 from frametool.cli.sink import is_special, refuse_existing, writing
@@ -41,7 +41,7 @@ def format_options(function: Any) -> Any:
     options = (
         click.option("-f", "--format", "format_name", type=click.Choice(FORMS),
                      help="form of the records  [default: text on a terminal, yaml otherwise]"),
-        click.option("--precision", type=click.IntRange(0, 30), metavar="N",
+        click.option("--precision", type=Digits(), metavar="N|full",
                      help="digits after the point  [default: the shortest text that reads back to the same bits]"),
         click.option("-o", "--output", type=TEXT, metavar="FILE",
                      help="write there instead of stdout, whole or not at all"),
@@ -200,7 +200,7 @@ def style_of(format_name: str | None, output: str | None, precision: int | None)
     """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
     is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
     form = format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
-    return Style(form, precision=precision)
+    return Style(form, precision=None if precision == FULL else precision)
 
 
 def suffix_of(path: str) -> str:

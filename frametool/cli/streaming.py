@@ -12,8 +12,9 @@ import click
 
 from frametool.cli.command import (
     FILE,
-    READING,
+    STREAMED,
     TEXT,
+    TREES_OPENED,
     UTF8,
     Notations,
     decorated,
@@ -25,8 +26,8 @@ from frametool.cli.command import (
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
-from frametool.formats import FORMATS, readers
-from frametool.formats.detect import detect
+from frametool.formats import FORMATS, is_trajectory, readers
+from frametool.formats.detect import by_sign, detect
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
@@ -34,14 +35,16 @@ if TYPE_CHECKING:
     from typing import TypeVar
 
     from frametool.cli.output import Output
+    from frametool.documents.source import Source
     from frametool.stream.request import Request
     from frametool.stream.run import Outcome
 
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 MOST_JOBS = 256
-STREAMED = ("records", "rows")
+_STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
+TABLES = ("tum", "euroc", "kitti")  # trajectories whose lines are rows
 OPTIONS = {
     "input_path": click.option(
         "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
@@ -111,26 +114,37 @@ class Stream:
             raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
         return self.path is not None or argument in (None, "-")
 
+    def takes_rows(self, path: str) -> bool:
+        """Stream a file that an argument names if it is a table; one of records, or none known, is not touched."""
+        if path == "-" or (self.told_form() or _form_of(path)) in ("", *RECORDS):
+            return False
+        self.path = path
+        return True
+
     @staticmethod
     def told_form() -> str:
         """Return the form that --in names for the stream, "" if it names none."""
-        told = forms_told()
-        streamed = [form for form in told if not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
-        if len(streamed) > 1:
-            raise click.UsageError(f"--in {streamed[0]} and --in {streamed[1]}: there is one stream")
+        others, form = forms_told(streams=True)
         context = click.get_current_context(silent=True)
-        if told and not streamed and READING not in (context.meta if context else {}):
-            raise click.UsageError(f"--in {told[0]} is not streamed; streams are {', '.join(readers(*STREAMED))}")
-        return streamed[0] if streamed else ""
+        reads_trees = context is not None and TREES_OPENED in context.meta
+        if others and not reads_trees:
+            both = f"--in {others[0]} and --in {form}: there is one stream"
+            raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
+        return form
 
     def run(
         self, request: Request, output: Output, *, tables_only: bool = False
     ) -> int:
         """Run the stream and return its exit status."""
         name = self.path or "stdin"
-        with self.opened() as stream:
-            begin = stream.peek()
+        with self.opened() as given:
+            stream = given
             form, known_by = self.told_form(), ""
+            if not (form or tables_only or self._says_columns() or is_trajectory(_signed(stream.peek(), name))):
+                pasted, stream = self._pasted(stream, name, request)
+                if pasted is not None:
+                    return self._run_pasted(pasted, request, output)
+            begin = stream.peek()
             if not form:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
@@ -138,14 +152,50 @@ class Stream:
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             request = self._completed(request, output, form)
+            if "trajectory" in FORMATS[form].reads and not output.notations:
+                request = request._replace(notations=())  # its rows stay what they are
             if form in RECORDS and (output.told or form) != form:
                 return self._run_as_values(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
-            if form not in RECORDS and output.told not in (None, form) and not kindred:
-                raise click.UsageError(
-                    f"a stream of {form} stays {form}; --format {output.told} is for single results and records"
-                )
+            listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
+            if form not in RECORDS and (listed or output.told not in (None, form)) and not kindred:
+                return self._run_as_poses(stream, form, request, output)
             return self._run(stream, form, request, output)
+
+    def _run_as_poses(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        """Write the results of rows, or of poses that no table holds, in another form."""
+        from frametool.cli.trees import answers
+        from frametool.stream.as_poses import OtherForm
+
+        target = output.told or (form if "poses" in FORMATS[form].writes else "yaml")
+        name = self.path or "stdin"
+        converted = OtherForm(form, request, output.style.in_form(target), name, answers())
+        status = self._write(converted.outcomes(stream, header=self.options["header"]), output, name)
+        states = FORMATS[form].states
+        if states and not self.options["quiet"]:
+            about = converted.tally.about
+            say(f"{name}: {FORMATS[form].summary}{', ' if about else ''}{about}; {states}")
+        return status
+
+    def _says_columns(self) -> bool:
+        """Tell whether an option says that the stream is a table."""
+        options = self.options
+        return bool(options["columns"] or options["keep"] or options["prefix"] or not options["header"])
+
+    def _pasted(self, stream: BufferedReader, name: str, request: Request) -> tuple[Source | None, BufferedReader]:
+        """Look for what was pasted; the stream is then another, with the same in it."""
+        from frametool.cli.pasted_input import pasted_stream
+
+        return pasted_stream(stream, name, request._replace(given=request.given or self.given))
+
+    @staticmethod
+    def _run_pasted(source: Source, request: Request, output: Output) -> int:
+        """Write the results of a text that was pasted."""
+        from frametool.stream.record_values import results
+
+        request = request._replace(notations=request.notations or output.notations)
+        output.values(results(source, request, output.style))
+        return 0
 
     def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of records in another form than theirs."""
@@ -177,17 +227,21 @@ class Stream:
         )
 
     def _run(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        name = self.path or "stdin"
+        return self._write(self._outcomes(stream, form, request, name), output, name)
+
+    def _write(self, outcomes: Generator[Outcome], output: Output, name: str) -> int:
+        """Write what becomes of each block as it comes; return the exit status."""
         from contextlib import closing
 
         from frametool.cli.sink import writing
         from frametool.stream.run import run
         from frametool.view.progress import ProgressBar
 
-        name = self.path or "stdin"
         with (
             writing(output.path, force=output.force) as write,
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
-            closing(self._outcomes(stream, form, request, name)) as outcomes,  # ends the processes of --jobs
+            closing(outcomes),  # ends the processes of --jobs
         ):
             return run(outcomes, write, self.policy(name), progress.advance)
 
@@ -199,6 +253,12 @@ class Stream:
         from frametool.stream.table_stream import run_table
 
         return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
+
+
+def _signed(begin: bytes, name: str) -> str:
+    """Return the form that a stream shows, if it is no single row of a pose, which may have been pasted."""
+    form = by_sign(begin, *STREAMED, name=name) or ""
+    return "" if form == "kitti" else form
 
 
 def _opened(path: str | None) -> BufferedReader:
@@ -214,6 +274,15 @@ def _opened(path: str | None) -> BufferedReader:
         return BufferedReader(FileIO(path), HEAD)
     except OSError as error:
         raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def _form_of(path: str) -> str:
+    """Return the form of a file by what is in it; "" where nothing tells, or it cannot be read."""
+    try:
+        with open(path, "rb") as file:
+            return detect(file.read(HEAD), *STREAMED, name=path)[0]
+    except (OSError, ValueError):
+        return ""
 
 
 def one_notation(given: Any) -> Any:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, READING, TEXT, VERBOSE, Text, decorated, forms_told, in_option
-from frametool.cli.poses import is_inline, source_of
+from frametool.cli.command import FILE, READING, TEXT, TREES_OPENED, VERBOSE, Text, decorated, forms_told, in_option
+from frametool.cli.pasted_input import is_inline
+from frametool.cli.poses import source_of
 from frametool.cli.stderr import say
 from frametool.errors import shown, warn
 from frametool.formats import FORMATS
-from frametool.formats.load import load_sources
-from frametool.formats.recordings import Recording
 from frametool.grammar.edges import CAMERA_AXES, DH, DIRECTIONS, Answers
 
 if TYPE_CHECKING:
@@ -23,7 +22,8 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from frametool.formats.assembly import Rules
+    from frametool.formats.assembly import Place, Rules
+    from frametool.formats.recordings import Recording
     from frametool.formats.robot import Robot
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
@@ -48,6 +48,13 @@ def _option(*names: str, **rest: Any) -> Callable[[Any], Any]:
 
 
 _quiet_option = _option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+_CAMERA_AXES = _option(
+    "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
+    help="turn cameras to these axes  [default: those that the form of the file has]",
+)  # fmt: skip
+_STAMPS = _option(
+    "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
+)
 _READING_OPTIONS = (
     _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
             help="read only this topic; may be repeated"),
@@ -59,11 +66,15 @@ _READING_OPTIONS = (
             help="names of frames that a form does not name; may be repeated, in the order of the files"),
     _option("--direction", "direction", type=click.Choice(DIRECTIONS),
             help="of matrices whose key does not say which frame they are seen from"),
-    _option("--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
-            help="what the axes of a file's cameras are  [default: as its form has them]"),
+    _CAMERA_AXES,
     _option("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
-    _option("--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"),
+    _STAMPS,
 )  # fmt: skip
+
+
+def pose_reading_options(function: Function) -> Function:
+    """Add to a command of streams the options about trajectories: the times of their poses, the axes of cameras."""
+    return decorated(function, [_CAMERA_AXES, _STAMPS])
 
 
 def load_tree(
@@ -73,10 +84,32 @@ def load_tree(
 
     streams: `--in` is about what is streamed wherever that can be
     """
+    from frametool.formats.load import load_sources  # not every command that may read trees does
+
     files = opened((argument, *more), streams=streams)
     tree = load_sources(files, rules)
     state(files)
     return tree
+
+
+def load_sides(
+    a: Sequence[str], b: Sequence[str], *, normalize: bool, places: Sequence[dict[str, Place]]
+) -> list[FrameTree | TransformBuffer]:
+    """Read two trees that will be compared, each of several files, as `load_tree` does.
+
+    places: are filled with where each frame of the one and the other was said to be
+    """
+    refuse_two_readers((*a, *b))
+    from frametool.formats.assembly import Rules
+    from frametool.formats.load import load_sources
+
+    rules = Rules(normalize=normalize)
+    trees = []
+    for arguments, behind, found in ((a, 0, places[0]), (b, len(a), places[1])):
+        files = opened(arguments, behind=behind, of=len(a) + len(b))
+        trees.append(load_sources(files, rules, found))
+        state(files)
+    return trees
 
 
 def state(files: Sequence[Recording]) -> None:
@@ -84,30 +117,48 @@ def state(files: Sequence[Recording]) -> None:
     context = click.get_current_context(silent=True)
     if context is None:
         return
-    quiet = context.params.get("quiet") or context.meta.get(READING, {}).get("quiet")
     for file in files:
-        if said := ("" if quiet else file.stated) or (file.described if context.meta.get(VERBOSE) else ""):
-            say(said)
+        if context.meta.get(VERBOSE):
+            say(file.known)
+        if file.stated and not is_quiet():
+            say(file.stated)
 
 
-def opened(arguments: Sequence[str], *, streams: bool = False) -> list[Recording]:
+def is_quiet() -> bool:
+    """Return whether the command was called with --quiet."""
+    context = click.get_current_context()
+    return bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
+
+
+def opened(
+    arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None
+) -> list[Recording]:
     """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
 
     streams: as `load_tree` has it
+    behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
+    of: so many files there are in all
     """
-    if list(arguments).count("-") > 1:
-        raise click.UsageError("standard input can be read once; only one argument may be -")
+    from frametool.formats.recordings import Recording, opened_together
+
+    refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
-    told = iter([form for form in forms_told() if _reads_trees(form, streams=streams)])
+    forms = forms_told(streams=streams)[0]
+    _check_forms(forms)
+    if not streams:
+        _refuse_more("--in", forms, of or len(arguments))
+    told = iter(forms[behind:] or forms)
     context = click.get_current_context(silent=True)
-    chosen = dict(context.meta.get(READING, {})) if context is not None else {}
-    chosen.pop("quiet", None)
-    topics = chosen.pop("topics", ())
-    frames = iter(chosen.pop("named_frames", ()))
-    chosen["joints"] = dict(map(_joint, chosen.pop("joints", ())))
-    general = Answers(**{name: value for name, value in chosen.items() if value})
-    return [
+    if context is not None:
+        context.meta[TREES_OPENED] = True
+    topics = _reading("topics")
+    named = _reading("named_frames")
+    if not streams:
+        _refuse_more("--frames", named, of or len(arguments))
+    frames = iter(named[behind:] or named)
+    general = answers()
+    return opened_together(
         Recording.inline(source_of(each))
         if is_inline(each)
         else Recording(
@@ -117,15 +168,38 @@ def opened(arguments: Sequence[str], *, streams: bool = False) -> list[Recording
             answers=general._replace(frames=_frame_names(next(frames, ""))),
         )
         for each in arguments
-    ]
+    )
 
 
-def _reads_trees(form: str, *, streams: bool) -> bool:
-    """Tell whether `--in` is about a file of frames, and not about a stream."""
-    reads = FORMATS[form].reads
-    if "tree" not in reads and not streams:
-        raise click.UsageError(f"--in {form}: no frames are read from that; `frametool formats` lists what is")
-    return "tree" in reads and not (streams and {"rows", "records"} & {*reads})
+def refuse_two_readers(arguments: Sequence[str]) -> None:
+    """Raise a usage error where two arguments stand for standard input."""
+    if list(arguments).count("-") > 1:
+        raise click.UsageError("standard input can be read once; only one argument may be -")
+
+
+def _check_forms(forms: Sequence[str]) -> None:
+    """Refuse a form from which no frames are read."""
+    if other := [form for form in forms if "tree" not in FORMATS[form].reads]:
+        raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
+
+
+def _refuse_more(option: str, values: Sequence[str], files: int) -> None:
+    """Refuse an option that is given more often than there are files."""
+    if len(values) > files:
+        raise click.UsageError(f"{option} is given {len(values)} times for {files} file{'s' * (files != 1)}")
+
+
+def _reading(name: str) -> Any:
+    """Return what an option about files of frames says."""
+    context = click.get_current_context(silent=True)
+    return (context.meta.get(READING, {}) if context is not None else {}).get(name, ())
+
+
+def answers() -> Answers:
+    """Return what the options say about all files whose form leaves it open."""
+    named = {name: _reading(name) for name in Answers._fields if name not in ("joints", "frames")}
+    given = {name: value for name, value in named.items() if value}
+    return Answers(joints=dict(map(_joint, _reading("joints"))), **given)
 
 
 def _joint(text: str) -> tuple[str, str]:
@@ -164,7 +238,8 @@ class Frame(Text):
 
         from frametool.errors import FrametoolError
 
-        named = ctx.params.get("tree") or next(iter(ctx.params.get("arguments") or ()), None)
+        # behind an option that wants a frame click has not come to the arguments
+        named = ctx.params.get("tree") or next(iter(ctx.params.get("arguments") or ctx.args), None)
         if named is None and "arguments" in ctx.params:
             return [CompletionItem(incomplete, type="file")]
         try:

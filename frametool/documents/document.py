@@ -17,7 +17,7 @@ from frametool.text.numbers import odd_characters
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
     from typing import Any
 
     from frametool.documents.marks import Event, Path
@@ -39,10 +39,10 @@ class Document:
         self.source = source
 
 
-def parse_documents(text: str, name: str) -> list[Document]:
+def parse_documents(text: str, name: str, tags: Collection[str] = ()) -> list[Document]:
     """Read every document of a YAML or JSON text; empty ones are left out.
 
-    name: what messages call the text.
+    name: what messages call the text.  tags: of YAML's mappings that are read, as `parse_yaml` has them.
     Values are dict, list, str or None (an empty value, `~`, `null`); keys are text, each once.
     Raises FormatError with line and column.
     """
@@ -52,7 +52,7 @@ def parse_documents(text: str, name: str) -> list[Document]:
     if values is None:
         from frametool.documents.yaml_events import parse_yaml
 
-        values = parse_yaml(source)
+        values = parse_yaml(source, tags)
     return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
 
 
@@ -88,7 +88,7 @@ def format_error(
     source: Source, path: Path, message: str, *, key: bool = False, error: type[FormatError] = FormatError
 ) -> FormatError:
     """Make the error for a value, or its key, at a path: placed, with the source line and a caret."""
-    bare = Source(source.name, source.text.removeprefix(_BYTE_ORDER_MARK))
+    bare = source._replace(text=source.text.removeprefix(_BYTE_ORDER_MARK))
     (offset,) = _offsets(bare.text, [path], key=key)
     return error_at(bare, offset, message, error)
 

@@ -9,6 +9,7 @@ from frametool.documents.source import HEAD, Source, opened, read_text
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from os import PathLike
     from typing import BinaryIO
 
@@ -25,6 +26,8 @@ class InputFile:
         self.path = str(path)
         self.name = "stdin" if self.path == "-" else self.path
         self.form = ""
+        self.beside: Sequence[InputFile] = ()  # all files that are read together
+        self.scopes: list[str] = []  # what stands before its names, once for each, where another file says so
         self.stream: BinaryIO = BytesIO() if folder else stream or opened(path)
 
     def head(self) -> bytes:

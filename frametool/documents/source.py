@@ -59,6 +59,10 @@ class Source(NamedTuple):
     text: str
 
 
+class Pasted(Source):
+    """A text made of one that somebody pasted, who knows nothing of places in it."""
+
+
 def opened(path: str | PathLike[str]) -> BinaryIO:
     """Open a file, or standard input for `-`, with a buffer that can be looked into.
 
@@ -177,6 +181,8 @@ def places_of(text: str, offsets: Sequence[int]) -> list[tuple[int, int]]:
 
 def error_at(source: Source, offset: int, message: str, error: type[FormatError] = FormatError) -> FormatError:
     """Make the error for an offset into the source's text, with the source line and a caret below it."""
+    if isinstance(source, Pasted):
+        return error(message, source=source.name)
     ((line, column),) = places_of(source.text, [offset])
     snippet = pointer(line_of(source.text, line), column)
     return error(message, source=source.name, line=line, column=column, snippet=snippet)

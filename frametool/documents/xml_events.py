@@ -7,6 +7,7 @@ are read too.
 from __future__ import annotations
 
 import re
+from functools import partial
 from math import inf, isfinite
 from typing import NamedTuple
 from xml.parsers import expat
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 DEEPEST_ELEMENT = 100_000
 _BLOCK = 1 << 16
+_OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s;]+;")
 _DECIMALS = "0123456789.-+eE \t\r\n"
 
 
@@ -100,6 +102,7 @@ class XmlFile:
         parser.StartElementHandler, parser.EndElementHandler = start, end
         if ends:
             parser.CharacterDataHandler = read_text
+        parser.StartDoctypeDeclHandler = partial(self._check_doctype, parser)
         parser.EntityDeclHandler = refuse
         parser.ExternalEntityRefHandler = refuse
         for begin in range(0, len(self.data) or 1, _BLOCK):
@@ -116,6 +119,12 @@ class XmlFile:
             yield from found
             found.clear()
 
+    def _check_doctype(self, parser: expat.XMLParserType, _: str, file: str | None, *_more: object) -> None:
+        """Refuse entities of another file, which expat would leave out in silence."""
+        if file and _OTHER_ENTITY.search(self.data.replace(b"\0", b"")):
+            message = f"XML with entities of {shown(file)} is not read; expand them: xmllint --noent --loaddtd FILE"
+            raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
+
     def _broken(self, error: expat.ExpatError) -> FormatError:
         """Say in one line what is no XML."""
         if what := not_text(self.data):
@@ -125,15 +134,19 @@ class XmlFile:
 
     def error(self, element: Element, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
         """Make the error for an element, or for the value of one of its attributes."""
-        line, column = element.line, element.column
-        if attribute:
-            tail = self.data[element.offset : element.offset + _BLOCK]
-            value = re.search(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()), tail)
-            if value:
-                before = tail[: value.end()].decode("utf-8", "replace")
-                line += before.count("\n")
-                column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
+        line, column = self.place(element, attribute)
         return self._at(line, column, message, rule=rule)
+
+    def place(self, element: Element, attribute: str = "") -> tuple[int, int]:
+        """Return line and column of an element, or of the value of one of its attributes."""
+        line, column = element.line, element.column
+        name = re.compile(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()))
+        value = name.search(self.data, element.offset, element.offset + _BLOCK) if attribute else None
+        if value:
+            before = self.data[element.offset : value.end()].decode("utf-8", "replace")
+            line += before.count("\n")
+            column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
+        return line, column
 
     def _at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
         # lines as expat counts them, which are those of every editor

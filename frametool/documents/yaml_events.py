@@ -27,7 +27,7 @@ from frametool.errors import FormatError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Collection, Iterator
     from typing import Any, TypeAlias
 
     from frametool.documents.marks import Event
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
 
+TAG = "!"  # key under which a mapping has its tag: no plain key of YAML looks so
 MOST_ALIASES = 1000
 SPARE_COPIES = 10_000  # what aliases may repeat, beside one value for each character of the text
 
@@ -53,25 +54,26 @@ _KINDS: dict[type, int] = {
 _MOST_DIRECTIVES = 100  # libyaml compares each new %TAG with all before it
 
 
-def parse_yaml(source: Source) -> list[Value]:
+def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
     """Return the value of each document of a YAML text, None for an empty one.
 
     Mappings become dicts with text keys, sequences lists, scalars text, null values None.
+    tags: of mappings that are read (`!Rpy`, `!!opencv-matrix`); the dict then has its tag under the key TAG.
     Raises FormatError.
     """
     if source.text.count("\n%TAG") > _MOST_DIRECTIVES:
         raise error_at(source, source.text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
     with paused_collector():
-        return _read_by_lines(source) or _Builder(source).build()
+        return _read_by_lines(source, tags) or _Builder(source, tags).build()
 
 
-def _read_by_lines(source: Source) -> list[Value] | None:
+def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
     """Read a text that ends in a long list of plain maps; None for others and for mistakes."""
     split = split_run(source.text)
     if split is None:
         return None
     try:
-        values = _Builder(Source(source.name, split[0])).build()
+        values = _Builder(Source(source.name, split[0]), tags).build()
     except FormatError:
         return None
     return values if put_back(values, split[1]) else None
@@ -100,11 +102,12 @@ def yaml_events(text: str) -> Iterator[Event]:
 class _Builder:
     """Build the values of one text; holds what the rare events need beside the loop."""
 
-    __slots__ = ("aliases", "anchors", "copies", "documents", "open", "source")
+    __slots__ = ("aliases", "anchors", "copies", "documents", "open", "source", "tags")
 
-    def __init__(self, source: Source) -> None:
-        """Start with an empty list of documents, and the budget for aliases."""
+    def __init__(self, source: Source, tags: Collection[str]) -> None:
+        """Start with an empty list of documents, the tags that are read, and the budget for aliases."""
         self.source = source
+        self.tags = tags
         self.anchors: dict[str, Value] = {}
         self.aliases = MOST_ALIASES
         self.copies = SPARE_COPIES + len(source.text)
@@ -177,9 +180,12 @@ class _Builder:
                 key = None if kind is MappingStartEvent else item
 
     def _note(self, event: NodeEvent, value: Value) -> None:
-        """Refuse a tag; remember what an anchor names."""
+        """Keep the tag of a mapping if it is one that is read, refuse others; remember what an anchor names."""
         if event.tag is not None:
-            raise self._error(event, f"tag {event.tag.replace('tag:yaml.org,2002:', '!!')} is not read here")
+            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
+            if tag not in self.tags or type(value) is not dict:
+                raise self._error(event, f"tag {tag} is not read here")
+            value[TAG] = tag
         if event.anchor is not None:
             self.anchors[event.anchor] = value
 

@@ -9,10 +9,11 @@ class Format(NamedTuple):
     """A form of text: what it holds, how it is recognised, and the modules that read and write it.
 
     summary: what it is, in a line
-    suffixes: of files in this form
+    suffixes: of files in this form; names: what files are called to which it is written
     reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
-        `records` and `rows` by the streams
-    writes: what is written in it, by `write_poses`, `write_points` (also for a `report`), `write_tree` of `writer`
+        `records` and `rows` by the streams; `trajectory`: it holds one frame that moves
+    writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
+        `write_points` (also for a `report`), `write_tree` of `writer`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
     asks: the options that say what it leaves open
@@ -29,17 +30,31 @@ class Format(NamedTuple):
     states: str = ""
     asks: tuple[str, ...] = ()
     instead: str = ""
+    names: tuple[str, ...] = ()
 
 
 _TREE = "frametool.formats.tree_reader"
 _MESSAGES = "frametool.ros.message_reader"
+_TABLE = "frametool.stream.table_samples"
 BAG = "frametool.ros.bags"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
 _SRDF = (
     "group|group_state|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
     "(?:disable|enable|disable_default)_collisions"
+)
+
+_AT_HEAD = r"(?=(?s:.{0,2000}?)"
+_LENGTH = r"""(?<!\w)%s(?:[_ ]?[({\[]*[ijkn](?: ?- ?1)?[)}\]]*)?["']?\s*(?:[,;:\t ]|[\[(_](?:m|mm|cm)\b|$)"""
+_DH = (
+    rf"(?im)\A(?!\s*<){_AT_HEAD}(?<![^\W_])(?:alpha|\u03b1|twist))"
+    rf"{_AT_HEAD}(?:{_LENGTH % '[ar]'}|link_length)){_AT_HEAD}(?:{_LENGTH % 'd'}|link_offset))"
+)
+_KITTI = (
+    r"\A(?:#[^\n]*\n)*(?:calib_time: *\d|"
+    r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
 )
 
 FORMATS = {
@@ -51,7 +66,7 @@ FORMATS = {
         writes=("poses", "points", "tree", "report"),
         writer="frametool.formats.yaml_format",
         signs=(
-            ("yaml key", "frames"),
+            ("own key", "frames|children"),
             ("line", r"\{ *[A-Za-z_][\w.]*: "),  # no JSON, whatever the suffix says: its keys have quotes
             # a header of CSV whose first column ends in a colon is no key
             ("header", r"""(?!(?!.*(?:[{\[]|: )).*,)(?:---(?:\s|$)|%YAML|- |(?:[\w./-]+|"[^"\n]*"):(?:\s|$)|[\[{])"""),
@@ -69,19 +84,36 @@ FORMATS = {
     "csv": Format(
         "CSV with a header",
         suffixes=(".csv",),
-        reads=("rows",),
-        writes=("poses", "points", "report"),
+        reads=("tree", "rows"),
+        reader=_TABLE,
+        writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.csv_format",
         signs=(("header", r"[^\t]*,[^\t]*$"),),
     ),
     "tsv": Format(
-        "tab-separated values with a header", (".tsv", ".tab"), reads=("rows",), signs=(("header", r".*\t"),)
+        "tab-separated values with a header",
+        (".tsv", ".tab"),
+        reads=("tree", "rows"),
+        reader=_TABLE,
+        signs=(("header", r".*\t"),),
     ),
     "semicolon": Format(
-        "CSV with semicolons and a header", reads=("rows",), signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),)
+        "CSV with semicolons and a header",
+        reads=("tree", "rows"),
+        reader=_TABLE,
+        signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),),
     ),
     "columns": Format("columns between blanks, # comments", reads=("rows",), signs=(("header", r"#|\s*\S+\s+\S"),)),
-    "tum": Format("trajectory: t x y z qx qy qz qw", suffixes=(".tum",), reads=("rows",)),
+    "tum": Format(
+        "trajectory: t x y z qx qy qz qw",
+        suffixes=(".tum",),
+        reads=("tree", "trajectory", "rows"),
+        reader=_TABLE,
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.tum",
+        signs=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
+        states="world<-body, seconds, metres, quaternion x y z w",
+    ),
     "echo": Format(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
         reads=("tree",),
@@ -99,7 +131,7 @@ FORMATS = {
         "CSV of `ros2 topic echo --csv`",
         reads=("tree",),
         reader=_MESSAGES,
-        signs=(("line", r"-?\d+,\d+,[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$"),),
+        signs=(("line", r"-?\d{1,12},\d{1,10},[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$"),),
     ),
     "calls": Format(
         "static_transform_publisher calls",
@@ -130,9 +162,7 @@ FORMATS = {
         writes=("poses", "points", "tree"),
         writer="frametool.ros.echo_format",
     ),
-    "foxglove": Format(
-        "FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"
-    ),
+    "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
     "static1": Format(
         "static_transform_publisher of ROS 1", writes=("poses", "tree"), writer="frametool.ros.publisher"
     ),
@@ -142,6 +172,192 @@ FORMATS = {
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
     "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.dot"),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.mermaid"),
+    "euroc": Format(
+        "EuRoC ground truth",
+        reads=("tree", "trajectory", "rows"),
+        reader=_TABLE,
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.euroc",
+        signs=(
+            ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
+            ("line", rf"\d{{19}}(?:\s*,\s*{_NUMBER}){{7}}(?:(?:\s*,\s*{_NUMBER}){{9}})?\s*$"),
+        ),
+        states="world<-body (R<-S), nanoseconds, metres, quaternion w x y z",
+    ),
+    "colmap": Format(
+        "COLMAP images.txt",
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.colmap",
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.colmap",
+        names=("images.txt",),
+        signs=(
+            ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
+            ("line", rf"\d+(?:[ \t]+{_NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
+        ),
+        states="the file holds camera<-world, quaternion w x y z",
+    ),
+    "nerf": Format(
+        "NeRF transforms.json",
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.nerf",
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.nerf",
+        names=("transforms.json",),
+        signs=(("json path", "frames/transform_matrix"),),
+        states="world<-camera; opengl: x right, y up, z backward",
+    ),
+    "kitti": Format(
+        "KITTI poses",
+        reads=("tree", "trajectory", "rows"),
+        reader=_TABLE,
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.kitti",
+        signs=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),),
+        states="world<-cam0, metres",
+    ),
+    "g2o": Format(
+        "g2o pose graph",
+        suffixes=(".g2o",),
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.g2o",
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.g2o",
+        signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
+        states="vertices, world<-body, quaternion x y z w; edges are not read",
+    ),
+    "open3d": Format(
+        "Open3D camera trajectory",
+        suffixes=(".log",),
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.open3d",
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.open3d",
+        signs=(
+            ("text", rf"\A\ufeff?\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"),
+            ("json path", "parameters/extrinsic"),
+        ),
+        states=".log holds world<-camera, .json camera<-world",
+    ),
+    "bundler": Format(
+        "Bundler's bundle.out",
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.bundler",
+        signs=(("text", r"\A\ufeff?# *Bundle file v"),),
+        states="the file holds camera<-world; opengl: cameras look along -z",
+    ),
+    "colmap-bin": Format(
+        "COLMAP images.bin",
+        signs=(("magic", rb".{4}\0{4}.{4}.{56}.{4}[\x20-\x7e]{1,200}\0"),),
+        instead="write it as text: colmap model_converter --input_path . --output_path . --output_type TXT",
+    ),
+    "autoware": Format(
+        "Autoware sensor calibration",
+        reads=("tree",),
+        reader="frametool.formats.autoware",
+        writes=("tree",),
+        writer="frametool.formats.autoware",
+        signs=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
+        states="parent<-child, metres, radians, roll pitch yaw about fixed axes",
+    ),
+    "camchain": Format(
+        "camera chain of Kalibr, OpenVINS or okvis",
+        reads=("tree",),
+        reader="frametool.formats.camchain",
+        writes=("tree",),
+        writer="frametool.formats.camchain",
+        signs=(("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),),
+        states="target<-source as each key says; metres",
+        asks=("direction", "frames"),
+    ),
+    "opencv": Format(
+        "OpenCV FileStorage",
+        reads=("tree",),
+        reader="frametool.formats.opencv",
+        writes=("tree",),
+        writer="frametool.formats.opencv",
+        signs=(
+            ("xml", "opencv_storage"),
+            ("json path", "*/type_id"),
+            ("text", r"\A\s*%YAML:1\.0|: *!!opencv-"),
+        ),
+        states="target<-source as each key says, camera<-object by rvec and tvec; metres",
+        asks=("direction", "frames"),
+    ),
+    "euroc-sensor": Format(
+        "sensor.yaml of EuRoC",
+        reads=("tree",),
+        reader="frametool.formats.euroc_sensor",
+        signs=(("yaml key", "T_BS"),),
+        states="T_BS is body<-sensor, metres",
+        asks=("frames",),
+    ),
+    "kitti-calib": Format(
+        "KITTI calibration",
+        reads=("tree",),
+        reader="frametool.formats.kitti_calib",
+        signs=(("text", _KITTI),),
+        states="parent<-child, metres, optical axes of cameras",
+        asks=("frames",),
+    ),
+    "drake": Format(
+        "Drake model directives",
+        reads=("tree",),
+        reader="frametool.formats.drake",
+        signs=(("yaml key", "directives"),),
+        states="parent<-frame, metres, degrees, rpy about fixed axes",
+    ),
+    "handeye": Format(
+        "hand-eye calibration of easy_handeye",
+        reads=("tree",),
+        reader="frametool.formats.handeye",
+        writes=("tree",),
+        writer="frametool.formats.handeye",
+        signs=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
+        states="effector (base if not on the hand)<-tracking base, metres, x y z w",
+    ),
+    "nuscenes": Format(
+        "nuScenes table",
+        reads=("tree",),
+        reader="frametool.formats.nuscenes",
+        signs=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
+        states="ego<-sensor, global<-ego, metres, w first, microseconds",
+        asks=("frames",),
+    ),
+    "dh": Format(
+        "Denavit-Hartenberg table",
+        reads=("tree",),
+        reader="frametool.formats.dh",
+        signs=(("text", _DH),),
+        states="parent<-child, metres, radians unless their names say deg",
+        asks=("dh", "frames"),
+    ),
+    "launch": Format(
+        "launch file",
+        suffixes=(".launch",),
+        reads=("tree",),
+        reader="frametool.formats.launch",
+        writes=("tree",),
+        writer="frametool.formats.launch",
+        signs=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
+        states="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
+    ),
+    "mjcf": Format(
+        "MJCF of MuJoCo",
+        suffixes=(".mjcf",),
+        reads=("tree", "joints"),
+        reader="frametool.formats.mjcf",
+        signs=(("xml", "mujoco"),),
+        states="parent<-child, metres; sites and cameras (looking along -z) are site:NAME, camera:NAME",
+    ),
+    "sdf": Format(
+        "SDF of Gazebo",
+        suffixes=(".sdf", ".world"),
+        reads=("tree",),
+        reader="frametool.formats.sdf",
+        signs=(("xml", "sdf"),),
+        states="parent<-child, metres, radians unless degrees; frames are model::link",
+    ),
     "urdf": Format(
         "URDF robot",
         suffixes=(".urdf",),
@@ -162,12 +378,15 @@ FORMATS = {
     ),
     "xacro": Format(
         "xacro, from which URDF is made",
-        signs=(("xml text", r"<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b"),),
+        suffixes=(".xacro",),
+        signs=(  # launch files have the same substitutions
+            ("xml text", r"(?s)\A(?!<launch\b).*?(?:<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b)"),
+        ),
         instead="expand it: xacro FILE > robot.urdf (pip install xacro)",
     ),
     "camera_info": Format(
         "camera_info, the intrinsics of a camera",
-        signs=(("yaml key", "projection_matrix|distortion_model"),),
+        signs=(("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
         instead="there is no pose in it; its frame stands in the tree of the robot",
     ),
     "map": Format(
@@ -177,21 +396,25 @@ FORMATS = {
     ),
     "usd": Format(
         "a USD scene",
+        suffixes=(".usd", ".usda", ".usdc", ".usdz"),
         signs=(("magic", rb"#usda |PXR-USDC"),),
         instead="its units and axes differ from file to file; export URDF, or the poses as JSON",
     ),
     "gltf": Format(
         "a glTF scene",
+        suffixes=(".gltf", ".glb"),
         signs=(("magic", rb"glTF"), ("json path", "asset/version")),
         instead="glTF has y up and z forward; export URDF, or the poses as JSON",
     ),
     "unity": Format(
         "a Unity scene",
+        suffixes=(".unity", ".prefab"),
         signs=(("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),),
         instead="Unity is left-handed with y up; export poses as JSON and convert them",
     ),
     "itk": Format(
         "an ITK or ANTs transform",
+        suffixes=(".tfm",),
         signs=(("magic", rb"#Insight Transform File"),),
         instead="it maps points about a centre in LPS axes, in mm; convert it to a 4x4 matrix first",
     ),
@@ -208,9 +431,20 @@ def unread() -> tuple[str, ...]:
     return tuple(name for name, row in FORMATS.items() if row.instead)
 
 
-def writers(what: str) -> tuple[str, ...]:
-    """Name the forms in which `poses`, `points`, a `tree` or a `report` is written."""
-    return tuple(name for name, row in FORMATS.items() if what in row.writes)
+def writers(*what: str) -> tuple[str, ...]:
+    """Name the forms in which any of `poses`, `points`, a `trajectory`, a `tree` or a `report` is written."""
+    return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.writes))
+
+
+def is_trajectory(name: str) -> bool:
+    """Tell whether a form is that of the poses of one frame over time, and of nothing else."""
+    return name in FORMATS and "trajectory" in FORMATS[name].reads
+
+
+def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
+    """Return which of some forms is written to a file of this name: by the whole name, then by its suffix."""
+    last = (path or "").rpartition("/")[2]
+    return next((name for name in names if last in FORMATS[name].names), None) or by_suffix(path, names)
 
 
 def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:

@@ -5,6 +5,10 @@ Knows nothing of text: whoever reads says where each edge stood.
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from itertools import islice
+from operator import lt
+
 from frametool.errors import BadTopology, FormatError, Tf2Warning, ValueInvalid, shown, warn
 from frametool.frames.policy import Refused
 from frametool.frames.tree import FrameTree
@@ -15,6 +19,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Samples
 
     class Place(Protocol):
         """Where an edge was read."""
@@ -24,6 +29,16 @@ if TYPE_CHECKING:
 
         def seen_from(self, other: Place) -> str:
             """Name this place beside another one: `line 7`, or `other.yaml:7` in another source."""
+
+    class PlacedSamples(Protocol):
+        """Poses of one frame, and where each was read."""
+
+        @property
+        def samples(self) -> Samples:
+            """Return the poses."""
+
+        def place(self, at: int) -> Place:
+            """Return where one of them was read."""
 
 
 class Rules:
@@ -79,6 +94,13 @@ class Assembly:
         self._replaced: list[Replaced] = []
         self._stamps: dict[str, int] = {}  # child -> its one stamp, while it has no other
         self._moves: set[str] = set()
+        self._whole: dict[str, list[PlacedSamples]] = {}  # child -> samples that were taken in one piece
+        self.axes: dict[str, str] = {}  # frame -> the axes of the camera it is
+
+    @property
+    def places(self) -> dict[str, Place]:
+        """Return where each frame that has a parent was first said to hang from it."""
+        return {child: place for child, (_, _, place) in self._first.items()}
 
     def add_root(self, frame: str) -> None:
         """Make a frame known that has no parent (yet)."""
@@ -105,8 +127,51 @@ class Assembly:
         except ValueInvalid as error:
             raise place.error(str(error), FormatError) from None
 
+    def add_samples(self, placed: PlacedSamples) -> None:
+        """Add the poses of one frame: in one piece where nothing can be wrong with their order, else one by one."""
+        parent, child, stamps_ns, components, _ = placed.samples
+        if not stamps_ns:
+            return
+        if self._takes_whole(placed.samples):
+            try:
+                self._moving().insert_many(parent, child, stamps_ns, components)
+            except BadTopology as error:
+                raise self._placed(error, parent, child, placed.place(0)) from None
+            self._first.setdefault(child, (parent, components[0], placed.place(0)))
+            self._stamps.setdefault(child, stamps_ns[0])
+            self._moves.add(child)
+            self._whole.setdefault(child, []).append(placed)
+            return
+        for at, (stamp_ns, pose) in enumerate(zip(stamps_ns, components, strict=True)):
+            self.add(parent, child, pose, stamp_ns, placed.place(at))
+
+    def _takes_whole(self, samples: Samples) -> bool:
+        """Tell whether samples can only follow what is known: of a frame that is new or moves in the same parent."""
+        if self.rules.policy != "frametool" or self.rules.keep_ns is not None or len(samples.stamps_ns) == 1:
+            return False
+        track = None if self.buffer is None else self.buffer.track(samples.child)
+        if track is None:
+            follows = samples.child not in self._first
+        else:
+            follows = samples.child in self._moves and not track.standing and track.parent == samples.parent
+            follows = follows and track.last_ns < samples.stamps_ns[0]  # type: ignore[union-attr]
+        return follows and all(map(lt, samples.stamps_ns, islice(samples.stamps_ns, 1, None)))
+
+    def _place_before(self, child: str, stamp_ns: int) -> Place | None:
+        """Find where the sample of a stamp stood among those taken in one piece."""
+        for placed in self._whole.get(child, ()):
+            at = bisect_left(placed.samples.stamps_ns, stamp_ns)
+            if at < len(placed.samples.stamps_ns) and placed.samples.stamps_ns[at] == stamp_ns:
+                return placed.place(at)
+        return None
+
     def finish(self) -> FrameTree | TransformBuffer:
         """Return the tree, or the buffer if anything moves."""
+        made = self._finished()
+        made.camera_axes |= self.axes
+        return made
+
+    def _finished(self) -> FrameTree | TransformBuffer:
         if self.buffer is None:
             return self.tree
         standing = set()
@@ -156,7 +221,8 @@ class Assembly:
         if stamp_ns is not None:
             places = self._places.setdefault(child, {})
             if replaced:
-                self._replaced.append(Replaced(parent, child, stamp_ns, places.get(stamp_ns, place), place))
+                earlier = places.get(stamp_ns) or self._place_before(child, stamp_ns) or place
+                self._replaced.append(Replaced(parent, child, stamp_ns, earlier, place))
             places[stamp_ns] = place
 
     def _tell_replaced(self, standing: set[str], most: int = 10) -> None:

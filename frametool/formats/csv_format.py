@@ -1,7 +1,9 @@
 """CSV: a header with the column names of the representations, then one row a result.
 
-name,parent,x,y,z,qx,qy,qz,qw
-camera,map,1.0,2.0,3.0,0.0,0.0,0.0,1.0
+    name,parent,x,y,z,qx,qy,qz,qw
+    camera,map,1.0,2.0,3.0,0.0,0.0,0.0,1.0
+
+Metres, radians unless the column says degrees; the pose of `name` in `parent`.
 """
 
 from __future__ import annotations

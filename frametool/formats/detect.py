@@ -9,11 +9,13 @@ Kinds of signs in the table, the strongest first.  Above the suffix, a sign belo
     xml        the root element
     json path  the way to a key that is not outermost: keys with slashes between them, * for any; lists do not count
     json key   a key of the outermost object, or of the objects in the outermost list
+    own key    a pattern of a key at the beginning of a line that makes YAML ours, whatever stands in it or beside it
     yaml key   a pattern of a key at the beginning of a line
     yaml inner a pattern of a key that stands deeper
     text       a pattern found in the first characters
     line       a pattern of the first line of data, behind blank lines, comments and what tools print
-    leaves     a pattern of all the keys that have a number beside them
+    leaves     a pattern of the keys that have a number beside them, behind a slash for each key above them; of five
+               one may be another, so that a misspelt one is told where it stands
 
 Below it, the first form that looks so is taken:
 
@@ -29,7 +31,7 @@ from contextlib import suppress
 from functools import cached_property
 
 from frametool.documents.source import LOOKED_AT, UTF16, not_text
-from frametool.errors import FormatError, shown
+from frametool.errors import FormatError, bare, shown
 from frametool.formats import FORMATS, by_suffix, readers, unread
 
 TYPE_CHECKING = False
@@ -99,13 +101,35 @@ class Beginning:
 
     @cached_property
     def yaml_inner_keys(self) -> set[str]:
-        """Return the words behind the blanks or dashes of a line that a colon follows."""
-        return {found[2] for found in re.finditer(rf"(?m)^[ -]+{_YAML_KEY}", self.text)}
+        """Return the words behind the blanks or dashes of a line, and a brace, that a colon follows."""
+        return {found[2] for found in re.finditer(rf"(?m)^[ -]+\{{? *{_YAML_KEY}", self.text)}
 
     @cached_property
-    def number_keys(self) -> set[str]:
-        """Return the words with a colon and a number behind them."""
-        return {found[2] for found in re.finditer(rf"(?m)(?:^|[ ,{{]){_YAML_KEY}[ \t]*[-+]?\.?\d", self.text)}
+    def leaves(self) -> set[str]:
+        """Return the keys of YAML's maps with a number beside them, behind a slash for each key above them.
+
+        A list in between is a `[`.
+        """
+        from frametool.documents.marks import END, LEAF, LIST, MAP
+        from frametool.documents.yaml_events import yaml_events
+
+        found: set[str] = set()
+        outer: list[tuple[str, str | None]] = []
+        way, key = "", None  # what leads to the keys of a map; the key whose value comes next
+        for kind, word, *_ in yaml_events(self.text[:LOOKED_AT]):
+            if kind == END:
+                way, key = outer.pop()
+            elif kind == LEAF and outer and not way.endswith("[") and key is None:
+                key = word
+            elif kind == LEAF:
+                if key is not None and re.match(r"[-+]?\.?\d", word):
+                    found.add(way + key)
+                key = None
+            else:
+                outer.append((way, None))
+                way += "[" if kind == LIST else "/" if len(outer) > 1 and kind == MAP else ""
+                key = None
+        return found
 
     @cached_property
     def xml(self) -> str:
@@ -131,16 +155,17 @@ def _has_delimiter(line: str) -> bool:
 # kind -> whether a beginning shows what a row says, the strongest first
 _STRONG: dict[str, Shows] = {
     "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
-    "xml text": lambda begin, what: re.search(what, begin.xml) is not None,
-    "xml child": lambda begin, what: re.fullmatch(what, "/".join(begin.elements)) is not None,
+    "xml text": lambda begin, what: bool(begin.xml) and re.search(what, begin.xml) is not None,
+    "xml child": lambda begin, what: bool(begin.xml) and re.fullmatch(what, "/".join(begin.elements)) is not None,
     "xml": lambda begin, what: begin.elements[:1] == [what],
     "json path": lambda begin, what: any(_leads(path, what.split("/")) for path in begin.json_paths),
     "json key": lambda begin, what: (what,) in begin.json_paths,
+    "own key": lambda begin, what: _any_is(begin.yaml_keys, what),
     "yaml key": lambda begin, what: _any_is(begin.yaml_keys, what),
     "yaml inner": lambda begin, what: _any_is(begin.yaml_inner_keys, what),
     "text": lambda begin, what: re.search(what, begin.text) is not None,
     "line": lambda begin, what: re.match(what, begin.data_line) is not None,
-    "leaves": lambda begin, what: all(re.fullmatch(what, key) for key in begin.number_keys or " "),
+    "leaves": lambda begin, what: 5 * _count(begin.leaves, what) >= 4 * max(1, len(begin.leaves)),
 }
 _WEAK: dict[str, Shows] = {
     "begin": lambda begin, what: re.match(what, begin.text) is not None,
@@ -152,18 +177,33 @@ def _leads(path: tuple[str, ...], way: list[str]) -> bool:
     return len(path) == len(way) and all(step in (key, "*") for key, step in zip(path, way, strict=True))
 
 
+def _count(keys: set[str], pattern: str) -> int:
+    return sum(re.fullmatch(pattern, key) is not None for key in keys)
+
+
 def _any_is(keys: set[str], pattern: str) -> bool:
     return any(re.fullmatch(pattern, key) for key in keys)
 
 
-def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> list[str]:
-    """Return the forms that show a sign of the strongest kind that is shown at all."""
+def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> tuple[list[str], str]:
+    """Return the forms that show a sign of the strongest kind that is shown at all, and that kind."""
     for kind, shows in tests.items():
         if found := [
             name for name in names if any(kind == of and shows(begin, what) for of, what in FORMATS[name].signs)
         ]:
-            return found
-    return []
+            return found, kind
+    return [], ""
+
+
+# kind -> by what a file was known; all others by its keys
+_KNOWN_BY = {
+    "magic": "its first bytes",
+    "xml text": "its elements",
+    "xml child": "its elements",
+    "xml": "its root element",
+    "text": "its first lines",
+    "line": "its first line",
+}
 
 
 def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
@@ -171,12 +211,25 @@ def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
 
     Raises FormatError if two forms fit, or one that is known and not read.
     """
-    found = _fitting(Beginning(head), _STRONG, (*readers(*reads), *unread()))
+    return _by_sign(Beginning(head), *reads, name=name)[0]
+
+
+def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]:
+    """Return the form whose sign is shown, and by what it is known; a form that is read goes before one that is not."""
+    fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *unread()))
+    found = [form for form in fitting if not FORMATS[form].instead] or fitting
+    if not found:
+        return None, ""
+    if FORMATS[found[0]].instead:
+        raise not_read(found[0], name)
     if len(found) > 1:
         raise FormatError(f"fits {' and '.join(found)}; give --in {'|'.join(found)}", source=name or "stdin")
-    if found and (instead := FORMATS[found[0]].instead):
-        raise FormatError(f"{FORMATS[found[0]].summary}: {instead}", source=name or "stdin")
-    return found[0] if found else None
+    return found[0], _KNOWN_BY.get(kind, "its keys")
+
+
+def not_read(form: str, name: str) -> FormatError:
+    """Make the error for a file of a form that is known and not read: what it is, what to do."""
+    return FormatError(f"{FORMATS[form].summary}: {FORMATS[form].instead}", source=name or "stdin")
 
 
 def of_folder(path: str) -> str | None:
@@ -188,27 +241,56 @@ def of_folder(path: str) -> str | None:
     return None
 
 
-def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "") -> tuple[str, str]:
+def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty: str = "") -> tuple[str, str]:
     """Return the form of a file and by what it was known, among the forms from which `reads` is read.
 
-    head: its first bytes; name: of the file, "" for standard input; otherwise: the form if nothing tells.
+    head: its first bytes; name: of the file, "" for standard input; otherwise: the form if nothing tells; empty: that
+    of a file in which there is nothing but comments.
     Raises FormatError if nothing tells and there is no such form, or two forms fit.
     """
-    if form := by_sign(head, *reads, name=name):
-        return form, "its first bytes"
+    begin = Beginning(head)
+    form, known_by = _by_sign(begin, *reads, name=name)
+    if form:
+        return form, known_by
     if "tree" not in reads and (what := not_text(head)):
         raise FormatError(what, source=name or "stdin")
+    if "tree" in reads and begin.xml:
+        raise _unknown(begin, *reads, name=name)
     if form := by_suffix(name, readers(*reads)):
         return form, f"the suffix {name[name.rfind('.'):].lower()}"
-    begin = Beginning(head)
-    if found := _fitting(begin, _WEAK, readers(*reads)):
+    if form := by_suffix(name, unread()):
+        raise not_read(form, name)
+    if (what := not_text(head)) and not head.startswith(UTF16):
+        raise FormatError(what, source=name or "stdin")
+    found, _ = _fitting(begin, _WEAK, readers(*reads))
+    if found:
         return found[0], "its first line"
     if otherwise:
         return otherwise, "nothing else"
+    if not begin.data_line and empty:
+        return empty, "nothing else"
     if not begin.text.strip():
         raise FormatError("nothing in it", source=name or "stdin")
-    raise FormatError(
-        f"cannot tell the form of {shown(begin.first_line[:60])}; give --in {'|'.join(readers(*reads))}",
+    if "records" in reads or not re.search(_LIKE_YAML, begin.text):
+        raise _unknown(begin, *reads, name=name)
+    return "yaml", "nothing else"
+
+
+_LIKE_YAML = r"""(?m):(?:\s|$)|^\s*[-?&!{[]"""  # a key, a list, or what else may begin a value
+_MOST_NAMED = 8
+
+
+def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
+    """Make the error for a file that shows no sign: how it begins, which forms there are."""
+    likely = readers(*reads)
+    what = shown(begin.first_line.strip()[:40])
+    if begin.xml:
+        likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].signs))
+        what = f"XML with the root element {bare(''.join(begin.elements[:1]))}"
+    more = f" and {len(likely) - _MOST_NAMED} more" if len(likely) > _MOST_NAMED else ""
+    named = f"{', '.join(likely[:_MOST_NAMED])}{more}"
+    return FormatError(
+        f"cannot tell the form of {what}; forms: {named}; `frametool formats` lists all, --in FORM names one",
         source=name or "stdin",
         line=1,
     )

@@ -1,6 +1,8 @@
 """Graphviz: one node a frame, one arrow an edge from parent to child, labelled with its pose.
 
-"base" -> "camera" [label="xyz 0.1 0.0 1.2\\nrpy 0.0 15.0 0.0 deg"];
+    "base" -> "camera" [label="xyz 0.1 0.0 1.2\\nrpy 0.0 15.0 0.0 deg"];
+
+Metres and degrees; read by graphviz, not by frametool.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """JSON: one object a line, the keys of the pose grammar, numbers as Python's repr.
 
-{"name": "camera", "parent": "map", "xyz": [1.0, 2.0, 3.0], "quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    {"name": "camera", "parent": "map", "xyz": [1.0, 2.0, 3.0], "quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+
+Metres, radians unless the key says degrees; the pose of `name` in `parent`.
 """
 
 from __future__ import annotations

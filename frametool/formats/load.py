@@ -6,13 +6,13 @@ from os import PathLike
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.collector import paused_collector
-from frametool.documents.document import format_error, locate
+from frametool.documents.document import format_error, locate, locate_many
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, alternatives
 from frametool.formats import readers
 from frametool.formats.assembly import Assembly, Rules
-from frametool.formats.recordings import Recording, refuse_unknown_joints
-from frametool.grammar.edges import Answers
+from frametool.formats.recordings import Recording, close_all, opened_together, refuse_unknown_joints
+from frametool.grammar.edges import Answers, Samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -40,6 +40,17 @@ class EdgePlace(NamedTuple):
         line = locate(self.file.text, self.edge.path)[0] if self.edge.path else self.edge.line
         same = isinstance(other, EdgePlace) and other.file.name == self.file.name
         return f"line {line}" if same else f"{self.file.name}:{line}"
+
+
+class SamplesOfFile(NamedTuple):
+    """Poses of one frame, and the file they were read from."""
+
+    file: Recording
+    samples: Samples
+
+    def place(self, at: int) -> EdgePlace:
+        """Return where one of them was read."""
+        return EdgePlace(self.file, self.samples.edge(at))
 
 
 def load(
@@ -72,27 +83,53 @@ def load(
     values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in given.items()}
     joint_files = () if joints is None or given is joints else (str(joints),)
     known = Answers(tuple(frames), joints=values, joint_files=joint_files, **answers)
-    return load_sources([Recording(path, form=format, topics=chosen, answers=known) for path in paths], rules)
+    files = (Recording(path, form=format, topics=chosen, answers=known) for path in paths)
+    return load_sources(opened_together(files), rules)
 
 
-def load_sources(sources: Sequence[Source | Recording], rules: Rules | None = None) -> FrameTree | TransformBuffer:
-    """Merge the frames of several texts and files; otherwise as `load`."""
+def load_sources(
+    sources: Sequence[Source | Recording], rules: Rules | None = None, places: dict[str, Place] | None = None
+) -> FrameTree | TransformBuffer:
+    """Merge the frames of several texts and files; otherwise as `load`.
+
+    places: is filled with where each frame was first said to hang from its parent
+    """
     assembly = Assembly(", ".join(source.name for source in sources), rules)
-    with paused_collector():
-        files = [Recording.inline(source) if isinstance(source, Source) else source for source in sources]
-        for file in files:
-            _add(assembly, file)
-        refuse_unknown_joints(files)
-        return assembly.finish()
+    try:
+        with paused_collector():
+            files = [Recording.inline(source) if isinstance(source, Source) else source for source in sources]
+            for file in files:
+                _add(assembly, file)
+            refuse_unknown_joints(files)
+            tree = assembly.finish()
+    finally:
+        close_all(sources)
+    if places is not None:
+        places |= assembly.places
+    return tree
+
+
+def lines_of(places: Sequence[Place]) -> list[tuple[str, int]]:
+    """Return file and line of many places, each file walked once; 0 where a line says nothing."""
+    edges = [place for place in places if isinstance(place, EdgePlace)]
+    lines: dict[int, int] = {}
+    for file in {id(each.file): each.file for each in edges}.values():
+        inside = [each for each in edges if each.file is file and each.edge.path]
+        found = locate_many(file.text, [each.edge.path for each in inside]) if inside else []
+        lines |= {id(each): line for each, (line, _) in zip(inside, found, strict=True)}
+    return [(each.file.name, lines.get(id(each), each.edge.line)) for each in edges]
 
 
 def _add(assembly: Assembly, file: Recording) -> None:
-    edge = None
+    piece = None
     rules = assembly.rules
-    for edge in file.edges(raw=rules.policy != "frametool", normalize=rules.normalize):
-        if edge.parent is None:
-            assembly.add_root(edge.child)
+    for piece in file.pieces(raw=rules.policy != "frametool", normalize=rules.normalize):
+        if isinstance(piece, Samples):
+            assembly.add_samples(SamplesOfFile(file, piece))
+        elif piece.parent is None:
+            assembly.add_root(piece.child)
         else:
-            assembly.add(edge.parent, edge.child, edge.components, edge.stamp_ns, EdgePlace(file, edge))
-    if edge is None:
+            assembly.add(piece.parent, piece.child, piece.components, piece.stamp_ns, EdgePlace(file, piece))
+    if piece is None:
         raise FormatError("no frames in it", source=file.name)
+    assembly.axes |= file.tally.axes

@@ -1,6 +1,8 @@
 """Mermaid: a flowchart from parents to children, edges labelled with their poses.
 
-n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]
+    n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]
+
+Metres and degrees; read by mermaid, not by frametool.
 """
 
 from __future__ import annotations

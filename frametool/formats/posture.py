@@ -58,7 +58,7 @@ class Posture:
         self._take_options()
         self._tell_limits()
         self.given = frozenset((*self.still, *self.moving))
-        self._told = set(self.given)
+        self.told = set(self.given)
         self._follow(fail)
         options.tally.has_joints = True
         options.tally.about = options.tally.about or self._about()
@@ -197,8 +197,8 @@ class Posture:
             self.still[name] = followed(joint, self.still[leader])
         else:
             self.still[name] = followed(joint, JointValue(0.0)) if mimic else joint.start
-        if leader in self._told:
-            self._told.add(name)
+        if leader in self.told:
+            self.told.add(name)
 
     def _tell_limits(self) -> None:
         """Note the values told that lie beyond limits, and steps that a pose cannot follow."""
@@ -219,7 +219,7 @@ class Posture:
 
     def _about(self) -> str:
         """Say how many joints stand where nobody said."""
-        free = [joint for joint in self.joints.values() if joint.name not in self._told]
+        free = [joint for joint in self.joints.values() if joint.name not in self.told]
         if not free:
             return ""
         at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)

@@ -11,7 +11,7 @@ from frametool.documents.input_file import InputFile
 from frametool.errors import BadAnswer, FileProblem, FormatError, warn
 from frametool.formats import BAG, FORMATS
 from frametool.formats.detect import detect, of_folder
-from frametool.grammar.edges import Answers, Edge, Options, Tally, Topics, stop
+from frametool.grammar.edges import Answers, Edge, Options, Samples, Tally, Topics, stop
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -44,8 +44,10 @@ class Recording(InputFile):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
         try:
-            self.form = form or folder or detect(self.head(), "tree", name=self.path, otherwise="yaml")[0]
-        except FormatError:
+            self.form, self.known_by = form or folder or "", "what it holds" if folder else ""
+            if not self.form:
+                self.form, self.known_by = detect(self.head(), "tree", name=self.path, empty="yaml")
+        except BaseException:
             self.close()
             raise
         self.tally = Tally()
@@ -70,15 +72,31 @@ class Recording(InputFile):
         return f"{self.name}: {FORMATS[self.form].summary}"
 
     @property
+    def known(self) -> str:
+        """Say what the file was taken for, and by what it was known, unless that was told."""
+        return f"{self.described}{f', known by {self.known_by}' if self.known_by else ''}"
+
+    @property
     def stated(self) -> str:
         """Say what a file that was read means, if its form is not one of ours: directions, units, what was assumed."""
-        states = FORMATS[self.form].states
-        return f"{self.described}{', ' if self.tally.about else ''}{self.tally.about}; {states}" if states else ""
+        states, about = FORMATS[self.form].states, self.tally.about
+        said = f"{self.described}{', ' if about else ''}{about}" if states or about else ""
+        return f"{said}; {states}" if states else said
 
     def edges(
         self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
     ) -> Iterator[Edge]:
-        """Yield the edges in the order they were written, then warn of what was odd.
+        """Yield the edges in the order they were written, then warn of what was odd; otherwise as `pieces`."""
+        for piece in self.pieces(report, tell=tell, raw=raw, normalize=normalize):
+            if isinstance(piece, Samples):
+                yield from piece.edges()
+            else:
+                yield piece
+
+    def pieces(
+        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
+    ) -> Iterator[Edge | Samples]:
+        """Yield edges, and the poses of one frame that come in bulk as one piece, in the order they were written.
 
         report: takes the errors, and reading goes on behind them where it can; without it the first one is raised.
         tell: without it what was odd is only kept, in `tally`.  raw: messages as tf2 receives them, unchecked.
@@ -86,7 +104,8 @@ class Recording(InputFile):
         """
         try:
             options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
-            yield from import_module(FORMATS[self.form].reader).read(self, options)
+            found = import_module(FORMATS[self.form].reader).read(self, options)
+            yield from self._scoped(found) if self.scopes else found
         finally:
             self.close()
         if missing := self.topics.missing():
@@ -98,6 +117,42 @@ class Recording(InputFile):
         """Warn of what was odd in the file, once it was read."""
         for told in self.tally.told():
             warn(f"{self.name}:{told.line}: {told.message}")
+
+    def _scoped(self, edges: Iterable[Edge]) -> Iterator[Edge]:
+        """Yield the edges under each of the scopes that another file gives them."""
+        for edge in edges:
+            for scope in self.scopes:
+                child, parent = (
+                    name and _in_scope(name, scope, has_own=self.form == "sdf") for name in (edge.child, edge.parent)
+                )
+                yield edge._replace(child=child or "", parent=parent)
+
+
+def _in_scope(name: str, scope: str, *, has_own: bool) -> str:
+    """Return a name in a scope, which takes the place of its own; the world is one for all."""
+    if name == "world":
+        return name
+    return f"{scope}::{(name.partition('::')[2] or '__model__') if has_own else name}"
+
+
+def opened_together(files: Iterable[Recording]) -> list[Recording]:
+    """Return files that are opened one after the other; where one cannot be, the others are closed again."""
+    found: list[Recording] = []
+    try:
+        found.extend(files)
+    except BaseException:
+        close_all(found)
+        raise
+    for file in found:
+        file.beside = found
+    return found
+
+
+def close_all(files: Iterable[Source | Recording]) -> None:
+    """Let go of files, those among them that were not read."""
+    for file in files:
+        if isinstance(file, Recording):
+            file.close()
 
 
 def refuse_unknown_joints(files: Sequence[Recording]) -> None:

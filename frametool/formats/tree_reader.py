@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
+from frametool.documents.source import Pasted
 from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.edges import Edge
@@ -63,7 +64,8 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     """Warn of what was noted while reading, each with its place; only count what exceeds `most`."""
     places = locate_many(source.text, [note.path for note in notes[:most]])
     for (line, column), note in zip(places, notes[:most], strict=True):
-        warn(f"{source.name}:{line}:{column}: {note.message}")
+        place = source.name if isinstance(source, Pasted) else f"{source.name}:{line}:{column}"
+        warn(f"{place}: {note.message}")
     if len(notes) > most:
         warn(f"{source.name}: {len(notes) - most} more like these")
 
@@ -86,8 +88,21 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
     else:
         raise Misfit(
             f"no frame tree: expected frames:, transforms: or an entry with name: and parent:; "
-            f"found the keys {', '.join(map(repr, list(value)[:8]))}",
+            f"found the keys {shown_keys(value)}",
         )
+
+
+def shown_keys(value: dict[str, Any]) -> str:
+    """Name the first keys of a mapping in quotes, within some sixty characters."""
+    named = ""
+    for key in value:
+        if len(more := f"{named}{', ' * bool(named)}{shown(key)}") > MOST_SHOWN and named:
+            return f"{named} .."
+        named = more
+    return named
+
+
+MOST_SHOWN = 70  # characters of the keys found
 
 
 def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:

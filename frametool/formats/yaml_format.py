@@ -1,9 +1,11 @@
 """YAML: one document a result, in the grammar that poses and trees are read in.
 
-name: camera
-parent: map
-xyz: [1.0, 2.0, 3.0]
-quaternion: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
+    name: camera
+    parent: map
+    xyz: [1.0, 2.0, 3.0]
+    quaternion: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
+
+Metres, radians unless the key says degrees; the pose of `name` in `parent`.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from frametool.errors import BadTopology, ValueInvalid, shown, warn
@@ -12,6 +13,8 @@ from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
 from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StandingTrack
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.frames.track import Track
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Rigid
@@ -84,6 +87,21 @@ class TransformBuffer(Frames):
         standing = stamp_ns is None if static is None else static
         stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
         return self._admit(parent, child, components, stamp, standing=standing, authority=authority)
+
+    def insert_many(self, parent: str, child: str, stamps_ns: Sequence[int], components: Sequence[Rigid]) -> None:
+        """Add poses of one frame that moves, each later than the one before and than all that is known of the frame.
+
+        Otherwise as `insert_components`, and much faster; where that rule or the policy needs a look at each pose, they
+        are added one by one.
+        """
+        self.insert_components(parent, child, components[0], stamps_ns[0])
+        track = self._tracks[child]
+        within = stamps_ns[0] > -FURTHEST_NS and stamps_ns[-1] < FURTHEST_NS
+        if not self._plain or track.standing or not within or not all(map(isfinite, map(sum, components))):
+            for stamp_ns, each in zip(stamps_ns[1:], components[1:], strict=True):
+                self.insert_components(parent, child, each, stamp_ns)
+        else:
+            track.extend(stamps_ns[1:], components[1:])
 
     def _admit(
         self, parent: str, child: str, components: Rigid, stamp_ns: int, *, standing: bool, authority: str,

@@ -39,6 +39,7 @@ class Frames:
         self._tracks: dict[str, Track] = {}
         self._frames: dict[str, None] = {}
         self._queries: dict[tuple[str, str], Query] = {}
+        self.camera_axes: dict[str, str] = {}  # of frames that are cameras, where their file says it
         self._varies = False  # whether any frame has ever changed its parent
         self._loops = False  # whether newest parents were found to form a circle
 

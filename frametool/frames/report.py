@@ -14,14 +14,20 @@ SHORTEST = 0.0001  # seconds: tf2 divides by no less
 
 
 def motion(track: MovingTrack) -> str:
-    """Return in a few words how a frame moves: `41 samples  10 Hz  0.000000000 .. 4.000000000`."""
+    """Return in a few words how a frame moves: `41 at 10 Hz, 0 .. 4 s`."""
     first, last = track.span
     if first == last:
-        return f"1 sample  {format_stamp(first)}" if track.count == 1 else f"{track.count} samples at once"
+        return f"one at {_short(first)} s" if track.count == 1 else f"{track.count} at once"
     rate = (track.count - 1) * BILLION / (last - first)
     changes = sum(1 for _ in track.changes())
-    other = f"  {changes} change{'s' if changes > 1 else ''} of parent" if changes else ""
-    return f"{track.count} samples  {rate:.4g} Hz  {format_stamp(first)} .. {format_stamp(last)}{other}"
+    times = f" {changes} times" if changes > 1 else ""
+    other = f", reparented{times}" if changes else ""
+    return f"{track.count} at {rate:.4g} Hz, {_short(first)} .. {_short(last)} s{other}"
+
+
+def _short(stamp_ns: int) -> str:
+    """Write a stamp without the zeros at its end."""
+    return format_stamp(stamp_ns).rstrip("0").removesuffix(".")
 
 
 class CacheEntry:

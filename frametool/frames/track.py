@@ -12,7 +12,7 @@ from frametool.geometry import floats, segment
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from typing import Any, Literal, TypeAlias
 
     from frametool.geometry.types import Rigid
@@ -127,6 +127,15 @@ class MovingTrack:
         for (_, before, _), (stamp_ns, after, _) in pairwise(self.walk()):
             if before != after:
                 yield stamp_ns
+
+    def extend(self, stamps_ns: Sequence[int], components: Sequence[Rigid]) -> None:
+        """Append samples under the newest parent, in the order of time and later than all others."""
+        page = self.tail
+        page.stamps.extend(stamps_ns)
+        page.parents.extend([self.parent] * len(stamps_ns))
+        page.samples.extend(components)
+        self.last_ns = page.stamps[-1]
+        self.table = None
 
     def add(self, stamp_ns: int, parent: str, components: Rigid) -> None:
         """Sort a sample in, after those of the same stamp."""

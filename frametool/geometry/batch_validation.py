@@ -25,24 +25,28 @@ NONE = np.empty(0, np.int64)
 
 
 class Rotations(NamedTuple):
-    """Unit quaternions of n rows, the reasons of those that are no rotation, and the rows that were normalised."""
+    """Unit quaternions of n rows, the reasons of those that are no rotation, and the rows that were normalised.
+
+    off: how far the worst row was from a rotation, of those that are not refused
+    """
 
     quaternions: Components
     reasons: dict[int, str]
     mended: Indices
+    off: float = 0.0
 
 
 def read_rotations(
     notation: Notation, numbers: Sequence[Array], *, degrees: bool = False, normalize: bool = False
 ) -> Rotations:
     """Return the quaternions of rows of numbers in column order; the identity stands for rows that are no rotation."""
-    quaternions, off = _converted(notation, tuple(numbers), degrees=degrees, normalize=normalize)
+    quaternions, off, worst = _converted(notation, tuple(numbers), degrees=degrees, normalize=normalize)
     if off is None:
-        return Rotations(tuple(quaternions), {}, NONE)
+        return Rotations(tuple(quaternions), {}, NONE, worst)
     refused = np.flatnonzero(off == np.inf)
     reasons = {row: _reason(notation, [number[row] for number in numbers], normalize) for row in refused.tolist()}
     quaternions[:, refused] = np.reshape(IDENTITY, (4, 1))
-    return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)))
+    return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)), worst)
 
 
 def require_rotations(notation: Notation, given: Components, name: str, *, normalize: bool = False) -> Components:
@@ -52,19 +56,22 @@ def require_rotations(notation: Notation, given: Components, name: str, *, norma
         ValueInvalid: naming the first row that is no rotation, and how many there are.
     """
     shape = arrays.batch_shape(given)
-    quaternions, off = _converted(notation, given, degrees=False, normalize=normalize)
+    quaternions, off, _ = _converted(notation, given, degrees=False, normalize=normalize)
     if off is not None:
         _refuse_or_warn(notation, given, name, off.reshape(shape), normalize=normalize)
     return tuple(quaternions.reshape(4, *shape))
 
 
-def _converted(notation: Notation, given: Components, *, degrees: bool, normalize: bool) -> tuple[Array, Array | None]:
-    """Return quaternions (4, n) and how far each row was off: inf if refused; None if no row needs a word."""
+def _converted(
+    notation: Notation, given: Components, *, degrees: bool, normalize: bool
+) -> tuple[Array, Array | None, float]:
+    """Return quaternions (4, n), how far each row was off (inf if refused; None if no row needs a word), the worst."""
     quaternions = np.empty((4, int(np.prod(arrays.batch_shape(given)))))
-    off = None
+    off, worst = None, 0.0
     with np.errstate(all="ignore"):
         for place, block in arrays.cut(given, 4):
-            grades, right = _repaired(notation.representation.batch, block, normalize=normalize)
+            grades, right, furthest = _repaired(notation.representation.batch, block, normalize=normalize)
+            worst = max(worst, furthest)
             results = notation.to_quaternion(right, arrays, degrees=degrees)
             if notation.representation.batch is None and not arrays.all_finite(results):
                 grades = np.where(np.isfinite(sum(results)), 0.0, np.inf)
@@ -73,21 +80,24 @@ def _converted(notation: Notation, given: Components, *, degrees: bool, normaliz
             if grades is not None:
                 off = np.zeros(quaternions.shape[1]) if off is None else off
                 off[place] = grades
-    return quaternions, off
+    return quaternions, off, worst
 
 
-def _repaired(rule: BatchRule | None, block: Components, *, normalize: bool) -> tuple[Array | None, Components]:
-    """Return how far the rows of a block are off, None if no row needs a word; and the block made rotations."""
+def _repaired(
+    rule: BatchRule | None, block: Components, *, normalize: bool
+) -> tuple[Array | None, Components, float]:
+    """Return how far the rows of a block are off, None if no row needs a word; the block made rotations; the worst."""
     if rule is None:
-        return None, block
+        return None, block, 0.0
     off = rule.deviation(*block, arrays)
-    worst = arrays.largest(off)
+    worst = float(arrays.largest(off))
     if worst <= min(rule.exact, SILENT):
-        return None, block
+        return None, block, worst
     refused = ~(off < np.inf) if normalize else ~(off <= TOLERATED)
     rough = np.flatnonzero((off > rule.exact) & ~refused)
     grades = None if worst <= SILENT else np.where(refused, np.inf, 0.0 if normalize else off)
-    return grades, _with_repaired(rule, block, rough) if rough.size else block
+    kept = float(off[~refused].max(initial=0.0))
+    return grades, _with_repaired(rule, block, rough) if rough.size else block, kept
 
 
 def _with_repaired(rule: BatchRule, block: Components, rough: Indices) -> Components:

@@ -61,12 +61,10 @@ def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[
     Source: Higham 1986, Newton's X <- (X + X^-T)/2 with the inverse by cofactors.  A power of two brings the
     determinant into [1/2, 4).  The convergence is quadratic: a step below 1e-9 leaves 1e-18, and is a row's last.
     """
-    x = _scaled(a, b, c, d, e, f, g, h, i, xp)
-    third = xp.frexp(determinant(*x))[1] // 3
-    x = nine(xp.ldexp(part, -third) for part in x)
+    x = balanced(a, b, c, d, e, f, g, h, i, xp)
     moving: Condition | None = None
     for _ in range(60):
-        after = _newton(*x)
+        after = newton(*x)
         step = largest_of([abs(new - old) for new, old in zip(after, x, strict=True)], xp)
         if moving is None:
             x, moving = after, step >= 1e-9
@@ -78,7 +76,14 @@ def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[
     return x
 
 
-def _newton(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Nine[N]:
+def balanced(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
+    """Divide a matrix by the power of two that brings its determinant into [1/2, 4); its rotation stays."""
+    x = _scaled(a, b, c, d, e, f, g, h, i, xp)
+    third = xp.frexp(determinant(*x))[1] // 3
+    return nine(xp.ldexp(part, -third) for part in x)
+
+
+def newton(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Nine[N]:
     """Take one Newton step towards the orthogonal factor."""
     cofactors = (
         e * i - f * h, f * g - d * i, d * h - e * g,

@@ -213,6 +213,10 @@ def _homogeneous(position: Components, rows: Components) -> Components:
     return (*upper, *LAST_ROW)
 
 
+def _three_rows(position: Components, rows: Components) -> Components:
+    return _homogeneous(position, rows)[:12]
+
+
 def _of_homogeneous(m: Components) -> tuple[Components, Components]:
     return (m[3], m[7], m[11]), (*m[0:3], *m[4:7], *m[8:11])
 
@@ -353,6 +357,21 @@ class Notation:
         if self.representation.axes == NAMED_AXES and self.axes is None:
             raise ValueInvalid(f"{self.spec} needs its axes: write euler:rzyx (one of {', '.join(sorted(euler.AXES))})")
         return self.axes or "sxyz"
+
+
+def _upper_rows() -> Notation:
+    """Make the notation of a pose as the first three rows of its 4x4: what a row of a KITTI trajectory is."""
+    row = Representation(
+        "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "three rows of the matrix of a pose",
+        shape=ROWS, whole=Whole(" ".join(HOMOGENEOUS.columns[:12]), _three_rows, _of_homogeneous),
+        forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
+        batch=BatchRule("matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL),
+    )  # fmt: skip
+    row.name = "matrix"
+    return Notation("matrix", row, None, degrees=None)
+
+
+UPPER_ROWS = _upper_rows()  # no name spells it: twelve numbers of a file say it
 
 
 def notation(spec: str) -> Notation:

@@ -10,7 +10,7 @@ from frametool.grammar.readers import slash_note
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from frametool.errors import FormatError
     from frametool.geometry.types import Rigid
@@ -39,6 +39,27 @@ class Edge(NamedTuple):
     received_ns: int | None = None
     path: Path = ()
     topic: str = ""
+
+
+class Samples(NamedTuple):
+    """Many poses of one frame that moves, in one piece: what as many edges would say.
+
+    stamps_ns, components, lines: of each pose, in the order they were written
+    """
+
+    parent: str
+    child: str
+    stamps_ns: Sequence[int]
+    components: Sequence[Rigid]
+    lines: Sequence[int]
+
+    def edge(self, at: int) -> Edge:
+        """Return one of the poses as an edge."""
+        return Edge(self.parent, self.child, self.components[at], self.stamps_ns[at], self.lines[at])
+
+    def edges(self) -> Iterator[Edge]:
+        """Yield the poses as edges."""
+        return map(self.edge, range(len(self.stamps_ns)))
 
 
 def stop(error: FormatError) -> None:
@@ -80,20 +101,26 @@ class Remark(NamedTuple):
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
-    __slots__ = ("about", "has_joints", "names", "noise", "notes", "others", "rough", "unknown_joints")
+    __slots__ = (
+        "about", "axes", "has_joints", "names", "noise", "notes", "others", "projected", "rough", "unknown_joints",
+    )  # fmt: skip
 
     def __init__(self) -> None:
         """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic.
 
         about: what this file holds and what was taken for granted, told beside what its form means
+        axes: frame -> the axes of the camera it is, `optical` or `opengl`
+        projected: how far the worst matrix was from a rotation, in forms that round them
         has_joints: whether values of joints are about this file; unknown_joints: those told of that it does not have,
         each with the error that says so, for another file may have them
         """
         self.about = ""
+        self.axes: dict[str, str] = {}
         self.has_joints = False
         self.unknown_joints: dict[str, FormatError] = {}
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
+        self.projected = 0.0
         self.rough: list[int] = []
         self.others: dict[str, int] = {}
         self.notes: dict[str, Remark] = {}
@@ -105,11 +132,17 @@ class Tally:
         else:
             self.notes.setdefault(note.message, Remark(line, note.message, note.rule))
 
+    def note_each(self, message: str, line: int, rule: str = "odd") -> None:
+        """Keep a sentence about one line, also where it was said of other lines."""
+        self.notes.setdefault(f"{line}: {message}", Remark(line, message, rule))
+
     def told(self) -> Iterator[Remark]:
         """Yield one sentence for each kind of oddity."""
         if self.rough:
             count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
             yield Remark(self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised", "rounded")
+        if self.projected > PROJECTED_IN_SILENCE:
+            yield Remark(1, projection(self.projected), "rounded")
         if self.noise:
             line, text = self.noise[0]
             count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
@@ -122,6 +155,14 @@ class Tally:
         yield from self.notes.values()
 
 
+PROJECTED_IN_SILENCE = 1e-9  # what seventeen digits and some products leave of orthonormal rows
+
+
+def projection(off: float) -> str:
+    """Say that matrices were replaced by rotations."""
+    return f"the matrices are orthonormal only to {off:.2g}; the nearest rotation of each was taken"
+
+
 class Topics:
     """The topics of a recording: how many transforms came by each, which are read, and which frames come by two."""
 
@@ -129,6 +170,7 @@ class Topics:
         """Read the topics chosen, with or without a leading `/`; all of them if none is."""
         self.chosen = frozenset(topic.strip("/") for topic in chosen)
         self.counts: dict[str, int] = {}
+        self.seen: set[str] = set()  # topics, also those without transforms
         self._first: dict[str, str] = {}  # child -> the topic it came by first
         self._told: set[tuple[str, str]] = set()
 
@@ -136,6 +178,10 @@ class Topics:
         """Count a transform; return whether its topic is read."""
         self.counts[topic] = self.counts.get(topic, 0) + 1
         return not self.chosen or topic.strip("/") in self.chosen
+
+    def chooses(self, topic: str) -> bool:
+        """Tell whether a topic was named; only then are messages read that are poses and no transforms."""
+        return topic.strip("/") in self.chosen
 
     def conflict(self, topic: str, child: str) -> str:
         """Return what is wrong if a frame comes from two namespaces, as of two robots; told once of each frame."""
@@ -147,9 +193,10 @@ class Topics:
 
     def missing(self) -> str:
         """Return what is wrong if none of the topics chosen is there; what names no topics is read in any case."""
-        if not self.chosen or not self.counts or any(topic.strip("/") in self.chosen for topic in self.counts):
+        known = {*self.counts, *self.seen} - {""}
+        if not self.chosen or not known or any(map(self.chooses, self.counts)):
             return ""
-        return f"no transforms on {', '.join(sorted(self.chosen))}; topics: {', '.join(sorted(self.counts))}"
+        return f"no transforms on {', '.join(sorted(self.chosen))}; topics: {', '.join(sorted(known))}"
 
 
 def _source_of(topic: str) -> str:

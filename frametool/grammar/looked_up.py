@@ -65,3 +65,21 @@ def why_missing(frames: Frames, target: str, source: str, at_ns: int) -> LookupF
     except LookupFailed as error:
         return error
     return None
+
+
+def sample_stamps(frames: Frames, target: str, source: str) -> list[int]:
+    """Return the stamps of all samples on the way between two frames at which all of it has data, sorted."""
+    span = frames.span(target, source)
+    if span is None:
+        return []
+    first, last = span
+    stamps = {
+        stamp_ns
+        for track in frames.way(target, source)
+        if not track.standing
+        for stamp_ns, *_ in track.walk()
+        if first <= stamp_ns <= last
+    }
+    if not stamps:
+        frames.lookup_components(target, source, first)  # raises: the samples of two edges never overlap
+    return sorted(stamps)

@@ -110,7 +110,7 @@ def kind(value: Any) -> str:
         return "nothing"
     if isinstance(value, dict):
         return "a mapping"
-    return "a list" if isinstance(value, list) else repr(value)
+    return "a list" if isinstance(value, list) else shown(value)
 
 
 def as_mapping(value: Any, what: str) -> dict[str, Any]:

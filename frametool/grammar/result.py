@@ -25,9 +25,10 @@ class Style:
 
     precision: digits after the point; None for the shortest text that reads back
     full: that text for people too, who are else shown some decimals of an overview
+    axes: those of the camera that the poses are of, `optical` or `opengl`; "" where that is not known
     """
 
-    __slots__ = ("degrees", "form", "full", "keep_sign", "notations", "precision")
+    __slots__ = ("axes", "degrees", "form", "full", "keep_sign", "notations", "precision")
 
     def __init__(
         self,
@@ -41,6 +42,7 @@ class Style:
     ) -> None:
         """Keep what the options of a command say."""
         self.form = form
+        self.axes = ""
         self.notations = notations
         self.degrees = degrees
         self.precision = precision
@@ -49,10 +51,12 @@ class Style:
 
     def in_form(self, form: str) -> Style:
         """Return the same style in another form."""
-        return Style(
+        style = Style(
             form, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
             keep_sign=self.keep_sign,
         )  # fmt: skip
+        style.axes = self.axes
+        return style
 
     def in_notations(self, notations: tuple[Notation, ...]) -> Style:
         """Return the same style with other notations."""

@@ -96,9 +96,15 @@ def write_github(findings: Iterable[Finding]) -> str:
 
 def _command(finding: Finding) -> str:
     level = "notice" if finding.level == "note" else finding.level
-    place = {"file": finding.source, "line": finding.line, "col": finding.column, "title": finding.rule}
+    return github_command(
+        level, finding.message, file=finding.source, line=finding.line, col=finding.column, title=finding.rule
+    )
+
+
+def github_command(level: str, message: str, **place: str | int) -> str:
+    """Return one workflow command: `error`, `warning` or `notice`; what is empty or 0 of its place is left out."""
     properties = ",".join(f"{key}={_escaped(str(value), ',:')}" for key, value in place.items() if value)
-    return f"::{level} {properties}::{_escaped(finding.message)}\n"
+    return f"::{level} {properties}::{_escaped(message)}\n"
 
 
 def _escaped(text: str, more: str = "") -> str:

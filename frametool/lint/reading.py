@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.errors import FormatError
+from frametool.errors import FormatError, Unanswered
 from frametool.formats.tree_reader import read_edges, without_slashes
 from frametool.grammar.readers import Misfit, Note, Reading
 from frametool.lint.findings import Finding
@@ -56,14 +56,30 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
     def report(error: FormatError) -> None:
         find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
 
-    for edge in recording.edges(report, tell=False, normalize=normalize):
-        w_first = looks_w_first(edge.components)
-        yield Statement(edge.parent or "", *edge[1:4], recording.name, edge.line, 1 if edge.line else 0, w_first)
+    in_documents = []
+    try:
+        for edge in recording.edges(report, tell=False, normalize=normalize):
+            if edge.path:
+                in_documents.append(edge)
+            elif edge.parent is not None:
+                yield _stated(edge, recording.name, edge.line, 1 if edge.line else 0)
+    except Unanswered:
+        raise
+    except FormatError as error:  # behind which nothing can be read
+        report(error)
+    places = locate_many(recording.text, [edge.path for edge in in_documents]) if in_documents else []
+    for edge, (line, column) in zip(in_documents, places, strict=True):
+        if edge.parent is not None:
+            yield _stated(edge, recording.name, line, column)
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
     for told in recording.tally.told():
         find(Finding(told.rule, told.message, recording.name, told.line, 1))
+
+
+def _stated(edge: Edge, source: str, line: int, column: int) -> Statement:
+    return Statement(edge.parent or "", *edge[1:4], source, line, column, looks_w_first(edge.components))
 
 
 def looks_w_first(components: Rigid) -> bool:

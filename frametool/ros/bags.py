@@ -14,6 +14,8 @@ from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Note
 from frametool.ros.echo_blocks import unit_components
 from frametool.ros.message_parts import STAMPS, stamp_problem
+from frametool.ros.pose_messages import TYPES as POSES
+from frametool.ros.pose_messages import body_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -97,22 +99,26 @@ def _check_database(file: Path) -> None:
 
 def _transforms(reader: Any, path: str, options: Options) -> Iterator[Edge]:
     """Walk the messages of every topic with transforms; there must be as many as the bag says."""
-    topics = [connection for connection in reader.connections if connection.msgtype in TYPES]
+    topics = [connection for connection in reader.connections if _is_read(connection, options)]
+    options.topics.seen |= {connection.topic for connection in reader.connections}
     for other in reader.connections:
         if other not in topics and other.topic.rpartition("/")[2] in ("tf", "tf_static"):
             raise FormatError(f"{other.topic} holds {other.msgtype} and no transforms; is it damaged?", source=path)
     if not topics:
-        known = ", ".join(sorted({connection.topic for connection in reader.connections}))
-        said = f"no transforms in the bag; its topics: {known}" if known else "no messages in the bag"
+        poses = sorted({connection.topic for connection in reader.connections if connection.msgtype in POSES})
+        known = ", ".join(sorted(options.topics.seen))
+        hint = f"; --topic {poses[0]} reads its poses" if poses else ""
+        said = f"no transforms in the bag; its topics: {known}{hint}" if known else "no messages in the bag"
         raise FormatError(said, source=path)
     number = 0
     for number, (topic, received_ns, data) in enumerate(reader.messages(connections=topics), 1):
         name = topic.topic
         still = name.endswith("tf_static")
-        for transform in reader.deserialize(data, topic.msgtype).transforms:
+        message = reader.deserialize(data, topic.msgtype)
+        for transform in [message] if topic.msgtype in POSES else message.transforms:
             if not options.topics.takes(name):
                 continue
-            edge = _edge(transform, number, path, options)
+            edge = _edge(transform, number, path, options, name)
             if problem := options.topics.conflict(name, edge.child):
                 options.report(FormatError(problem, source=path, rule="two-topics"))
             yield edge._replace(stamp_ns=None if still else edge.stamp_ns, received_ns=received_ns, topic=name)
@@ -133,12 +139,26 @@ def _expected(reader: Any, topics: list[Any]) -> int:
     return sum(count for counts in chunks for number, count in counts.items() if number not in others)
 
 
-def _edge(message: Any, number: int, path: str, options: Options) -> Edge:
-    """Return one TransformStamped."""
+def _is_read(connection: Any, options: Options) -> bool:
+    """Tell whether a topic holds transforms, or was chosen and holds poses."""
+    kind = connection.msgtype
+    return kind in TYPES or (kind in POSES and options.topics.chooses(connection.topic))
+
+
+def _parts(message: Any, topic: str, options: Options) -> tuple[str, Any, Any]:
+    """Return what a transform or a pose is about, its position and its rotation."""
+    if hasattr(message, "transform"):
+        return message.child_frame_id, message.transform.translation, message.transform.rotation
+    pose = getattr(message.pose, "pose", message.pose)
+    return getattr(message, "child_frame_id", "") or body_of(topic, options.answers), pose.position, pose.orientation
+
+
+def _edge(message: Any, number: int, path: str, options: Options, topic: str) -> Edge:
+    """Return one TransformStamped, or a pose over time."""
     tally = options.tally
-    moved, turned = message.transform.translation, message.transform.rotation
+    named, moved, turned = _parts(message, topic, options)
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
-    parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(message.child_frame_id)
+    parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(named)
     components = unit_components(tally, number, *numbers, normalize=options.normalize)
     if components is None or not parent or not child:
         problem = _complaint(parent, child, numbers, normalize=options.normalize)

@@ -14,13 +14,14 @@ from frametool.ros import messages
 from frametool.ros.echo_blocks import Blocks
 from frametool.ros.json_blocks import plain_line
 from frametool.ros.message_stream import Message, document_messages, end_of_document, line_messages, read_messages
+from frametool.ros.pose_messages import body_of, is_pose, read_pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.input_file import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options, Tally
+    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path
 
 _HEADER = re.compile(r"\bheader\b")
@@ -81,7 +82,7 @@ def _message_edges(message: Message | FormatError, options: Options) -> Iterator
         options.report(message)
         return
     try:
-        found = list(_transforms(message.value, (), options.tally))
+        found = list(_transforms(message.value, (), options))
     except Misfit as misfit:
         options.report(message.error(misfit))
         return
@@ -92,7 +93,7 @@ def _message_edges(message: Message | FormatError, options: Options) -> Iterator
             continue
         reading = Reading(message.source, normalize=options.normalize)
         try:
-            parent, child, components, stamp_ns = _read(transform, reading, options, line)
+            parent, child, components, stamp_ns = _read(transform, reading, options, line, topic)
         except Misfit as misfit:
             options.report(message.error(misfit.below(*path)))
             continue
@@ -108,28 +109,41 @@ def _on_topic(edge: Edge, topic: str, name: str, options: Options) -> Edge:
 
 
 def _read(
-    transform: dict[str, Any], reading: Reading, options: Options, line: int
+    transform: dict[str, Any], reading: Reading, options: Options, line: int, topic: str
 ) -> tuple[str, str, Rigid, int | None]:
     """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
     if options.raw and "header" in transform:
         from frametool.ros.tf2_input import read_transform
 
         return read_transform(transform)
-    parent, child, position, rotation, stamp_ns = messages.read_transform(transform, reading)
+    if is_pose(transform):
+        found = read_pose(transform, reading, body_of(topic, options.answers))
+    else:
+        found = messages.read_transform(transform, reading)
+    parent, child, position, rotation, stamp_ns = found
     for note in reading.notes:
         options.tally.note(note, line)
     return parent, child, (*position, *rotation), stamp_ns
 
 
-def _transforms(value: Any, path: Path, tally: Tally) -> Iterator[tuple[dict[str, Any], Path]]:
-    """Yield every transform of a message, or of a list of messages; count messages that hold none."""
+def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict[str, Any], Path]]:
+    """Yield every transform of a message, or of a list of messages; count messages that hold none.
+
+    A pose counts where its topic was chosen, or where topics are not named.
+    """
     if type(value) is list:
         for index, item in enumerate(value):
-            yield from _transforms(item, (*path, index), tally)
+            yield from _transforms(item, (*path, index), options)
         return
+    tally = options.tally
     mapping = as_mapping(value, "a message with transforms")
-    inner = mapping["msg"] if messages.is_envelope(mapping) else mapping
-    if messages.is_message(inner):
+    enveloped = messages.is_envelope(mapping)
+    inner = mapping["msg"] if enveloped else mapping
+    topic = messages.topic_of(mapping)
+    options.topics.seen.add(topic)
+    if is_pose(inner) and (not enveloped or options.topics.chooses(topic)):
+        yield inner, (*path, "msg") if enveloped else path
+    elif not is_pose(inner) and messages.is_message(inner):
         yield from messages.messages(mapping, path)
     elif "op" in mapping:
         topic = str(mapping.get("topic") or f"op {mapping['op']}")

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Result, Style
 
 CALL = "static_transform_publisher"
+ROS_ARGUMENTS = "--ros-args"
 XYZ = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
 RPY = ("roll", "pitch", "yaw")
@@ -118,10 +119,21 @@ def read_call(line: str, reading: Reading) -> Pose:
         words = split(line, comments=True)
     except ValueError as error:
         raise ValueInvalid(f"a quote is not closed ({str(error).lower()})") from None
+    return read_words(words, reading)
+
+
+def read_words(words: Sequence[str], reading: Reading) -> Pose:
+    """Read one call from its words: what stands before the tool's name, and what is said to ROS itself, is left out.
+
+    Raises ValueInvalid.
+    """
     starts = [index for index, word in enumerate(words) if word.rsplit("/", 1)[-1] == CALL]
-    words = words[starts[-1] + 1 :] if starts else words
+    words = list(words[starts[-1] + 1 :] if starts else words)
+    if ROS_ARGUMENTS in words:
+        del words[words.index(ROS_ARGUMENTS) :]
     if words[-1:] == ["&"]:  # a script starts the tool in the background
         del words[-1]
+    words = [word for word in words if ":=" not in word]  # a remapping, as __name:=camera
     if any(word.startswith("--") for word in words):
         return read_flags(_flags(words), reading)
     return read_positional(words, reading)

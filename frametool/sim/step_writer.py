@@ -29,8 +29,14 @@ if TYPE_CHECKING:
 
 FORMS = ("text", "yaml", "json", "csv")
 EMITS = ("commands", "poses", "tf")
-WIDTH = 10  # least, of a column in text
 DECIMALS = 6
+# of steps in text, where a line must fit a terminal: millimetres and milliradians, under short names
+STEP_DECIMALS = 3
+SHORT = {
+    "linear_x": "linear", "angular_z": "turning", "distance": "away",
+    "leader_x": "lead_x", "leader_y": "lead_y", "leader_theta": "lead_th",
+    "linear_velocity": "linear", "angular_velocity": "turning",
+}  # fmt: skip
 
 
 class Emission(NamedTuple):
@@ -73,7 +79,7 @@ class StepWriter:
     def _header(self, emission: Emission) -> str:
         columns = list(emission.cells)
         if self._style.form == "text":
-            return _aligned(columns, columns)
+            return _aligned([SHORT.get(name, name) for name in columns], map(_step_width, columns))
         return row(columns, self._style) if self._style.form == "csv" and not emission.ros2_row else ""
 
     def _yaml(self, emission: Emission) -> str:
@@ -89,7 +95,13 @@ class StepWriter:
 
     def _text(self, emission: Emission) -> str:
         t, *others = emission.cells.values()
-        return _aligned([f"{t:.3f}", *(_text_cell(cell, self._style) for cell in others)], list(emission.cells))
+        cells = [f"{t:.3f}", *(_text_cell(cell, self._style, STEP_DECIMALS) for cell in others)]
+        return _aligned(cells, map(_step_width, emission.cells))
+
+
+def _step_width(name: str) -> int:
+    """Return how wide a column of steps is in text."""
+    return 7 if name in ("turtle", "parent", "child") else max(6, len(SHORT.get(name, name)))
 
 
 def table(rows: Sequence[dict[str, float | None]], style: Style) -> str:
@@ -102,21 +114,21 @@ def table(rows: Sequence[dict[str, float | None]], style: Style) -> str:
         case "csv":
             return write_points(rows, style)
     columns = list(rows[0])
-    lines = ([_text_cell(cell, style) for cell in each.values()] for each in rows)
-    return "".join(_aligned(line, columns) for line in (columns, *lines))
+    lines = ([_text_cell(cell, style, DECIMALS) for cell in each.values()] for each in rows)
+    return "".join(_aligned(line, (max(10, len(name)) for name in columns)) for line in (columns, *lines))
 
 
-def _text_cell(cell: Any, style: Style) -> str:
+def _text_cell(cell: Any, style: Style, decimals: int) -> str:
     """Round for reading; zero has no sign there."""
     if not isinstance(cell, float):
         return "-" if cell is None else printable(str(cell))
-    digits = DECIMALS if style.precision is None else style.precision
+    digits = decimals if style.precision is None else style.precision
     return f"{round(cell, digits) + 0.0:.{digits}f}"
 
 
-def _aligned(cells: Sequence[str], columns: Sequence[str]) -> str:
-    """Write a line, each cell to the right below its column's name."""
-    return " ".join(f"{cell:>{max(WIDTH, len(name))}}" for cell, name in zip(cells, columns, strict=True)) + "\n"
+def _aligned(cells: Sequence[str], widths: Iterable[int]) -> str:
+    """Write a line, each cell to the right in its column."""
+    return " ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True)) + "\n"
 
 
 def _commands(commands: Iterable[IssuedCommand]) -> Iterator[Emission]:

@@ -87,6 +87,7 @@ class Run:
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
         self.mended: list[int] = []
         self.doubted: list[tuple[int, str]] = []
+        self.off = 0.0  # how far the worst rotation was from one, of those that are none too far
         self.evaluated: list[tuple[str, Components, list[Floats], Ints | None]] = []
         self.count = len(block.places)
         numbers = self._read()
@@ -106,6 +107,8 @@ class Run:
 
     def _read(self) -> Floats:
         """Read all numbers; those that are none are nan."""
+        if self.block.values is not None:
+            return self.block.values
         numbers, bad = parse_floats(self.block.numbers)
         for place in bad.tolist():
             row, column = divmod(place, numbers.shape[1])
@@ -133,6 +136,8 @@ class Run:
         if plan.timed is not None and self.count:
             frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
             edges = plan.edges or [None] * shapes
+            if block.times is not None:
+                return [by_time(plan.timed, block.times, frames[0], self._blame, plan.frame_column)]
             return [
                 by_time(plan.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
                 for stamps, names, edge in zip(block.stamps, frames, edges, strict=True)
@@ -221,6 +226,7 @@ class Run:
         for row, reason in found.reasons.items():
             self._blame(row, names[shape.rotation_at[0]], reason)
         self.mended += found.mended.tolist()
+        self.off = max(self.off, found.off)
         self.doubted += _doubtful_angles(shape, given)
         return found.quaternions
 

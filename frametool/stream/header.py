@@ -65,12 +65,6 @@ class Columns(NamedTuple):
         """Name the columns."""
         return " ".join(self.names)
 
-    @property
-    def is_mixed(self) -> bool:
-        """Tell whether the names of a rotation's angles do not all say the same unit."""
-        angles = self.notation.representation.angles if self.notation else ()
-        return len({self.degrees[at] for at in angles if at not in self.absent}) > 1
-
 
 class PoseColumns(NamedTuple):
     """The columns of one point or pose."""

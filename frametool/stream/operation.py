@@ -76,6 +76,7 @@ class Operation(NamedTuple):
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: only the rotation changes; the position, if there is one, stays as it is
+    before: each pose is multiplied with this one from the right before anything else: the axes of a camera
     formula: an expression, instead of all this
     """
 
@@ -86,6 +87,7 @@ class Operation(NamedTuple):
     fixed: Rigid | None = None
     moves: bool = False
     turns: bool = False
+    before: Rigid | None = None
     formula: Formula | None = None
 
     def extras(self, kind: str) -> tuple[str, ...]:
@@ -125,7 +127,7 @@ class Operation(NamedTuple):
 
     @property
     def _is_bare(self) -> bool:
-        return not (self.left or self.right or self.of or self.moves)
+        return not (self.left or self.right or self.of or self.moves or self.before)
 
     def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
         """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
@@ -147,6 +149,8 @@ class Operation(NamedTuple):
 
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
         """Return the resulting pose, and what else is known about it."""
+        if self.before is not None:
+            poses = [rigid.compose(*pose, *self.before) for pose in poses]
         result: Rigid = rigid.inverse(*poses[0]) if self.inverse else poses[0]
         left = edge or self.left
         if left is not None:

@@ -13,8 +13,9 @@ from frametool.documents.json_reader import JSON_NUMBER
 from frametool.documents.json_writer import Verbatim
 from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
+from frametool.formats import is_trajectory
 from frametool.formats.tree_reader import tell
-from frametool.frames.stamps import BILLION
+from frametool.frames.stamps import BILLION, parse_stamp
 from frametool.geometry import floats
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, Reading
@@ -103,7 +104,7 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
         answers = [_answer(record, request, source) for record in records]
         for unit in dict.fromkeys(_unit(answer.record, document.value) for answer in answers):
             ours = [answer for answer in answers if answer.record.path[: len(unit)] == unit]
-            yield from _values(_at(nodes, unit), unit, ours, request, style)
+            yield from _values(_at(nodes, unit), unit, ours, request, style, source)
     if not found:
         raise FormatError("nothing in it", source=source.name)
 
@@ -136,7 +137,7 @@ def _edge(record: Record, request: Request, source: Source) -> Rigid | None:
     """Find the pose that moves a record, at the time its header says where that matters."""
     timed = request.timed
     if timed is not None and record.stamp and timed.moves(record.parent.text):
-        return timed.pose(record.parent.text, _stamp_ns(record, source))
+        return timed.pose(record.parent.text, stamp_of(record, source))
     return None if request.way is None else request.way(record.parent.text)
 
 
@@ -146,7 +147,7 @@ def _asked_time(record: Record, request: Request, source: Source) -> int | None:
     if timed is None:
         return None
     if record.stamp and not timed.name:
-        return _stamp_ns(record, source)
+        return stamp_of(record, source)
     document = next(each for each in parse_documents(source.text, source.name) if each.index == record.path[0])
     path = record.path[1:]
     found = key_path(document.value, path, timed.name) if timed.name else stamp_keys(document.value, path)
@@ -154,14 +155,16 @@ def _asked_time(record: Record, request: Request, source: Source) -> int | None:
     return read_stamp(value_at(document.value, found), in_ns=timed._replace(name=key).in_ns)
 
 
-def _stamp_ns(record: Record, source: Source) -> int:
+def stamp_of(record: Record, source: Source) -> int:
     """Return the stamp of a record's header."""
     values = {document.index: document.value for document in parse_documents(source.text, source.name)}
     seconds, below = (int(value_at(values, path)) for path in record.stamp)
     return seconds * BILLION + below
 
 
-def _values(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
+def _values(
+    node: Node, unit: Path, answers: list[Answer], request: Request, style: Style, source: Source
+) -> Iterator[Value]:
     """Yield what one document or item becomes: itself with new numbers, or a pose for each record in it."""
     inside = any(type(step) is str for answer in answers for step in answer.record.path[len(unit) :])
     keeps = not request.notations or [form.spec for form in style.notations] == ["quaternion"]
@@ -173,11 +176,29 @@ def _values(node: Node, unit: Path, answers: list[Answer], request: Request, sty
         if request.operation.formula is not None:
             yield _formula_result(node, unit, answer, request)
         elif record.shape.kind == POSE:
-            yield _pose_result(node, unit, answer, request)
+            made = _pose_result(node, unit, answer, request)
+            if is_trajectory(style.form):
+                _keep_stamp(made, node, unit, record, source)
+            yield made
         elif style.form == "csv" or (style.form == "text" and record.shape.kind not in PARTS):
             yield _flat(answer, request)
         else:
             yield _rewritten(node, unit, [answer], request)
+
+
+def _keep_stamp(result: Result, node: Node, unit: Path, record: Record, source: Source) -> None:
+    """Put the stamp of a record's header, or that it says under `stamp` or `stamp_ns`, where lookups have theirs."""
+    said = {key: result.extras.pop(key, None) for key in ("stamp", "stamp_ns")}
+    try:
+        if record.stamp:
+            seconds, below = (int(str(node.at(path[len(unit) :]).value)) for path in record.stamp)
+            result.extras["stamp_ns"] = seconds * BILLION + below
+        elif said["stamp_ns"] is not None:
+            result.extras["stamp_ns"] = parse_stamp(f"{said['stamp_ns']}ns")
+        elif said["stamp"] is not None:
+            result.extras["stamp_ns"] = parse_stamp(str(said["stamp"]))
+    except ValueInvalid as error:
+        raise placed(Misfit(str(error), record.path), source) from None
 
 
 def _formula_result(node: Node, unit: Path, answer: Answer, request: Request) -> Value:

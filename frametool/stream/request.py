@@ -33,6 +33,7 @@ class Request(NamedTuple):
     rename: turns a record's (parent, name) into those of its result
     counters: a decimal `frame` is a counter, because no frame is called so
     unwrap: angles go on beyond half a turn
+    whole: all numbers of a result are wanted, also those that do not change
     """
 
     operation: Operation = Operation()
@@ -56,6 +57,7 @@ class Request(NamedTuple):
     counters: bool = True
     unwrap: bool = False
     on_error: str = STOP
+    whole: bool = False
 
     @property
     def in_order(self) -> bool:

@@ -47,14 +47,17 @@ def _edge(edge_of: Callable[..., Rigid], name: str | None) -> tuple[Rigid, Frame
 
 
 def by_time(
-    timed: Timed, stamps: tuple[Spans, ...], frames: Sequence[str | None], blame: Blame, column: str = ""
+    timed: Timed, stamps: tuple[Spans, ...] | Ints, frames: Sequence[str | None], blame: Blame, column: str = ""
 ) -> Rigid:
     """Return the pose of each row at its stamp; a row without a stamp or without data then is bad.
 
-    stamps: one for each row, or its seconds and nanoseconds
+    stamps: one for each row, or its seconds and nanoseconds; or the nanoseconds themselves
     frames: one a row, or one for all (None: the one SOURCE); column: the one that names them
     """
-    times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=timed.in_ns)
+    if isinstance(stamps, np.ndarray):
+        times, reasons = stamps, dict[int, str]()
+    else:
+        times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=timed.in_ns)
     for row, reason in reasons.items():
         blame(row, timed.column, reason)
     poses = np.full((7, len(times)), np.nan)

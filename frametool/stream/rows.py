@@ -46,6 +46,7 @@ class Block(NamedTuple):
     stamps: for each shape the spans (n,) of its stamp: one, or seconds and nanoseconds; none where it has none
     bad: rows whose names do not fit: column and reason
     lost: the first row whose result cannot name a frame, and that frame
+    values, times: (n, c) and (n,) the numbers and the stamps in nanoseconds themselves, where they are no text
     """
 
     numbers: Spans
@@ -58,6 +59,8 @@ class Block(NamedTuple):
     stamps: Sequence[tuple[Spans, ...]] = ()
     bad: Mapping[int, tuple[str, FrametoolError | str]] = MappingProxyType({})
     lost: Sequence[tuple[int, str]] = ()
+    values: Floats | None = None
+    times: Ints | None = None
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:

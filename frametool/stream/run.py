@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import shown, warn
+from frametool.geometry.representations import UPPER_ROWS
+from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from frametool.stream.blocks import Run
     from frametool.stream.faults import BadRows, Fault
+    from frametool.stream.rows import Block
 
 
 class RowNote(NamedTuple):
@@ -40,6 +44,16 @@ class RowNote(NamedTuple):
     def of_rounding(cls, line: int) -> RowNote:
         """Tell that a rotation had to be normalised."""
         return cls(line, "rounded", "the rotation is off by more than 1e-6 and was normalised")
+
+
+def notes_of(run: Run, block: Block) -> list[RowNote]:
+    """Return what is worth telling about the rows of a block, by line."""
+    notes = [RowNote.of_degrees(block.line_of(row), angle) for row, angle in run.doubted[:1]]
+    notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.lost]
+    notes += [RowNote.of_rounding(block.line_of(row)) for row in sorted(run.mended)[:1]]
+    if run.plan.shapes and run.plan.shapes[0].notation is UPPER_ROWS and run.off > PROJECTED_IN_SILENCE:
+        notes.append(RowNote(block.line_of(0), "projected", projection(run.off)))
+    return sorted(notes)
 
 
 class Outcome(NamedTuple):

@@ -113,7 +113,7 @@ class Splicer:
         if type(self.node.value) is not dict or not self.node.value:
             if self.request.operation.result_kind(shape.kind) != shape.kind:
                 return self._rewritten()
-            return self._numbers(range(len(self.slots)), 0) if self._same_rotation() else self._rewritten()
+            return self._numbers(range(len(self.slots)), 0) if self._stays_a_list() else self._rewritten()
         self._names()
         if self.request.operation.result_kind(shape.kind) != shape.kind:
             return self._of_other_kind()
@@ -128,6 +128,12 @@ class Splicer:
             self.dropped.update({*STALE, "inverse", *self.record.others} - set(self.record.flat))
         self._leave_out()
         return self.edits
+
+    def _stays_a_list(self) -> bool:
+        """Tell whether a result has the numbers of the bare list it comes from and no others."""
+        has_place = self.target.unit is None or self.record.shape.unit is not None
+        told = self.request.operation.extras if self.record.shape.kind == POSE else ()
+        return self._same_rotation() and has_place and not told
 
     def _same_rotation(self) -> bool:
         """Tell whether the rotation is written as it was read, number by number."""
@@ -332,8 +338,10 @@ class Splicer:
 
     def _rewritten(self) -> list[Edit]:
         """Write a bare list, a matrix or a point, as a mapping."""
-        members = self._all_members()
-        pieces = [piece for member in members for piece in (Const(b", "), *member)]
+        pieces: list[Piece] = []
+        for member in self._all_members():
+            conditional = any(isinstance(piece, IfLocked) for piece in member)
+            pieces += [IfLocked(b", ") if conditional else Const(b", "), *member]
         self.edits.append(Edit(self.node.start, self.node.end, (Const(b"{"), *pieces[1:], Const(b"}"))))
         return self.edits
 

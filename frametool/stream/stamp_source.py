@@ -80,7 +80,8 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
         bare += "ns"
     stamp_ns = parse_stamp(bare)
     if abs(stamp_ns) > LARGEST:
-        raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds")
+        remedy = "; are these some? then call them stamp_ns"
+        raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds{remedy}")
     return stamp_ns
 
 

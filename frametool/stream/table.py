@@ -21,6 +21,7 @@ from frametool.text.spans import MARGIN, Spans
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from frametool.stream.header import PoseColumns
     from frametool.stream.output_columns import Layout
     from frametool.stream.table_names import Naming
     from frametool.text.array_types import Ints
@@ -39,6 +40,7 @@ class Table(NamedTuple):
     names: of its columns, if it has any; width: how many cells a row has
     head: what comes before the header, or before the first row
     header: the raw text of the header's cells; title: its whole line; line_end: what ends it
+    pose: its columns, where the form says which they are, whatever their names
     """
 
     delimiter: bytes
@@ -48,6 +50,7 @@ class Table(NamedTuple):
     header: tuple[bytes, ...] = ()
     title: bytes = b""
     line_end: bytes = b"\n"
+    pose: PoseColumns | None = None
 
     def split(self, block: bytes) -> Cells:
         """Find the cells of a block."""

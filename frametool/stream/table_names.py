@@ -165,7 +165,12 @@ def _coded(cells: Cells, place: int | None) -> Coded:
     rows = len(cells.rows)
     if place is None or not rows:
         return Coded([""], np.zeros(rows, np.int64))
-    column = without_quotes(cells.column(place))
+    return coded(cells.column(place))
+
+
+def coded(cells: Spans) -> Coded:
+    """Read cells (n,), not none, as texts."""
+    column, rows = without_quotes(cells), len(cells.starts)
     if _is_constant(column):
         return Coded([_text(column.text(0))], np.zeros(rows, np.int64))
     data, known = column.data.tobytes(), dict[bytes, int]()

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.table import Table
 
-TUM = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 PARENTS = ("header.frame_id", "parent", "frame_id", "frame")  # what is in the message's header is said best
 NAMES = ("child_frame_id", "name")
 
@@ -31,7 +30,8 @@ NAMES = ("child_frame_id", "name")
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find_if_read(table, request, source)
-    if request.poses == 1 and not request.operation.moves and request.operation.keeps_position:
+    only_turned = not request.operation.moves and request.operation.keeps_position
+    if request.poses == 1 and only_turned and not request.whole:
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
         raise FormatError(wrong, source=source, line=1)
@@ -67,6 +67,8 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         if len(request.columns) != request.poses:
             raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
         return [named_pose(spec, table.names, table.width, request.given) for spec in request.columns]
+    if table.pose is not None and request.given is None and request.poses == 1:
+        return [table.pose]
     if table.names:
         return find_poses(table.names, request.given, request.poses, source)
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
@@ -137,7 +139,7 @@ def _target(shapes: Sequence[Shape], request: Request) -> Target:
     if not kind:
         return Target(None, ())
     if shape.kind != POSE:
-        return Target(shape.unit, ())
+        return Target(1.0 if request.whole and shape.unit else shape.unit, ())
     placed = shape.whole or shape.unit is not None
     if request.notations or shape.notation is None:
         notations = request.notations
@@ -145,7 +147,7 @@ def _target(shapes: Sequence[Shape], request: Request) -> Target:
             notations = (parse_notation("quaternion"),)
         written = tuple((notation, request.in_degrees(notation)) for notation in notations)
         whole = placed and _is_whole(notations)
-        unit = None if whole or not (placed or _shifts(request)) else shape.unit or 1.0
+        unit = None if whole or not (placed or _shifts(request)) else 1.0 if request.whole else shape.unit or 1.0
         return Target(unit, written, request.keep_sign, whole)
     unit = None if shape.whole or not (placed or _shifts(request)) else shape.unit or 1.0
     first = len(XYZ) * (unit is not None and shape.unit is None)  # a position comes in front

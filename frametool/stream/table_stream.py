@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from contextlib import suppress
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, FrametoolError, listing
 from frametool.stream.blocks import Run, State
 from frametool.stream.faults import NULL, Fault, Misused
 from frametool.stream.rows import written
-from frametool.stream.run import Outcome, RowNote, mapped
+from frametool.stream.run import Outcome, RowNote, mapped, notes_of
 from frametool.stream.table import UNCLOSED, open_table, table_block
 from frametool.stream.table_names import Naming
-from frametool.stream.table_plan import TUM, plan_table
+from frametool.stream.table_plan import plan_table
+from frametool.stream.trajectory_columns import STAMPS, as_trajectory, has_header
 from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import BLOCK_BYTES, read_blocks
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
     from frametool.text.lines import ByteStream
 
-STAMPS = re.compile(r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
-DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b""}
+
+DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b"", "kitti": b"", "euroc": b","}
 
 
 def run_table(
@@ -43,25 +43,38 @@ def run_table(
     size: int = 0,
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
+    table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header, size=size)
+    request, unasked = settle_stamps(table, request, source)
+    plan, layout = plan_table(table, request, source)
+    yield Outcome(table.opening(layout), lines=lines, size=taken)
+    named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
+    work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
+    yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
+
+
+class Begun(NamedTuple):
+    """A table whose head was read: what follows of the first block, the other blocks, bytes and lines of the head."""
+
+    table: Table
+    rest: bytes
+    blocks: Iterator[bytes]
+    taken: int
+    lines: int
+
+
+def begin_table(
+    stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True, size: int = 0
+) -> Begun:
+    """Read the head of a table in a form; raises FormatError."""
     delimiter = DELIMITERS[form]
     blocks = _blocks(stream, delimiter, size)
     first = _first_rows(blocks, delimiter)
     if first is None:
         raise FormatError("nothing in it", source=source)
-    table, rest = open_table(first, delimiter, header=header, source=source)
-    table = _as_tum(table, form, request)
-    unasked = None
-    if request.timed is not None and request.operation.formula is not None:
-        name = request.timed.name or _stamp_column(table, source)
-        request = request._replace(timed=request.timed._replace(name=name))
-    elif request.timed is not None and not request.timed.name:  # rows have no header
-        unasked, request = _stamps_unasked(table, request.timed), request._replace(timed=None)
-    plan, layout = plan_table(table, request, source)
+    table, rest = open_table(first, delimiter, header=header and has_header(form, first), source=source)
+    table = as_trajectory(table, form, request, source)
     taken = len(first) - len(rest)
-    yield Outcome(table.opening(layout), lines=first.count(b"\n", 0, taken), size=taken)
-    named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
-    work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
-    yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
+    return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))
 
 
 def _blocks(stream: ByteStream, delimiter: bytes, size: int) -> Iterator[bytes]:
@@ -82,11 +95,18 @@ def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
     return text or None
 
 
-def _as_tum(table: Table, form: str, request: Request) -> Table:
-    """Name the columns of a trajectory without a header, unless --from says what they are."""
-    if table.names or request.given or not (form == "tum" or table.width == len(TUM)):
-        return table
-    return table._replace(names=TUM, width=len(TUM))
+def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request, Timed | None]:
+    """Find the column of stamps that a request needs; or, where no option names one, the one nobody asked for."""
+    timed = request.timed
+    if timed is None:
+        return request, None
+    if request.operation.formula is not None:
+        name = timed.name or _stamp_column(table, source)
+        return request._replace(timed=timed._replace(name=name)), None
+    if timed.name:
+        return request, None
+    name = next(filter(STAMPS.fullmatch, table.names or ()), "")  # rows have no header
+    return request._replace(timed=None), timed._replace(name=name) if name else None
 
 
 def _stamp_column(table: Table, source: str) -> str:
@@ -96,12 +116,6 @@ def _stamp_column(table: Table, source: str) -> str:
         known = f"; columns: {listing(table.names)}" if table.names else ""
         raise Misused(f"@ row: no column looks like stamps; name it with --time-column{known}", source=source, line=1)
     return name
-
-
-def _stamps_unasked(table: Table, timed: Timed) -> Timed | None:
-    """Find a column of stamps that no option names."""
-    name = next(filter(STAMPS.fullmatch, table.names or ()), None)
-    return None if name is None else timed._replace(name=name)
 
 
 class TableWork:
@@ -129,12 +143,10 @@ class TableWork:
         block = table_block(self.table, self.layout, text, self.naming, nulls=self.plan.on_error == NULL)
         run = Run(self.plan, block, self.state)
         faults = run.faults()
-        notes = [RowNote.of_degrees(block.line_of(row), angle) for row, angle in run.doubted[:1]]
-        notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.lost]
-        if self.unasked is not None and len(block.places) and _moves(self.unasked, set(block.frames) or {None}):
+        notes = notes_of(run, block)
+        if self.unasked is not None and len(block.places) and moves_in_time(self.unasked, set(block.frames) or {None}):
             notes.append(RowNote.of_latest(block.line_of(0), self.unasked.name))
             self.unasked = None
-        notes += [RowNote.of_rounding(block.line_of(row)) for row in sorted(run.mended)[:1]]
         rows = len(block.places) + len(block.broken)
         return Outcome(
             written(run.groups(run.first_fault())),
@@ -147,7 +159,7 @@ class TableWork:
         )
 
 
-def _moves(timed: Timed, frames: set[str | None]) -> bool:
+def moves_in_time(timed: Timed, frames: set[str | None]) -> bool:
     """Tell whether the way from one of some frames depends on the time; rows of unknown frames say so themselves."""
     for frame in frames:
         with suppress(FrametoolError):

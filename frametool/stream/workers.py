@@ -72,7 +72,7 @@ class Team:
         return len(self.dealt) >= MOST_WAITING * self.jobs
 
     def deal(self, block: bytes) -> None:
-        """Give a block to the worker whose turn it is."""
+        """Send a block to the worker whose turn it is."""
         turn = self._count % self.jobs
         if turn == len(self.workers):
             self.workers.append(Worker(self.process, [each.connection for each in self.workers]))

@@ -17,7 +17,7 @@ def _seconds(value: float | None) -> str:
 
 
 def _stamp(value: int | None) -> str:
-    return "" if value is None else format_stamp(value)
+    return "" if value is None else format_stamp(value)[:-6]
 
 
 COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
@@ -32,7 +32,7 @@ COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "delay_max_s": ("max s", _seconds),
     "jumps": ("jumps", str),
     "backward": ("back", str),
-    "parent_changes": ("reparented", str),
+    "parent_changes": ("parents", str),
     "topics": ("topics", str),
 }
 RARE = ("parent_changes",)  # left out where all are 0

@@ -9,13 +9,14 @@ from frametool.geometry.transform import Transform
 from frametool.grammar.edge_label import edge_label
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
     from frametool.grammar.result import Style
 
 
+WIDEST = 80  # cells of a line, if names and depth leave that much
 DEEPEST = 1000  # levels; the lines of a drawing grow with its depth
 
 
@@ -57,13 +58,34 @@ def _label(track: Track, style: Style) -> tuple[str, ...]:
 
 
 def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
-    """Yield the lines with the blanks that bring their poses below one another."""
+    """Yield the lines with the blanks that bring their poses below one another.
+
+    Where that makes them too long levels stand closer; where that is not enough either poses stand behind their names.
+    """
     lines = list(_lines(tree, style))
+    if _longest(lines) > WIDEST:
+        lines = [line._replace(branch=_narrowed(line.branch)) for line in lines]
     width = max((len(line.branch) + cells(line.frame) for line in lines), default=0)
     firsts = max((len(line.label[0]) for line in lines if line.label), default=0)
+    if _longest(lines) > WIDEST:
+        yield from ((line, "  " * bool(line.label)) for line in lines)
+        return
     for line in lines:
         label = (f"{line.label[0]:<{firsts}}", *line.label[1:]) if line.label else ()
         yield line._replace(label=label), " " * bool(label) * (width - len(line.branch) - cells(line.frame) + 2)
+
+
+def _narrowed(branch: str) -> str:
+    """Let each level take two cells instead of four."""
+    return "".join(branch[at] + branch[at + 3] for at in range(0, len(branch), 4))
+
+
+def _longest(lines: Sequence[DrawnFrame]) -> int:
+    """Return how many cells the longest line takes with all poses below one another."""
+    labels = [line.label for line in lines if line.label]
+    names = max((len(line.branch) + cells(line.frame) for line in lines), default=0)
+    positions = max((len(label[0]) for label in labels), default=0)
+    return names + 2 + positions + max((sum(2 + cells(part) for part in label[1:]) for label in labels), default=0)
 
 
 def cells(text: str) -> int:

@@ -159,7 +159,7 @@ def test_the_cache_forgets_for_apply_too(run: Run) -> None:
         (["map", "base", "1", "2", "3"], 2, "--time-column is for the rows of a stream"),
         (["map", "bse"], 4, "did you mean 'base'?"),
         (["map", "base", "--frame-column", "frme"], 2, "no column 'frme'"),
-        (["map", "base", "-f", "yaml"], 2, "a stream of csv stays csv"),
+        (["map", "base", "-f", "tum"], 1, "tum holds poses"),
     ],
 )
 def test_misuse_is_told(move: Run, arguments: list[str], status: int, complaint: str) -> None:

@@ -255,7 +255,7 @@ def test_a_tree_that_moves_reads_back_whole(run: Run, form: str) -> None:
 
 def test_a_tree_that_moves_is_drawn_with_rate_and_interval(run: Run) -> None:
     lines = run("tree", "-", "-f", "text", stdin=DRIVE).out.splitlines()
-    assert lines[1].endswith("2 samples  0.5 Hz  0.000000000 .. 2.000000000")
+    assert lines[1].endswith("2 at 0.5 Hz, 0 .. 2 s")
     assert "samples" not in lines[2]
 
 

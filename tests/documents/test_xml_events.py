@@ -78,3 +78,12 @@ def test_a_bad_number_is_shown_where_it_stands(value: str, said: str) -> None:
 def test_a_million_elements_inside_one_another_are_refused_in_a_line() -> None:
     with pytest.raises(FormatError, match="more than 100000 elements inside one another"):
         list(xml(b"<a>" * 200_000).elements())
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_an_entity_of_another_file_is_refused_and_not_left_out(encoding: str) -> None:
+    text = f'<?xml version="1.0" encoding="{encoding}"?>\n<!DOCTYPE a SYSTEM "x.dtd">\n<a xyz="1 &neg;2 3"/>'
+    with pytest.raises(FormatError, match=r"^a\.xml:2:\d+: XML with entities of 'x\.dtd' is not read; expand them: xmllint"):
+        list(xml(text.encode(encoding)).elements())
+    plain = text.replace("&neg;", "&#45;")
+    assert next(xml(plain.encode(encoding)).elements()).attributes == {"xyz": "1 -2 3"}

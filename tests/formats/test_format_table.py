@@ -72,7 +72,7 @@ def test_a_made_up_form_is_written_by_name_and_by_suffix_and_read_back(tmp_path:
     assert with_toy(tmp_path, "tree", "-", "-o", "out.toy", stdin=TEXT) == (0, "", "")
     assert (tmp_path / "out.toy").read_text() == TEXT
     assert "toy" in with_toy(tmp_path, "tree", "--help")[1]
-    assert with_toy(tmp_path, "tree", "-v", "out.toy", "-f", "toy")[2] == "frametool: out.toy: a toy\n"
+    assert with_toy(tmp_path, "tree", "-v", "out.toy", "-f", "toy")[2] == "frametool: out.toy: a toy, known by its first line\n"
 
 
 def test_what_is_wrong_in_a_made_up_form_names_its_line(tmp_path: Path) -> None:
@@ -87,6 +87,7 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
 
     row = FORMATS[name]
     functions = {"poses": "write_poses", "points": "write_points", "tree": "write_tree", "report": "write_points"}
+    functions["trajectory"] = "write_poses"
     assert all(hasattr(import_module(row.writer), functions[what]) for what in row.writes)
     assert "tree" not in row.reads or hasattr(import_module(row.reader), "read")
     assert row.summary
@@ -107,6 +108,14 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a bag": (b"#ROSBAG V2.0\n", "tree", "bag1"),
     "sqlite": (b"SQLite format 3\0..", "tree", "bag2"),
     "mcap": (b"\x89MCAP0\r\n", "tree", "mcap"),
+    "a launch file": (b"<!-- -*- mode: XML -*- -->\n<launch><arg name='x'/>", "tree", "launch"),
+    "a launch file with substitutions": (b"<launch><node if='$(arg x)' args='$(find y) ${z}'/>", "tree", "launch"),
+    "a launch file in YAML": (b"%YAML 1.2\n---\nlaunch:\n- node: {pkg: x}\n", "tree", "launch"),
+    "a launch file in Python": (b"import os\n\ndef generate_launch_description():\n    pass\n", "tree", "launch"),
+    "a tree with a frame called launch": (b"frames:\n  launch:\n    a:\n", "tree", "yaml"),
+    "a world of Gazebo": (b"<?xml version='1.0' ?>\n<sdf version='1.6'>\n<world name='a'>", "tree", "sdf"),
+    "a model of MuJoCo": (b"<mujoco model='a'>\n<compiler angle='radian'/>", "tree", "mjcf"),
+    "a model of MuJoCo whose joints are told": (b"<mujoco model='a'>\n<keyframe>", "joints records rows", "mjcf"),
     "URDF": (b'<?xml version="1.0"?>\n<!-- <xacro:a/> ${b} -->\n<robot name="r" xmlns:xacro="x">\n<link', "tree", "urdf"),
     "URDF that begins with a joint": (b'<robot name="r"><joint name="a"><origin/></joint>', "tree", "urdf"),
     "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "tree", "srdf"),
@@ -123,6 +132,35 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "documents": (b"# c\n- {x: 1}\n", "rows records", "yaml"),
     "a document in braces": (b"{x: 1, y: 2}\n", "rows records", "yaml"),
     "documents behind dashes": (b"---\nx: 1\n", "rows records", "yaml"),
+    "Autoware's poses": (b"# kit\nbase/x:\n  kit:\n    x: 0\n    y: -.5\n    roll: 1e-3\n    yaw: 0.0\n", "tree", "autoware"),
+    "Autoware's poses in braces": (b"base: {kit: {x: 0, y: 1, z: 2, roll: 0, pitch: 0, yaw: 0}}\n", "tree", "autoware"),
+    "one level of numbers, as robot_calibration has it": (b"a_initial_values:\n  x: 0\n  roll: 0\n", "tree", "yaml"),
+    "three levels of numbers": (b"a:\n  b:\n    c:\n      x: 0\n      roll: 0\n", "tree", "yaml"),
+    "a tree of ours with two levels": (b"frames:\n  a:\n    b:\n      x: 0\n", "tree", "yaml"),
+    "a chain of Kalibr": (b"cam0:\n  T_cam_imu:\n  - [1, 0]\n  distortion_model: radtan\n", "tree", "camchain"),
+    "a chain of OpenVINS": (b"%YAML:1.0\n\ncam0:\n  T_imu_cam: # c\n    - [1]\n", "tree", "camchain"),
+    "a configuration of okvis": (b"%YAML:1.0\ncameras:\n     - {T_SC:\n        [ 1.0", "tree", "camchain"),
+    "a configuration of VINS": (b"%YAML:1.0\n\nimu: 1\nbody_T_cam0: !!opencv-matrix\n   rows: 4\n", "tree", "opencv"),
+    "a matrix of OpenCV without its head": (b"body_T_cam0: !!opencv-matrix\n   rows: 4\n", "tree", "opencv"),
+    "OpenCV's XML": (b'<?xml version="1.0"?>\n<opencv_storage>\n<a type_id="opencv-matrix">', "tree", "opencv"),
+    "OpenCV's JSON": (b'{"a": {"type_id": "opencv-matrix", "rows": 4}}', "tree", "opencv"),
+    "a sensor of EuRoC": (b"#Default\nsensor_type: camera\nT_BS:\n  cols: 4\n", "tree", "euroc-sensor"),
+    "KITTI's odometry": (b"P0: 7.2e+02 0 6.1e+02 0 0 7 1 0 0 0 1 0\n", "tree", "kitti-calib"),
+    "KITTI's odometry with a bad number": (b"P0: 7.2e+02 0 x 0 0 7 1 0 0 0 1 0\n", "tree", "kitti-calib"),
+    "KITTI's tracking without colons": (b"R_rect 9.9e-01 1 0 0 0 0 0 0 1\n", "tree", "kitti-calib"),
+    "KITTI's raw recordings": (b"calib_time: 15-Mar-2012 11:37:16\nR: 7.5e-03", "tree", "kitti-calib"),
+    "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "tree", "drake"),
+    "sensors of nuScenes": (b'[\n{\n"token": "f4d",\n"sensor_token": "47f",', "tree", "nuscenes"),
+    "ego poses of nuScenes": (b'[{"token": "5a", "timestamp": 15, "rotation": [', "tree", "nuscenes"),
+    "a table of joints": (b"joint,theta,d,a,alpha\n1,q1,0.1,0,pi/2\n", "tree", "dh"),
+    "a table of joints between blanks": (b"# i  alpha_i-1  a_i-1  d_i  theta_i\n1 0 0 0.3 q1\n", "tree", "dh"),
+    "a table of joints with units": ("\u03b8_deg\td (mm)\ta [mm]\t\u03b1 [deg]\n".encode(), "tree", "dh"),
+    "a table of joints in YAML": (b"dh:\n  - {joint: one, theta: 0, d: 0, a: 1, alpha: 0}\n", "tree", "dh"),
+    "a table of joints in JSON": (b'[{"alpha": 0, "a": 0.3, "d": 0.1}]', "tree", "dh"),
+    "a tree of ours about alpha": (b"frames:\n  alpha:\n    a: {xyz: [1, 0, 0]}\n    d: {}\n", "tree", "yaml"),
+    "a table of numbers about colours": (b"a,alpha,blue\n1,2,3\n", "rows records", "csv"),
+    "a hand-eye calibration": (b"parameters:\n  eye_on_hand: true\ntransformation: {x: 1}\n", "tree", "handeye"),
+    "a second hand-eye calibration": (b"parameters:\n  tracking_base_frame: a\n", "tree", "handeye"),
 }
 
 
@@ -143,19 +181,27 @@ def test_the_suffix_counts_more_than_the_look_and_less_than_a_sign() -> None:
     assert detect(b"1 2 3\n", "rows", "records", name="a.csv") == ("csv", "the suffix .csv")
     assert detect(b"1 2 3\n", "rows", "records", name="a.txt") == ("columns", "its first line")
     assert detect(b"\x89MCAP0\r\n", "tree", name="a.yaml") == ("mcap", "its first bytes")
+    assert detect(b"frames:\n", "tree", name="a.bag") == ("yaml", "its keys")
+    assert detect(b"<robot name='a'/>", "tree", name="a.yaml") == ("urdf", "its root element")
 
 
 def test_two_forms_that_fit_are_both_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("yaml key", "frames"),)))
-    with pytest.raises(FormatError, match=r"^a\.yaml: fits yaml and toy; give --in yaml\|toy$"):
-        by_sign(b"frames:\n", "tree", name="a.yaml")
+    for name in ("toy", "other"):
+        monkeypatch.setitem(FORMATS, name, Format("a toy", reads=("tree",), signs=(("yaml key", "toys"),)))
+    with pytest.raises(FormatError, match=r"^a\.yaml: fits toy and other; give --in toy\|other$"):
+        by_sign(b"toys:\n", "tree", name="a.yaml")
+
+
+def test_a_form_that_is_read_goes_before_one_that_is_only_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("yaml key", "toys"),)))
+    assert by_sign(b"distortion_model: x\ntoys:\n", "tree") == "toy"
 
 
 def test_the_root_element_of_xml_is_a_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "toy"),)))
-    for head in (b"<toy name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<toy>", b"\xef\xbb\xbf<toy/>"):
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "toys"),)))
+    for head in (b"<toys name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<toys>", b"\xef\xbb\xbf<toys/>"):
         assert by_sign(head, "tree") == "toy"
-    assert by_sign(b"<toys>", "tree") is None
+    assert by_sign(b"<toy>", "tree") is None
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -200,3 +246,127 @@ def test_a_stream_of_what_is_no_utf_8_is_named_as_what_it_is(data: bytes, said: 
 def test_a_word_that_only_yaml_reads_is_read_as_yaml(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text('{frames: {"a\\e[31m": {b: {xyz: [1, 0, 0]}}}}')
     assert set(load(tmp_path / "a.yaml").frames) == {"a\x1b[31m", "b"}
+
+
+FOREIGN = [
+    "map", "launch", "directives", "distortion_model", "projection_matrix", "occupied_thresh", "T_cam_imu", "T_BS",
+    "eye_on_hand", "transforms", "header", "parameters", "opencv_storage", "angles",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "frames:\n  {}:\n    b: {{xyz: [1, 0, 0]}}\n",
+        "# c\nangles: deg\nframes:\n  a:\n    {}:\n      xyz: {{x: 1, y: 2, z: 3}}\n      rpy: {{roll: 0, pitch: 0, yaw: 0}}\n",
+        "frames:\n- name: {}\n  parent: b\n  xyz: [1, 0, 0]\n",
+        "frames:\n  a:\n    b:\n      xyz: [0, 0, 1]\n      children:\n        {}: {{xyz: [1, 0, 0]}}\n",
+        "'frames':\n  a: {{{}: {{xyz: [1, 0, 0]}}}}\n",
+        "{{frames: {{a: {{{}: {{xyz: [1, 0, 0]}}}}}}}}\n",
+        '{{"frames": {{"a": {{"{}": {{"xyz": [1, 0, 0]}}}}}}}}\n',
+        '{{\n"frames": {{\n  "{}": {{"b": {{"xyz": [1, 0, 0]}}}}}}}}\n',
+        "name: {}\nparent: b\nxyz: {{x: 1, y: 2, z: 3}}\nrpy: {{roll: 0, pitch: 0, yaw: 0}}\n",
+    ],
+)
+def test_a_tree_of_ours_stays_ours_whatever_its_frames_are_called(name: str, text: str, tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_text(text.format(name))
+    assert name in load(path).frames
+
+
+@pytest.mark.parametrize("beside", ["distortion_model: x", "directives: []", "T_BS: 1", "launch: []"])
+def test_frames_make_a_tree_ours_whatever_stands_beside_them(beside: str, tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    for text in (f"{beside}\nframes: {{a: {{b: {{xyz: [1, 0, 0]}}}}}}\n", f"frames:\n  a:\n{beside}\n"):
+        path.write_text(text)
+        with pytest.raises(FormatError, match=r"unknown key .* beside frames"):
+            load(path)
+
+
+KNOWN: dict[str, tuple[bytes, str]] = {
+    "camera_info": (b"image_width: 640\ncamera_matrix: {rows: 3}\nprojection_matrix: {rows: 3}\n", "camera_info"),
+    "camera_info as echo prints it": (b"header:\n  frame_id: a\nheight: 4\ndistortion_model: plumb_bob\n---\n", "camera_info"),
+    "camera_info as ini": (b"# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n", "camera_info"),
+    "a map": (b"image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\n", "map"),
+    "USD in ASCII": (b'#usda 1.0\n(\n)\ndef Xform "World"\n', "usd"),
+    "USD in binary": (b"PXR-USDC" + bytes(80), "usd"),
+    "glTF": (b'{"scene": 0, "asset": {"version": "2.0"}, "nodes": []}', "gltf"),
+    "glTF in binary": (b"glTF\x02\0\0\0" + bytes(40), "gltf"),
+    "Unity": (b"%YAML 1.1\r\n%TAG !u! tag:unity3d.com,2011:\n--- !u!1 &1\n", "unity"),
+    "ITK": (b"#Insight Transform File V1.0\n#Transform 0\n", "itk"),
+    "xacro": (b'<?xml version="1.0"?>\n<robot name="a">\n<xacro:macro name="b"/>\n</robot>', "xacro"),
+    "xacro by its substitutions": (b'<robot name="a"><link name="${b}link"/></robot>', "xacro"),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_a_form_that_is_not_read_is_named_in_one_short_line_with_what_to_do(run: Callable[..., Any], name: str) -> None:
+    head, form = KNOWN[name]
+    found = run("tree", "file", files={"file": head})
+    assert (found.status, found.out) == (1, "")
+    assert found.err == f"frametool: file: {FORMATS[form].summary}: {FORMATS[form].instead}\n"
+    assert len(found.err) < 200
+
+
+@pytest.mark.parametrize("suffix", [suffix for row in FORMATS.values() if row.instead for suffix in row.suffixes])
+def test_a_suffix_tells_of_a_form_that_is_not_read_where_no_sign_does(run: Callable[..., Any], suffix: str) -> None:
+    form = next(name for name, row in FORMATS.items() if suffix in row.suffixes)
+    assert FORMATS[form].instead in run("tree", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
+    assert run("tree", f"b{suffix}", files={f"b{suffix}": "frames: {a: {b: {xyz: [1, 2, 3]}}}"}).status == 0
+
+
+UNKNOWN: dict[str, tuple[bytes, str]] = {
+    "prose": (b"The quick brown fox\njumps over it\n", "cannot tell the form of 'The quick brown fox'; forms: yaml, "),
+    "code": (b"import os\nprint(1)\n", "cannot tell the form of 'import os'; forms: yaml, "),
+    "a huge line": (b"abc " * 200_000, "cannot tell the form of 'abc abc"),
+    "XML": (b'<?xml version="1.0"?>\n<!-- c --><note><to>Bob</to></note>', "form of XML with the root element note; forms: "),
+    "HTML": (b"<!DOCTYPE html>\n<html><body>" + b"x" * 9999, "form of XML with the root element html; forms: "),
+    "binary data": (bytes(range(256)) * 9, "not text but binary data"),
+    "gzip": (b"\x1f\x8b\x08\0abc", "not text but gzip data; unpack it first"),
+    "zip": (b"PK\x03\x04abc", "not text but a zip archive; unpack it first"),
+    "UTF-16 without a mark": ("frames: {a: {b: {}}}".encode("utf-16-le"), "UTF-16LE without a byte order mark"),
+    "escapes": (b"\x1b[31mred\x1b[0m fox\n", "cannot tell the form of '\\x1b[31mred"),
+    "keys of no tree": (b"".join(b"key_%d: 1\n" % each for each in range(999)), "no frame tree: "),
+    "long keys of no tree": (b"{" + b"".join(b'"%d%s": 1,' % (each, b"x" * 500) for each in range(9)) + b'"a": 1}', "no frame tree: "),
+    "text under dashes": (b"--- |\n" + b"  words and more words\n" * 999, "expected a frame tree, found 'words and"),
+}
+
+
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_what_is_no_form_is_told_in_one_line_without_its_content(run: Callable[..., Any], name: str) -> None:
+    data, said = UNKNOWN[name]
+    found = run("tree", "file", files={"file": data})
+    assert (found.status, found.out) == (1, "")
+    first, *snippet = found.err.splitlines()
+    assert said in first
+    assert len(first) <= 260
+    assert all(len(line) <= 81 for line in snippet)
+    if "cannot tell" in first:
+        assert first.endswith("; `frametool formats` lists all, --in FORM names one")
+
+
+@pytest.mark.parametrize("data", [b"", b"  \n\n", b"# only a comment\n", b"\xef\xbb\xbf"])
+def test_an_empty_file_has_no_frames(run: Callable[..., Any], data: bytes) -> None:
+    found = run("tree", "file", files={"file": data})
+    assert (found.status, found.err) == (1, "frametool: file: no frames in it\n")
+
+
+def test_a_form_that_is_not_read_cannot_be_told_either(run: Callable[..., Any]) -> None:
+    found = run("tree", "--in", "xacro", "-", stdin="<robot/>")
+    assert found.status == 2
+    assert FORMATS["xacro"].instead in found.err
+
+
+@pytest.mark.parametrize(
+    ("data", "by"),
+    [
+        ("frames: {a: {b: {xyz: [1, 0, 0]}}}", "its keys"),
+        ("{name: a, parent: b, xyz: [1, 0, 0]}", "its first line"),
+        ("name: a\nparent: b\nxyz: [1, 0, 0]\n", "the suffix .yaml"),
+    ],
+)
+def test_verbose_says_by_what_a_file_was_known(run: Callable[..., Any], data: str, by: str) -> None:
+    said = run("tree", "a.yaml", "-v", files={"a.yaml": data}).err
+    assert said == f"frametool: a.yaml: {FORMATS['yaml'].summary}, known by {by}\n"
+    assert run("tree", "a.yaml", "-v", "--in", "yaml").err == f"frametool: a.yaml: {FORMATS['yaml'].summary}\n"

@@ -24,9 +24,9 @@ PLAIN = {
     "lookup": [TREE, "map", "lidar"], "apply": [TREE, "map", "lidar", "1", "2", "3"], "tree": [TREE], "echo": [TREE, "map", "lidar"],
     "monitor": [TREE], "static": [TREE, "-f", "static2"], "check": [TREE], "sim follow": ["--duration", "0.1"],
     "sim run": ["{turtles: {turtle1: {leader: square}}, duration: 0.1}"], "sim sweep": ["--duration", "0.1", "--gain-linear", "1", "--gain-angular", "4"],
-    "sim teleop": [],
+    "sim teleop": [], "calc": ["1 + 1"],
 }  # fmt: skip
-STREAM = {"convert": [], "invert": [], "apply": [TREE, "map"], "relative": ["--consecutive"], "compose": ["-", POSE]}
+STREAM = {"convert": [], "invert": [], "apply": [TREE, "map"], "relative": ["--consecutive"], "compose": ["-", POSE], "calc": ["row"]}
 ROWS = b"stamp,frame,x,y,z,qx,qy,qz,qw\n1,lidar,1,2,3,0,0,0,1\n2,map,1,2,3,0,0,0.6,0.8\n"
 
 

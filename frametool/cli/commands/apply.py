@@ -7,21 +7,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options
+from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, one_pose, values_of
+from frametool.cli.pasted_input import is_inline, is_pasted
+from frametool.cli.poses import one_pose, pose_source, usage_if_inline, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.documents.source import Source
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.calc.explain.derive_apply import ByPose, ByTree
     from frametool.formats.assembly import Rules
+    from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.pose import Pose
     from frametool.stream.request import Request
 
 CHOICES = ("point", "vector", "pose", "twist", "wrench")
@@ -34,7 +38,8 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
 @pose_options
-@result_options("points")
+@result_options("points", "trajectory")
+@explain_options
 @click.option(
     "--frame-column",
     "frame_column",
@@ -81,16 +86,30 @@ def command(
 
     Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
     """
-    stream = Stream(options)
-    output = Output("points", deg=deg, **options)
+    stream, explaining = Stream(options), Explaining(options)
+    output = Output("points", "trajectory", deg=deg, **options)
+    plan = explaining.plan(output, stream) if explaining else None
     if pose is None:
         way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize), at)
     elif time_column is not None or at is not None:
         raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
-        way, rest = _way_by_pose(one_pose(pose, degrees=deg, normalize=normalize)), arguments
+        way, rest = _way_by_pose(pose, stream.given, degrees=deg, normalize=normalize), arguments
     if time_column is not None:
         _check_timed(rest, at)
+    if plan is not None:
+        records = list(_sources(rest, kind))
+        if rest in ((), ("-",)) or len(records) != 1 or frame_column is not None:
+            raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
+        try:
+            from frametool.calc.explain.derive_apply import derive_apply
+
+            source = pose_source(records[0], stream.given, normalize=normalize, points=True)
+            made = derive_apply(way.explained(), source, plan, kind=kind or "", degrees=deg, normalize=normalize,
+                                counters=way.counters, timeless=at is not None)  # fmt: skip
+        except FormatError as error:
+            raise usage_if_inline(error) from None
+        return explaining.write(made, output)
     request = way.request(frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
     if rest in ((), ("-",)):
         return stream.run(request, output)
@@ -115,6 +134,7 @@ class Way(NamedTuple):
     from_frame: the transform from a frame (None: the one SOURCE), at a time or the latest
     at_times: columns of such transforms, nan where there is no data; None where the time does not matter
     moves: tells whether the transform from a frame depends on the time
+    explained: the same for derivations
     has_source: whether all come from one frame
     counters: whether no frame has a number for its name
     """
@@ -123,6 +143,7 @@ class Way(NamedTuple):
     from_frame: Callable[[str | None, int | None], Rigid]
     at_times: Callable[[str | None, Any], Components] | None
     moves: Callable[[str | None], bool]
+    explained: Callable[[], ByTree | ByPose]
     has_source: bool
     counters: bool = True
 
@@ -160,11 +181,11 @@ def _way_by_tree(
     """
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
-    tree = load_tree(arguments[0], more, chosen_rules, streams=True)
-    target, rest = frame_name(arguments[1], tree), arguments[2:]
-    source = None
-    if rest and not _is_record(rest[0]):
-        source, rest = frame_name(rest[0], tree), rest[1:]
+    named = arguments[2:3] if len(arguments) > 2 and not _is_record(arguments[2]) else ()
+    rest = arguments[2 + len(named) :]
+    tree = load_tree(arguments[0], more, chosen_rules, streams=rest in ((), ("-",)))
+    target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
+    source = next(iter(sources), None)
 
     if not {target, source or target} <= set(tree.frames):
         tree.lookup(target, source or target)  # raises, and names the nearest frames
@@ -189,17 +210,29 @@ def _way_by_tree(
 
     counters = not any(frame.isdecimal() for frame in tree.frames)
     in_time = at_times if chosen is None else None
-    return Way(target, from_frame, in_time, moves, source is not None, counters), rest
+    def explained() -> ByTree:
+        from frametool.calc.explain.derive_apply import ByTree
+
+        return ByTree(tree, target, source, at_ns(chosen))
+
+    return Way(target, from_frame, in_time, moves, explained, source is not None, counters), rest
 
 
-def _way_by_pose(pose: Pose) -> Way:
+def _way_by_pose(argument: str, given: Notation | None, *, degrees: bool, normalize: bool) -> Way:
     """Move everything by one pose; where it names its frames, records must be given in its name."""
+    source = pose_source(argument, given, normalize=normalize)
+    pose = one_pose(source, given, degrees=degrees, normalize=normalize)
 
     def from_frame(own: str | None, _own_ns: int | None = None) -> Rigid:
         _settled(own, pose.name)
         return pose.components
 
-    return Way(pose.parent, from_frame, None, lambda _own: False, has_source=True)
+    def explained() -> ByPose:
+        from frametool.calc.explain.derive_apply import ByPose
+
+        return ByPose(given_as_written(source, given, degrees=degrees, normalize=normalize, told=False))
+
+    return Way(pose.parent, from_frame, None, lambda _own: False, explained, has_source=True)
 
 
 def _settled(own: str | None, source: str | None) -> str | None:
@@ -214,14 +247,19 @@ def _settled(own: str | None, source: str | None) -> str | None:
 
 def _is_record(argument: str) -> bool:
     """Tell a record from a frame's name."""
-    return argument == "-" or is_inline(argument)
+    return argument == "-" or is_inline(argument) or "\n" in argument
+
+
+def _begins_number(argument: str) -> bool:
+    """Tell what is meant for one number of a point."""
+    return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
 def _sources(arguments: Sequence[str], kind: str | None) -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
     pending: list[str] = []
     for argument in (*arguments, ""):
-        if argument and not _is_record(argument):
+        if argument and not (_is_record(argument) or (not _begins_number(argument) and is_pasted(argument))):
             pending.append(argument)
             continue
         for x, y, z in _threes(pending, kind):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.calc.evaluate import Scope, evaluate_line, mentions_row, read_line
+from frametool.calc.functions import FUNCTIONS
 from frametool.calc.literals import Literals
 from frametool.calc.parser import walk
 from frametool.cli.calc_names import file_named_in
@@ -29,15 +30,30 @@ if TYPE_CHECKING:
 KINDS = ("point", "vector", "pose")
 
 
-@click.command(cls=Command, name="calc")
+class CalcCommand(Command):
+    """A command whose arguments may be expressions that begin with a minus: -(..), -[..], -norm(..)."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Put a blank before such arguments, which click takes for options."""
+        return super().parse_args(ctx, [f" {each}" if _begins_with_minus(each) else each for each in args])
+
+
+def _begins_with_minus(argument: str) -> bool:
+    """Tell an expression with a sign from an option."""
+    behind = argument[1:].lstrip("- ")
+    name, bracket, _ = behind.partition("(")
+    return argument.startswith("-") and (behind[:1] in tuple('([{"') or (bool(bracket) and name in FUNCTIONS))
+
+
+@click.command(cls=CalcCommand, name="calc")
 @click.argument("arguments", nargs=-1, type=TEXT, metavar="[NAME=FILE ..] [EXPR ..]")
 @click.option("--tree", "trees", multiple=True, type=FILE, metavar="FILE",
-              help="the tree of look-ups; may be repeated, files are merged  [default: FRAMETOOL_TREE]")
+              help="tree of look-ups; may be repeated")
 @click.option("-e", "expressions", multiple=True, type=TEXT, metavar="[NAME=]EXPR|@FILE",
-              help="of a stream: a result in columns of its own, NAME or NAME_x ..; may be repeated")
+              help="result in columns NAME or NAME_x ..; may be repeated")
 @click.option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
 @click.option("--time-column", "time_column", type=TEXT, metavar="NAME",
-              help="the column or key of a row's time, for @ row  [default: the one that looks like it]")
+              help="column or key of a row's time, for @ row")
 @rotation_options
 @pose_options
 @result_options("points")
@@ -88,9 +104,9 @@ def _given(arguments: Iterable[str], expressions: Iterable[str], scope: Scope) -
     """Yield the expressions in order, and whether -e gave them; names of files are bound."""
     for text in arguments:
         if file_named_in(text, scope) is None:
-            yield text, False
+            yield text.strip(), False
     for text in expressions:
-        yield read_text(text[1:]) if text.startswith("@") else text, True
+        yield (read_text(text[1:]) if text.startswith("@") else text).strip(), True
 
 
 def _tree(files: Sequence[str], lines: Sequence[Line]) -> Any:

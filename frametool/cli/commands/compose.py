@@ -8,9 +8,11 @@ from typing import Any
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, all_given, explain_options
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, factors_of, one_pose
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 from frametool.grammar.result import Result
@@ -21,7 +23,9 @@ from frametool.grammar.result import Result
 @rotation_options
 @pose_options
 @result_options("poses")
+@explain_options
 @stream_options
+@pose_reading_options
 def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 
@@ -34,21 +38,29 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch. The
     inverse of any of them is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
-    stream = Stream(options)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
     factors = factors_of(poses)
     given = [each.argument for each in factors]
+    if explaining:
+        plan = explaining.plan(output, stream)
+        from frametool.calc.explain.derive import derive_compose
+
+        written = all_given(given, stream.given, degrees=deg, normalize=normalize)
+        turned = [each.turned() if factor.is_inverse else each for each, factor in zip(written, factors, strict=True)]
+        return explaining.write(derive_compose(turned, plan), output)
     if "-" not in given:
         if stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")
-        products = [reduce(product, each) for each in combinations(factors, degrees=deg, normalize=normalize)]
+        each_product = combinations(factors, stream.given, degrees=deg, normalize=normalize)
+        products = [reduce(product, each) for each in each_product]
         output.poses(Result(each) for each in products)
         return 0
     if given.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
     at = given.index("-")
     left, right = (
-        [each.of(one_pose(each.argument, degrees=deg, normalize=normalize)) for each in side]
+        [each.of(one_pose(each.argument, stream.given, degrees=deg, normalize=normalize)) for each in side]
         for side in (factors[:at], factors[at + 1 :])
     )
     rows = factors[at]

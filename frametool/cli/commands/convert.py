@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
+from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options, one_argument
+from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
-from frametool.cli.poses import is_inline, pose_from_numbers, values_of
+from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
+from frametool.cli.poses import pose_from_numbers, pose_source, source_from_numbers, values_of
 from frametool.cli.streaming import Stream, one_notation, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
-from frametool.geometry.representations import notation
+from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.text.numbers import parse_angle
@@ -21,6 +25,7 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.documents.source import Source
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Quaternion
@@ -29,7 +34,17 @@ if TYPE_CHECKING:
 AXES = 3
 
 
-@click.command(cls=Command, name="convert", short_help="one rotation or pose in other representations")
+class ConvertCommand(Command):
+    """A command whose help lists the representations."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List them, then the exit codes."""
+        formatter.write_paragraph()
+        formatter.write_text(f"Representations: {', '.join(row.spelling for row in REPRESENTATIONS.values())}.")
+        super().format_epilog(ctx, formatter)
+
+
+@click.command(cls=ConvertCommand, name="convert", short_help="one rotation or pose in other representations")
 @click.argument("values", nargs=-1, type=TEXT, metavar="[VALUES.. | POSE]")
 @click.option(
     "--axes",
@@ -50,8 +65,10 @@ AXES = 3
 @rotation_options
 @pose_options
 @result_options("poses")
+@explain_options
 @click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
 @stream_options
+@pose_reading_options
 def command(
     values: tuple[str, ...],
     given: tuple[Notation, ...] | None,
@@ -72,13 +89,18 @@ def command(
       frametool convert --axes optical --to rpy_deg
       frametool convert --from rpy_deg 10 20 30 --to euler:all
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
+      frametool convert --from rpy_deg 10 20 30 --to matrix --explain
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
     poses; without any argument standard input is read.
     """
-    stream = Stream(options)
+    values = rejoined(values)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
+    if explaining:
+        explaining.plan(output, stream)
+        one_argument(values[0] if values else axes)
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
@@ -92,23 +114,56 @@ def command(
         notations=forms,
         unwrap=unwrap,
     )
-    if stream.path or values == ("-",) or not (values or (turn and not stream.has_input())):
+    is_numbers = _are_numbers(values, told=bool(given))
+    if len(values) == 1 and not (is_numbers or stream.path) and _is_table(values[0], stream):
+        if explaining:
+            raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
+        values = ()
+    if stream.path or values == ("-",) or not (values or (turn and (explaining or not stream.has_input()))):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
         return stream.run(request, output)
+    sources: list[Source] = []
     if not values:
+        sources = [source_from_numbers(list(map(repr, turn[0][3:])), (notation("xyzw"),))] if explaining else []
         results: list[Any] = [Result(Pose.of((0.0, 0.0, 0.0, *turn[0][3:]))._replace(position=None))]
-    elif not is_inline(values[0]) and (given or len(values) > 1):
+    elif is_numbers:
         pose = pose_from_numbers(values, given, degrees=deg, normalize=normalize)
+        sources = [source_from_numbers(values, given)] if explaining else []
         results = [Result(_turned(pose, turn))]
     else:
-        results = list(values_of(values, request, output))
+        sources = [pose_source(each, request.given, normalize=normalize) for each in values] if explaining else []
+        results = list(values_of(sources or values, request, output))
     poses = [each.pose for each in results if isinstance(each, Result)]
     if find is not None:
         output.use(_found(poses, find, tolerance, degrees=deg))
+    if explaining:
+        if len(poses) != 1:
+            raise click.UsageError(f"--explain derives one pose, found {len(results)}")
+        from frametool.calc.explain.derive import derive_convert
+
+        written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
+        change = (axes or "", turn[0][3:]) if turn and values else None
+        return explaining.write(derive_convert(written, explaining.plan(output), own=poses[0], turn=change), output)
     output.values(results)
     output.tell_of_lock(poses)
     return 0
+
+
+def _are_numbers(values: Sequence[str], *, told: bool) -> bool:
+    """Tell bare numbers from mappings and files; one that is alone is a number where --from says of what."""
+    if len(values) != 1:
+        return bool(values) and not is_inline(values[0])
+    try:
+        parse_angle(values[0])
+    except ValueInvalid:
+        return False
+    return told
+
+
+def _is_table(value: str, stream: Stream) -> bool:
+    """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
+    return not is_pasted(value, stream.given) and stream.takes_rows(value)
 
 
 def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool) -> tuple[Notation, ...]:

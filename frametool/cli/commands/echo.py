@@ -85,6 +85,7 @@ def command(
     out = Output("poses", format_name=form, output=output, **options)
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize))
     target, source = frame_name(target, frames), frame_name(source, frames)
+    out.style.axes = frames.camera_axes.get(source, "")
     replayed = frames.replay(target, source, rate_hz=rate, start_ns=start, stop_ns=stop)
     skipped = Skipped(in_json=out.told == "json")
     results = skipped.counted(_results(replayed, target, source, skipped))

@@ -57,14 +57,14 @@ def command(ctx: click.Context, name: str | None) -> None:
       frametool help pose
       frametool help convert
     """
-    if name in COMMANDS:
+    known = topics()
+    if name in COMMANDS and name not in known:  # calc and formats are subjects too
         from frametool.cli.group import group
 
         found = group.get_command(ctx, name)
         if found is not None and ctx.parent is not None:
             show_help(click.Context(found, parent=ctx.parent, info_name=name))
         return
-    known = topics()
     if name is not None and name not in known:
         raise click.UsageError(f"no topic {shown(name)}{alternatives(name, (*known, *COMMANDS), 'topics')}")
     width = max(map(len, known))

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, all_given, explain_options
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations
 from frametool.grammar.pose_algebra import interpolated
@@ -20,6 +21,7 @@ from frametool.grammar.result import Result
 @rotation_options
 @pose_options
 @result_options("poses")
+@explain_options
 def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: bool, **options: Any) -> None:
     """Print poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
 
@@ -30,6 +32,16 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
     The rotation takes the shorter arc. Fractions outside 0 .. 1 extrapolate. Unlike a screw motion, position and
     rotation are independent.
     """
+    explaining = Explaining(options)
     output = Output("poses", deg=deg, **options)
+    if explaining:
+        plan = explaining.plan(output)
+        if len(fractions) != 1:
+            raise click.UsageError(f"--explain derives one fraction, found {len(fractions)}")
+        from frametool.calc.explain.derive import derive_interpolate
+
+        first, last = all_given((a, b), degrees=deg, normalize=normalize)
+        explaining.write(derive_interpolate(first, last, fractions[0], plan), output)
+        return
     pairs = combinations((a, b), degrees=deg, normalize=normalize)
     output.poses([Result(interpolated(first, last, each)) for first, last in pairs for each in fractions])

@@ -7,9 +7,11 @@ from typing import Any
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, explain_options, given
 from frametool.cli.output import Output
 from frametool.cli.poses import write_results
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 
 
 @click.command(cls=Command, name="invert")
@@ -17,7 +19,9 @@ from frametool.cli.streaming import Stream, stream_options
 @rotation_options
 @pose_options
 @result_options("poses")
+@explain_options
 @stream_options
+@pose_reading_options
 def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.
 
@@ -27,12 +31,22 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
 
     POSE is a mapping, a file, or - for standard input, also with several poses.
     """
-    stream = Stream(options)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
+    if explaining:
+        plan = explaining.plan(output, stream)
+        from frametool.calc.explain.derive import derive_invert
+
+        written = given(pose, stream.given, degrees=deg, normalize=normalize)
+        return explaining.write(derive_invert(written, plan), output)
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
     request = Request(
-        Operation(inverse=True), degrees=deg, normalize=normalize, rename=lambda parent, name: (name, parent)
+        Operation(inverse=True),
+        given=stream.given,
+        degrees=deg,
+        normalize=normalize,
+        rename=lambda parent, name: (name, parent),
     )
     return write_results(pose, stream, request, output)

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, explain_options
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, Skipped, at_ns, read_times, rules, rules_options, times_option
 from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
 from frametool.grammar.edges import stop
-from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, why_missing
+from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 @pose_options
 @rotation_options
 @result_options("poses")
+@explain_options
 @column_options
 @stream_options
 def command(
@@ -51,12 +53,14 @@ def command(
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
       frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. Between two samples of a moving
-    frame positions go along the line and rotations by slerp, edge by edge, as in tf2; nothing is extrapolated. With
-    --times and --on-error skip, times without data are left out.
+    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp;
+    nothing is extrapolated. Trajectories (-f tum, kitti ..) hold all samples of the way without --times.
     """
-    by_row, stream = RowFrames(options), Stream(options)
+    by_row, stream, explaining = RowFrames(options), Stream(options), Explaining(options)
     output = Output("poses", **options)
+    if explaining and (by_row or times is not None):
+        raise click.UsageError("--explain derives one lookup; name TARGET and SOURCE, and --at TIME if it matters")
+    plan = explaining.plan(output, stream) if explaining else None
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
@@ -69,7 +73,14 @@ def command(
     if tf2 is None:
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
-    if times is not None:
+    if plan is not None:
+        from frametool.calc.explain.derive import derive_lookup
+
+        found = derive_lookup(frames, target, source, plan, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
+        return explaining.write(found, output)
+    output.style.axes = frames.camera_axes.get(source, "")
+    every = output.is_trajectory and at is None and fixed is None and frames.latest(target, source) is not None
+    if times is not None or every:
         skip = stream.options["on_error"] == "skip"
         return _many(output, frames, target, source, times, skip=skip)
     if fixed is not None:
@@ -87,10 +98,10 @@ def _check(at: int | str | None, source_at: int | str | None, fixed: str | None,
         raise click.UsageError("--times says all the times; leave --at, --source-at and --fixed out")
 
 
-def _many(output: Output, frames: Frames, target: str, source: str, times: str, *, skip: bool) -> int:
-    """Print the results at many times; with `skip` those without data are left out and reported."""
+def _many(output: Output, frames: Frames, target: str, source: str, times: str | None, *, skip: bool) -> int:
+    """Print the results at many times, or at those of all samples; with `skip` the others are left out and reported."""
     skipped = Skipped(in_json=output.told == "json")
-    asked = read_times(times, skipped.add if skip else stop)
+    asked = sample_stamps(frames, target, source) if times is None else read_times(times, skipped.add if skip else stop)
 
     def miss(at_ns: int) -> None:
         skipped.add(None if skipped.is_full else why_missing(frames, target, source, at_ns))

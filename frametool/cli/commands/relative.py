@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.explaining import Explaining, all_given, explain_options, one_argument
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose
 from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
 
@@ -26,7 +28,9 @@ if TYPE_CHECKING:
 @click.option(
     "--consecutive", is_flag=True, help="of a stream, each row seen from the row before; the first is the identity"
 )
+@explain_options
 @stream_options
+@pose_reading_options
 def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutive: bool, **options: Any) -> int:
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
@@ -37,25 +41,36 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
     A and B are poses in one frame: mappings, files, or - for standard input. distance in metres; angle in radians,
     angle_deg in degrees.
     """
-    stream = Stream(options)
+    stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
+    if explaining:
+        plan = explaining.plan(output, stream)
+        if consecutive:
+            raise click.UsageError("--consecutive is about the rows of a stream; leave it or --explain out")
+        from frametool.calc.explain.derive import derive_relative
+
+        arguments = [str(one_argument(each)) for each in (a, b)]
+        first, second = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
+        return explaining.write(derive_relative(first, second, plan), output)
+    from frametool.stream.request import Request
+
     given = [each for each in (a, b) if each is not None]
     if consecutive and given not in ([], ["-"]):
         raise click.UsageError("--consecutive is about the rows of a stream; leave A and B out")
     if len(given) < 2 or "-" in given:
-        return stream.run(_request(a, b, consecutive=consecutive, degrees=deg, normalize=normalize), output)
+        request = Request(given=stream.given, degrees=deg, normalize=normalize)
+        return stream.run(_asked(a, b, request, consecutive=consecutive), output)
     if stream.path:
         raise click.UsageError("-i FILE is read where - stands for A or B")
-    output.poses([relative(*pair) for pair in combinations(given, degrees=deg, normalize=normalize)])
+    pairs = combinations(given, stream.given, degrees=deg, normalize=normalize)
+    output.poses([relative(*pair) for pair in pairs])
     return 0
 
 
-def _request(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, normalize: bool) -> Request:
+def _asked(a: str | None, b: str | None, plain: Request, *, consecutive: bool) -> Request:
     """Compare a stream's rows with a fixed A or B, with the row before, or with the row's own second pose."""
     from frametool.stream.operation import Operation
-    from frametool.stream.request import Request
 
-    plain = Request(degrees=degrees, normalize=normalize)
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
@@ -66,7 +81,7 @@ def _request(a: str | None, b: str | None, *, consecutive: bool, degrees: bool, 
     if a == b == "-":
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     first = a != "-"
-    fixed = one_pose(str(a if first else b), degrees=degrees, normalize=normalize)
+    fixed = one_pose(str(a if first else b), plain.given, degrees=plain.degrees, normalize=plain.normalize)
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         own = Pose(name=name, parent=parent)

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import Command
+from frametool.cli.explaining import EXPLAIN, significant
 from frametool.cli.leader import leader_of
 from frametool.cli.sim_options import LEADER, follow_options
 from frametool.cli.sim_output import SimOutput, output_options
+from frametool.cli.sink import writing
 from frametool.errors import ValueInvalid
+from frametool.formats import by_suffix
 from frametool.sim.controllers import FollowController
 from frametool.sim.scene import tutorial
 
@@ -26,21 +29,54 @@ SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim
 @LEADER
 @follow_options("20")
 @output_options
-def command(leader: str, **options: Any) -> None:
+@click.option("--explain-step", type=click.IntRange(0), metavar="N", help="derive the command of step N, from 0")
+@EXPLAIN
+def command(leader: str, explain_step: int | None, explain: str | None, **options: Any) -> None:
     """Let turtle2 follow turtle1 by tf, as the tutorial does, and print its velocity commands.
 
     \b
       frametool sim follow
       frametool sim follow --spawn 1,1,0 --leader square --format csv
       frametool sim follow --leader figure8 --followers 3 --plot chain.svg --emit tf
+      frametool sim follow --explain-step 3
 
     A leader file has t, linear, angular as CSV, JSON or YAML; standard input also takes Twist messages and the words
     up, down, left, right, one a second unless they say their time: simulated time waits for the next of them, or goes
     on with --realtime, where they act when they come. A turtle at a wall is reported once, and every tick
     there is counted in the summary. Below 2 micrometres from its target a follower stands still.
     """
+    precision, told = options["precision"], _told(options)
     output, scene = output_and_scene(options, leader)
-    output.run(scene)
+    if explain_step is not None:
+        _explain(output, scene, explain_step, explain or "text", precision, told)
+    elif explain is not None:
+        raise click.UsageError("--explain derives one control step; name it with --explain-step N, from 0")
+    else:
+        output.run(scene)
+
+
+def _told(options: dict[str, Any]) -> list[str]:
+    """Name the options that are about a whole run and not about one step."""
+    named = {"live": "--live", "realtime": "--realtime", "plot": "--plot", "view": "--view"}
+    told = [option for name, option in named.items() if options[name]]
+    if options["emit"] != "commands":
+        told.append("--emit")
+    form = options["format_name"] or by_suffix(options["output"], ("yaml", "json", "csv"))
+    return [*told, f"the format {form}"] if form not in (None, "text") else told
+
+
+def _explain(output: SimOutput, scene: Scene, step: int, form: str, precision: int | None, told: list[str]) -> None:
+    """Write the derivation of one control step of the followers."""
+    if told:
+        raise click.UsageError(f"--explain-step derives one step in words; leave {' and '.join(told)} out")
+    from frametool.calc.explain.agreement import Plan
+    from frametool.calc.explain.follow import derive_follow
+    from frametool.sim.followed import follow_steps
+
+    plan = Plan(output.style, significant(precision))
+    text = derive_follow(follow_steps(scene, step), plan).render(form)
+    with writing(output.output, force=output.force) as write:
+        write(text)
 
 
 def output_and_scene(

@@ -8,11 +8,12 @@ import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
+from frametool.cli.poses import misuse_unless_rotations
 from frametool.cli.trees import load_tree, reading_options
 from frametool.documents.source import Source
-from frametool.errors import ValueInvalid, shown, warn
+from frametool.errors import ValueInvalid, shown
 from frametool.frames.tree import FrameTree
-from frametool.grammar.readers import NotARotation, Reading
+from frametool.grammar.readers import Reading
 from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_positional
 
 if TYPE_CHECKING:
@@ -71,12 +72,5 @@ def _pose(arguments: Sequence[str], flags: dict[str, str], reading: Reading) -> 
     """Read the arguments of one call."""
     if flags and arguments:
         raise click.UsageError(f"extra arguments {shown(' '.join(arguments))} beside the flags")
-    try:
-        pose = read_flags(flags, reading) if flags else read_positional(arguments, reading)
-    except NotARotation:
-        raise
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
-    for note in reading.notes:
-        warn(note.message)
-    return pose
+    with misuse_unless_rotations(reading):
+        return read_flags(flags, reading) if flags else read_positional(arguments, reading)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @verbose_option
 @pose_options
 @rotation_options
-@result_options("tree")
+@result_options("tree", "trajectory")
 def command(
     tree: str, more: Sequence[str], at: int | str | None, color: str, moving: bool, cache: int | None, tf2: str | None,
     normalize: bool, **options: Any,
@@ -43,7 +43,7 @@ def command(
     and read back, frames that move with all their samples. dot draws what moves as ROS's view_frames does, tf2 is the
     listing of tf2's all_frames_as_yaml. --at draws the tree as it stood at one time.
     """
-    output = Output("tree", **options)
+    output = Output("tree", "trajectory", **options)
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize))
     stamp = at_ns(at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), color)

@@ -1,0 +1,43 @@
+"""`frametool formats`: the forms of files, what they mean, what is read from them and written in them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from frametool.cli.command import Command, Form, list_options
+from frametool.cli.output import Output
+from frametool.formats import FORMATS
+from frametool.view.form_list import form_entry, write_form, write_forms
+
+
+@click.command(cls=Command, name="formats")
+@click.argument("name", type=Form(FORMATS, "known"), required=False)
+@list_options()
+def command(name: str | None, **options: Any) -> None:
+    """List the forms of files that are read and written: their suffixes, what their numbers mean, what they leave open.
+
+    \b
+      frametool formats
+      frametool formats yaml
+      frametool formats -f json
+
+    The names are those of --in and of -f. `asks for` names the option that says what the form leaves open. A form is
+    known by its content first, then by the suffix of the file; --in NAME decides otherwise. With NAME all is said of
+    one form, with an example where there is one. `frametool help formats` is about the options that files need.
+    """
+    output = Output("report", **options, otherwise="text")
+    entries = list(map(form_entry, FORMATS if name is None else [name]))
+    if output.style.form != "text":
+        output.report(_flat(entries) if output.style.form == "csv" else entries)
+    else:
+        output.text(write_forms(entries) if name is None else write_form(entries[0]))
+
+
+def _flat(entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Put lists into one cell each."""
+    return [
+        {key: " ".join(value) if isinstance(value, tuple) else value for key, value in entry.items()}
+        for entry in entries
+    ]

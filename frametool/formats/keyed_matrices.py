@@ -1,0 +1,213 @@
+"""Matrices under keys that say what they do, wherever in a document: what camchains, OpenCV and EuRoC files share."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import shown
+from frametool.formats.document_edges import Unclear, dotted
+from frametool.formats.matrix_keys import Ambiguous, Meaning, meaning_of, no_pose, partner_of
+from frametool.formats.matrix_values import grid_of, is_tagged, read_shift, read_turn, read_whole, whole_pose
+from frametool.formats.opencv_text import TAGS
+from frametool.formats.stated_poses import Stated, edges_of
+from frametool.grammar.edges import DIRECTIONS
+from frametool.grammar.readers import Misfit, kind, within
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.formats.matrix_keys import Pair
+    from frametool.formats.matrix_values import Grid
+    from frametool.grammar.edges import Answers, Edge
+    from frametool.grammar.readers import Path, Reading
+
+MOST_TOLD = 3  # matrices that are no poses
+
+
+class Block(NamedTuple):
+    """A map of a document that may hold matrices: what it is called, and the way to it."""
+
+    name: str
+    entries: dict[str, Any]
+    path: Path
+
+
+class Naming(NamedTuple):
+    """How frames are called that no key names.
+
+    base: what all is seen from; alone: what a matrix outermost in the file belongs to; told: all names of `--frames`
+    blocks: names of blocks by their place in the file, where they were told
+    """
+
+    base: str
+    alone: str
+    told: tuple[str, ...] = ()
+    blocks: tuple[str, ...] = ()
+
+
+class Matrices:
+    """The poses of one document, and which of its matrices are none."""
+
+    def __init__(self, document: dict[str, Any], naming: Naming, answers: Answers, reading: Reading) -> None:
+        """Read all of it; raises Misfit."""
+        self.naming = naming
+        self.answers = answers
+        self.reading = reading
+        self.left: list[str] = []
+        self.asked = 0
+        self.blocks = list(_renamed(_blocks(document, "", ()), naming))
+        self.names = [block.name for block in self.blocks]
+        self.poses = [pose for block in self.blocks for pose in self._of_block(block)]
+
+    def edges(self) -> list[Edge]:
+        """Return the edges that the poses make; raises Misfit where they contradict each other."""
+        return edges_of(self.poses, self.reading)
+
+    def about(self, edges: list[Edge]) -> str:
+        """Say how many poses there are, and what was left out."""
+        count = f"{len(edges)} {'pose' if len(edges) == 1 else 'poses'}"
+        more = f" and {len(self.left) - MOST_TOLD} more" if len(self.left) > MOST_TOLD else ""
+        verb = "is no pose" if len(self.left) == 1 else "are no poses"
+        return f"{count}; {', '.join(self.left[:MOST_TOLD])}{more} {verb}" if self.left else count
+
+    def _of_block(self, block: Block) -> Iterator[Stated]:
+        """Yield the poses of one map."""
+        paired: set[str] = set()
+        for key, value in block.entries.items():
+            if key in paired:
+                continue
+            self.reading.here = (*block.path, key)
+            grid = within(self.reading.here, grid_of, value)
+            partner = partner_of(key, [other for other in block.entries if other != key]) if grid else None
+            if grid is not None and partner is not None:
+                paired.add(partner.translation)
+                yield self._pair(block, key, grid, partner)
+            elif (pose := self._single(block, key, value, grid)) is not None:
+                yield pose
+
+    def _single(self, block: Block, key: str, value: Any, grid: Grid | None) -> Stated | None:
+        """Return the pose under one key, if it is one."""
+        path = (*block.path, key)
+        whole = whole_pose(grid)
+        known = self._known(block)
+        meaning = meaning_of(key, known, self.naming.told)
+        says = isinstance(meaning, Meaning) and meaning.said
+        if says and whole is None and grid is not None and grid.holds(12):
+            whole = whole_pose(grid._replace(rows=3, columns=4))
+        if says and whole is None and (grid is not None or type(value) is not str):
+            found = grid.size if grid else kind(value)
+            raise Misfit(f"{key}: expected a 4 x 4 or 3 x 4 matrix, found {found}", path)
+        if whole is None or (not says and no_pose(key)):
+            self._leave(path, value, grid)
+            return None
+        if meaning is None or not says:
+            meaning = self._directed(block, key, path, meaning)
+        if isinstance(meaning, Ambiguous):
+            ways = " or ".join(f"{a},{b}" for a, b in meaning.names)
+            raise Unclear(f"{key} may name its two frames in several ways; give --frames {ways}", path, key=True)
+        if "" in (meaning.target, meaning.source):
+            raise Misfit(f"{key}: there is no camera before {block.name}", path, key=True)
+        components = within(path, read_whole, whole, self.reading)
+        return Stated(*meaning[:3], components, path, chained=key == "T_cn_cnm1")
+
+    def _known(self, block: Block) -> dict[str, str]:
+        """Return the names that the templates of the table stand for."""
+        base = self.naming.base or "imu"
+        body = self.naming.base or "body"
+        inertial = next((each.name for each in self.blocks if each is not block and "T_BS" in each.entries), body)
+        me = block.name or self.naming.alone
+        return {"me": me, "before": self._before(block), "imu": base, "body": body, "sensor": inertial}
+
+    def _before(self, block: Block) -> str:
+        """Return the camera before this one: cam0 of cam1; else the block before it; "" if there is none."""
+        at = self.names.index(block.name)
+        if not self.naming.blocks and (match := re.fullmatch(r"(.*?)([0-9]+)", block.name)):
+            lower = f"{match[1]}{int(match[2]) - 1}"
+            return lower if lower in self.names else ""
+        return self.names[at - 1] if at > 0 else ""
+
+    def _directed(self, block: Block, key: str, path: Path, named: Meaning | Ambiguous | None) -> Meaning | Ambiguous:
+        """Return what a key means that does not say its direction, as it was told; raises Unclear if it was not."""
+        if isinstance(named, Ambiguous):
+            return named
+        if named is not None:
+            parent, child = named.target, named.source
+        else:
+            told = self.naming.told[1:]
+            parent = self.naming.base or ("imu" if block.name else "body")
+            child = block.name or (told[self.asked] if self.asked < len(told) else key.rpartition(".")[2])
+            self.asked += 1
+        return self._told(dotted(path), path, parent, child)
+
+    def _told(self, what: str, path: Path, parent: str, child: str) -> Meaning:
+        """Return the direction that was told for two frames; raises Unclear if none was."""
+        if not self.answers.direction:
+            one, other = DIRECTIONS
+            ways = f"--direction {one} (takes points of {child} to {parent}) or {other} (of {parent} to {child})"
+            raise Unclear(f"{shown(what)}: the key does not say its direction: give {ways}", path, key=True)
+        ends = (parent, child) if self.answers.direction == DIRECTIONS[0] else (child, parent)
+        return Meaning(*ends, child)
+
+    def _pair(self, block: Block, key: str, turn: Grid, pair: Pair) -> Stated:
+        """Read a rotation and the translation beside it."""
+        path, place = (*block.path, key), (*block.path, pair.translation)
+        shift = within(place, grid_of, block.entries[pair.translation])
+        if shift is None:
+            found = kind(block.entries[pair.translation])
+            raise Misfit(f"{pair.translation}: expected 3 numbers, found {found}", place)
+        if pair.target:
+            target, source = self._names_of(pair)
+            meaning = Meaning(target, source, target if pair.target == "cam1" else source)
+        else:
+            parent, child = self.answers.names(self.naming.base or "body", block.name or key)
+            meaning = self._told(f"{key} and {pair.translation}", path, parent, child)
+        rotation = within(path, read_turn, turn, self.reading)
+        return Stated(*meaning[:3], (*within(place, read_shift, shift), *rotation), path)
+
+    def _names_of(self, pair: Pair) -> tuple[str, str]:
+        """Return target and source of a pair under the names that were told; of two cameras cam0 is told first."""
+        if pair.target == "cam1":
+            source, target = self.answers.names(pair.source, pair.target)
+        else:
+            target, source = self.answers.names(pair.target, pair.source)
+        return target, source
+
+    def _leave(self, path: Path, value: Any, grid: Grid | None) -> None:
+        """Keep the name of a matrix that is no pose."""
+        is_matrix = grid is not None and (grid.rows > 1 or type(value) is dict)
+        if is_matrix or any(is_tagged(value, tag) for tag in TAGS):
+            what = no_pose(str(path[-1]))
+            self.left.append(f"{dotted(path)} ({what})" if what else dotted(path))
+
+
+def _renamed(blocks: Iterator[Block], naming: Naming) -> Iterator[Block]:
+    """Yield the blocks, those that hold cameras under the names that were told."""
+    names = iter(naming.blocks)
+    for block in blocks:
+        is_camera = block.name and not block.name.startswith("imu") and any(map(_is_pose, block.entries))
+        yield block._replace(name=next(names, block.name)) if is_camera else block
+
+
+def _is_pose(key: str) -> bool:
+    return key.startswith("T_")
+
+
+def _blocks(entries: dict[str, Any], name: str, path: Path, depth: int = 0) -> Iterator[Block]:
+    """Yield a map and the maps in it; those of a list by its name and their number."""
+    yield Block(name, entries, path)
+    for key, value in entries.items():
+        here = (*path, key)
+        if depth > 8:
+            return
+        if type(value) is dict and not {"rows", "cols", "data"} <= value.keys():
+            yield from _blocks(value, _block_name(key), here, depth + 1)
+        elif type(value) is list:
+            for index, each in enumerate(value):
+                if type(each) is dict:
+                    yield from _blocks(each, f"{_block_name(key)}{index}", (*here, index), depth + 1)
+
+
+def _block_name(key: str) -> str:
+    """Return what a block is about: okvis writes `cameras`, `imu_params`."""
+    return {"cameras": "cam", "imu_params": "imu", "imu_parameters": "imu"}.get(key, key)

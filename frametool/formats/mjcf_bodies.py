@@ -1,0 +1,198 @@
+"""The bodies, sites, cameras and joints of an MJCF model, in the order in which MuJoCo counts them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import shown
+from frametool.formats.joints import Joint
+from frametool.formats.mjcf_attributes import Classes, PoseReader, own_attributes
+from frametool.geometry import quaternion, rigid
+from frametool.geometry.trig import DEGREE
+
+if TYPE_CHECKING:
+    from frametool.documents.xml_events import XmlFile
+    from frametool.documents.xml_tree import XmlNode
+    from frametool.formats.mjcf_attributes import Attributes
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Vector
+
+IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+WORLD = "world"
+WHOLE = "save it whole: mujoco.mj_saveLastXML('whole.xml', mujoco.MjModel.from_xml_path('FILE'))"
+REFUSED = ("include", "replicate", "attach")
+MADE = ("composite", "flexcomp")
+JOINTS = ("joint", "freejoint")
+INSIDE = ("body", "frame", *JOINTS, "site", "camera", *REFUSED, *MADE)
+HELD = {
+    "mujoco": ("compiler", "default", "worldbody", "keyframe", "include"),
+    "default": ("default", "joint", "site", "camera", "include"),
+    "worldbody": INSIDE,
+    "body": INSIDE,
+    "frame": INSIDE,
+    "keyframe": ("key", "include"),
+}
+TYPES = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "floating"}
+
+
+class Anchored(NamedTuple):
+    """A joint of a body, and the point of the body that it turns about."""
+
+    joint: Joint
+    anchor: Vector
+    node: XmlNode
+
+
+class Placed(NamedTuple):
+    """A body, site or camera: its pose in its parent where every joint is at its reference, and its joints in order."""
+
+    parent: str
+    name: str
+    pose: Rigid
+    joints: list[Anchored]
+    node: XmlNode
+
+
+class _Inside(NamedTuple):
+    """What surrounds an element: its body, the default class, and the frames in the body that it stands in."""
+
+    body: Placed
+    around: str
+    frame: Rigid
+
+
+class MjcfModel:
+    """The frames of a model, bodies before what they hold."""
+
+    def __init__(self, root: XmlNode, xml: XmlFile, options: Options) -> None:
+        """Read a model; raises FormatError."""
+        self.xml = xml
+        self.options = options
+        self._refuse(root)
+        self.poses = PoseReader(root, xml)
+        for section in root.all("default"):
+            self._refuse(section)
+        self.classes = Classes(root, xml)
+        self.placed: dict[str, Placed] = {}
+        self.joint_names: dict[str, XmlNode] = {}
+        self._counts: dict[tuple[str, str], int] = {}
+        self.world = Placed("", WORLD, IDENTITY, [], root)
+        for section in root.all("worldbody"):
+            self._walk(section)
+
+    @property
+    def joints(self) -> list[Anchored]:
+        """Return all joints in the order of qpos: body by body, those of a body before those of the bodies in it."""
+        return [joint for placed in self.placed.values() for joint in placed.joints]
+
+    def _refuse(self, node: XmlNode) -> None:
+        """Refuse what MuJoCo would have to expand first."""
+        for child in node.all(*REFUSED):
+            message = f"<{child.tag}> is not expanded here; {WHOLE}"
+            raise self.xml.error(child.element, message)
+
+    def _walk(self, section: XmlNode) -> None:
+        """Read what stands in a world in the order of the file; a stack, for bodies may be deep."""
+        self._refuse(section)
+        pending = [(child, _Inside(self.world, "", IDENTITY)) for child in reversed(section.children)]
+        while pending:
+            node, around = pending.pop()
+            if (inside := self._take(node, around)) is not None:
+                self._refuse(node)
+                pending += [(child, inside) for child in reversed(node.children)]
+
+    def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
+        """Read one element; of a body or frame return what surrounds that which it holds."""
+        if node.tag in MADE:
+            message = f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}"
+            self.options.tally.note_each(message, node.element.line)
+        elif node.tag == "frame":
+            pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node.element)))
+            return inside._replace(around=self._class(node, inside.around), frame=pose)
+        elif node.tag == "body":
+            body = self._place(node, inside, self.poses.pose(own_attributes(node.element)))
+            return _Inside(body, self._class(node, inside.around), IDENTITY)
+        elif node.tag in JOINTS:
+            self._join(node, inside)
+        else:
+            self._mark(node, inside)
+        return None
+
+    def _class(self, node: XmlNode, around: str) -> str:
+        """Return the class that a body or frame gives to what stands in it."""
+        name = node.attribute("childclass")
+        if name:
+            self.classes.check(name, node.element, "childclass")
+        return name or around
+
+    def _mark(self, node: XmlNode, inside: _Inside) -> None:
+        """Read a site or camera."""
+        attributes = self.classes.attributes(node.element, inside.around)
+        pose = self.poses.pose_of_site(attributes) if node.tag == "site" else self.poses.pose(attributes)
+        placed = self._place(node, inside, pose)
+        if "mode" in attributes and attributes["mode"].text.startswith("target"):
+            message = f"{placed.name} looks at a body; its orientation is that in the file"
+            self.options.tally.note_each(message, node.element.line)
+
+    def _place(self, node: XmlNode, inside: _Inside, pose: Rigid) -> Placed:
+        """Register a body, site or camera; sites and cameras have names of their own, and show it."""
+        name = self._name(node, inside.body.name)
+        name = name if node.tag == "body" else f"{node.tag}:{name}"
+        known = self.placed.get(name)
+        if known is not None or name == WORLD:
+            first = f"; first in line {known.node.element.line}" if known else ", which is the name of the root"
+            raise self.xml.error(node.element, f"{node.tag} {shown(name)} twice{first}", "name")
+        pose = pose if inside.frame == IDENTITY else rigid.compose(*inside.frame, *pose)
+        self.placed[name] = Placed(inside.body.name, name, pose, [], node)
+        return self.placed[name]
+
+    def _name(self, node: XmlNode, body: str) -> str:
+        """Return the name of an element; one without is counted in its body."""
+        if name := node.attribute("name"):
+            return name
+        count = self._counts[body, node.tag] = self._counts.get((body, node.tag), 0) + 1
+        return f"{body}/{node.tag}{count}"
+
+    def _join(self, node: XmlNode, inside: _Inside) -> None:
+        """Read a joint of a body."""
+        body = inside.body
+        if body is self.world:
+            raise self.xml.error(node.element, "the world has no joints; put it into a <body>")
+        free = node.tag == "freejoint"
+        attributes = own_attributes(node.element) if free else self.classes.attributes(node.element, inside.around)
+        kind = "free" if free else self.poses.word(attributes, "type", "hinge", tuple(TYPES))
+        name = node.attribute("name") or f"{body.name}/joint{len(body.joints) + 1}"
+        if known := self.joint_names.get(name):
+            raise self.xml.error(node.element, f"joint {shown(name)} twice; first in line {known.element.line}", "name")
+        if kind == "free" and body.parent != WORLD:
+            message = f"joint {shown(name)} is free: it belongs into a body directly in the world"
+            raise self.xml.error(node.element, message)
+        if body.joints and "floating" in (body.joints[0].joint.kind, TYPES[kind]):
+            message = f"joint {shown(name)} beside others in body {shown(body.name)}, one of them free; keep that"
+            raise self.xml.error(node.element, message)
+        self.joint_names[name] = node
+        body.joints.append(self._anchored(node, name, kind, attributes, inside.frame))
+
+    def _anchored(self, node: XmlNode, name: str, kind: str, attributes: Attributes, frame: Rigid) -> Anchored:
+        """Read the axis, anchor, limits and reference of a joint; frames around it move axis and anchor."""
+        if kind == "free":
+            return Anchored(Joint(name, "floating", line=node.element.line), (0.0, 0.0, 0.0), node)
+        px, py, pz = self.poses.numbers(attributes, "pos", 3, (0.0, 0.0, 0.0))
+        anchor = rigid.apply(*frame, px, py, pz)
+        if kind == "ball":
+            return Anchored(Joint(name, "ball", line=node.element.line), anchor, node)
+        axis = quaternion.rotate(*frame[3:], *self.poses.direction(attributes, "axis", (0.0, 0.0, 1.0)))
+        degrees = kind == "hinge" and self.poses.degrees
+        (rest,) = (value * DEGREE if degrees else value for value in self.poses.numbers(attributes, "ref", 1, (0.0,)))
+        lower, upper = self._limits(attributes, degrees=degrees)
+        return Anchored(Joint(name, TYPES[kind], axis, lower, upper, rest=rest, line=node.element.line), anchor, node)
+
+    def _limits(self, attributes: Attributes, *, degrees: bool) -> tuple[float | None, float | None]:
+        """Read the range of a joint, where it is limited: by default where it has one."""
+        limited = self.poses.word(attributes, "limited", "auto", ("auto", "true", "false"))
+        applies = limited == "true" or (limited == "auto" and self.poses.limits_apply)
+        if "range" not in attributes or not applies:
+            return None, None
+        lower, upper = self.poses.numbers(attributes, "range", 2, ())
+        return (lower * DEGREE, upper * DEGREE) if degrees else (lower, upper)

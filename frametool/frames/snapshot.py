@@ -1,0 +1,121 @@
+"""Frames at one time: every edge then, which have no data then, and all poses seen from one frame at once."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+from frametool.errors import BadTopology, LookupFailed
+from frametool.frames.path import IDENTITY
+from frametool.geometry import rigid
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Rigid
+
+
+class SeenPose(NamedTuple):
+    """The pose of a frame as it is seen from another one.
+
+    reach: the largest coordinate on the way, in metres; rounding is in proportion to it
+    """
+
+    components: Rigid
+    reach: float
+
+
+class Snapshot:
+    """The edges of a tree at one time, or each as it was last.
+
+    edges: child -> its parent and its pose there, parent_from_child
+    without_data: the frames that move and have no data at that time
+    """
+
+    def __init__(self, tree: Frames, at_ns: int | None = None) -> None:
+        """Take the edges of a tree; `at_ns` None is the latest of each."""
+        self.tree = tree
+        self.at_ns = at_ns
+        self.edges: dict[str, tuple[str, Rigid]] = {}
+        self.without_data: set[str] = set()
+        for track in tree.tracks():
+            pose = track.components if at_ns is None else track.at(at_ns)
+            parent = track.parent if at_ns is None else track.parent_at(at_ns)
+            if pose is None or parent is None:
+                self.without_data.add(track.child)
+            else:
+                self.edges[track.child] = parent, pose
+
+    def parent(self, frame: str) -> str | None:
+        """Return a frame's parent; None for a root, and where there is no data."""
+        return self.edges[frame][0] if frame in self.edges else None
+
+    @cached_property
+    def roots(self) -> dict[str, str]:
+        """Return the root above each frame, itself for a root; frames with one root hang together."""
+        roots: dict[str, str] = {}
+        for frame in self.tree.frames:
+            line: dict[str, None] = {}
+            above: str | None = frame
+            while above is not None and above not in roots and above not in line:
+                line[above] = None
+                above = self.parent(above)
+            root = next(reversed(line)) if line and above is None else frame if above in line else roots[above or frame]
+            roots.update(dict.fromkeys(line, root))
+        return roots
+
+    @cached_property
+    def _children(self) -> dict[str, list[str]]:
+        children: dict[str, list[str]] = {}
+        for child, (parent, _) in self.edges.items():
+            children.setdefault(parent, []).append(child)
+        return children
+
+    def below(self, start: str) -> list[str]:
+        """List a frame and all below it, the nearest first."""
+        found = [start]
+        for frame in found:  # it grows as it is walked
+            found += (child for child in self._children.get(frame, ()) if child != start)
+        return found
+
+    def seen_from(self, start: str) -> dict[str, SeenPose]:
+        """Return the pose in `start` of every frame that hangs together with it.
+
+        At the latest, what moves is looked up frame by frame: each at the time that the edges on its way share.
+        """
+        if self.at_ns is None and self.tree.moves:
+            return self._looked_up(start)
+        found = {start: SeenPose(IDENTITY, 0.0)}
+        pending = [start]
+        for frame in pending:  # it grows as it is walked
+            if frame in self.edges and (parent := self.edges[frame][0]) not in found:
+                found[parent] = _further(found[frame], rigid.inverse(*self.edges[frame][1]))
+                pending.append(parent)
+            for child in self._children.get(frame, ()):
+                if child not in found:
+                    found[child] = _further(found[frame], self.edges[child][1])
+                    pending.append(child)
+        return found
+
+    def _looked_up(self, start: str) -> dict[str, SeenPose]:
+        """Look every frame up that is connected and has a time at which it is."""
+        found = {}
+        for frame in self.tree.frames:
+            try:
+                pose = self.tree.lookup_components(start, frame)
+                way = self.tree.way(start, frame)
+            except (LookupFailed, BadTopology):
+                continue
+            found[frame] = SeenPose(pose, max(map(_size, [pose, *(track.components for track in way)])))
+        return found
+
+
+def _further(seen: SeenPose, step: Rigid) -> SeenPose:
+    """Return the pose behind one more edge."""
+    pose = rigid.compose(*seen.components, *step)
+    return SeenPose(pose, max(seen.reach, _size(step), _size(pose)))
+
+
+def _size(pose: Rigid) -> float:
+    x, y, z = map(abs, pose[:3])
+    return float(max(x, y, z))

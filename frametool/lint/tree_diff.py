@@ -1,0 +1,348 @@
+"""What differs between two trees: frames only one has, other parents, and how far each common frame moved.
+
+Signs of quaternions and the order of names do not count.  Where a tree moves it is compared at one time.
+"""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import shown
+from frametool.frames.snapshot import Snapshot
+from frametool.frames.stamps import format_stamp
+from frametool.geometry import floats, rigid
+from frametool.geometry.rotation import NEAR
+from frametool.geometry.transform import NEAR_BY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.frames.lookups import Frames
+    from frametool.frames.snapshot import SeenPose
+    from frametool.frames.track import MovingTrack
+    from frametool.geometry.types import Rigid
+
+ROUNDING = 2.0**-46  # of the largest number on a way: what a product of some dozens of poses is off at most
+
+# kind -> what it is, in the order in which differences are told; each of them makes two trees different
+KINDS = {
+    "only-in-a": "a frame that B does not have",
+    "only-in-b": "a frame that A does not have",
+    "parent": "a frame that hangs under another parent, or under none",
+    "motion": "a frame that stands still in one and moves in the other",
+    "no-data": "a frame without data at that time",
+    "samples": "a frame that moves in both, but otherwise",
+    "moved": "a frame that has another pose, in its parent or seen from elsewhere",
+}
+SAME = "same"
+
+
+class Tolerance(NamedTuple):
+    """How far frames may be apart and still count as the same: metres and radians."""
+
+    metres: float = NEAR_BY
+    radians: float = NEAR
+
+    def covers(self, apart: Apart | None) -> bool:
+        """Return whether two poses are so near; what is not known does not count."""
+        if apart is None:
+            return True
+        return apart.metres <= self.metres + apart.rounding and apart.radians <= self.radians + apart.turn_rounding
+
+    def times(self, apart: Apart | None) -> float:
+        """Return how many tolerances two poses are apart: what differences are sorted by; -1 where it is not known."""
+        if apart is None:
+            return -1.0
+        return max(apart.metres / (self.metres or NEAR_BY), apart.radians / (self.radians or NEAR))
+
+
+class Apart(NamedTuple):
+    """How far two poses are apart, in metres and radians, and how much of that may be rounding."""
+
+    metres: float
+    radians: float
+    rounding: float = 0.0
+    turn_rounding: float = 0.0
+
+    @property
+    def millimetres(self) -> float:
+        """Return the distance in mm."""
+        return 1e3 * self.metres
+
+    @property
+    def degrees(self) -> float:
+        """Return the angle in degrees."""
+        return degrees(self.radians)
+
+    def __str__(self) -> str:
+        """Write it in mm and degrees, with four digits or all before the point."""
+        far = self.millimetres
+        return f"{far:{'.0f' if 1e3 <= far < 1e9 else '.4g'}} mm and {self.degrees:.4g} deg"
+
+
+class Difference(NamedTuple):
+    """What differs about one frame.
+
+    kind: one of KINDS, or `same` for a frame that did not move
+    parent_a, parent_b: None for a root and where the frame is not there
+    own: how far it moved in its own parent; None where the parents are not the same, and for roots
+    seen_from: a frame from which it is seen in both; None if there is none
+    seen: how far it moved as seen from there
+    note: what else there is to say, in words
+    """
+
+    kind: str
+    frame: str
+    parent_a: str | None = None
+    parent_b: str | None = None
+    own: Apart | None = None
+    seen_from: str | None = None
+    seen: Apart | None = None
+    note: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """Say it in one line."""
+        name, note = shown(self.frame), f": {self.note}" if self.note else ""
+        at_a, at_b = map(_under, (self.parent_a, self.parent_b))
+        seen = f"seen from {shown(self.seen_from)} it moved {self.seen}" if self.seen else ""
+        match self.kind:
+            case "only-in-a":
+                return f"{name}, {at_a}, is only in A{note}"
+            case "only-in-b":
+                return f"{name}, {at_b}, is only in B{note}"
+            case "parent":
+                return "; ".join(filter(None, (f"{name} is {at_a} in A, {at_b} in B", seen, self.note)))
+            case "moved" | "same":
+                own = f"{name} moved {self.own or 'nowhere'} in {shown(self.parent_a)}" if self.parent_a else name
+                return "; ".join(filter(None, (own, seen, self.note)))
+            case "samples":
+                return f"{name} moves otherwise{f' by up to {self.own}' if self.own else ''}{note}"
+        return f"{name}{note}"
+
+
+def entry(each: Difference) -> dict[str, Any]:
+    """Return a difference as plain values: lengths in mm, angles in degrees."""
+    return {
+        "kind": each.kind,
+        "frame": each.frame,
+        "parent_a": each.parent_a,
+        "parent_b": each.parent_b,
+        "moved_mm": each.own and each.own.millimetres,
+        "moved_deg": each.own and each.own.degrees,
+        "seen_from": each.seen_from,
+        "seen_mm": each.seen and each.seen.millimetres,
+        "seen_deg": each.seen and each.seen.degrees,
+        "note": each.note or None,
+    }
+
+
+def _under(parent: str | None) -> str:
+    return "a root" if parent is None else f"under {shown(parent)}"
+
+
+class Comparison(NamedTuple):
+    """What differs between two trees.
+
+    differences: by kind, the farthest first
+    unmoved: the common frames of which nothing is told there
+    notes: sentences about how the two were compared
+    uncompared: frames that could not be compared: neither has data at that time
+    """
+
+    differences: list[Difference]
+    unmoved: list[Difference]
+    notes: list[str]
+    uncompared: list[str]
+
+
+def diff(
+    a: Frames, b: Frames, *, at_ns: int | None = None, seen_from: str | None = None,
+    tolerance: tuple[float, float] = Tolerance(),
+) -> Comparison:  # fmt: skip
+    """Compare two trees, or two recordings at one time: a frame moves from its pose in A to its pose in B.
+
+    at_ns: the time; None is the latest of each.  seen_from: a frame of both; None is the root of each part of A, or
+    what is nearest to it and in both.  tolerance: metres and radians that do not count.
+    Raises UnknownFrame for a `seen_from` that is not in both.
+    """
+    pair = _Pair(a, b, at_ns, Tolerance(*tolerance))
+    if seen_from is not None:
+        for tree in (a, b):
+            tree.require(seen_from, seen_from)
+    pair.see(seen_from)
+    found = [*pair.only(), *(each for frame in pair.common for each in pair.about(frame))]
+    order = {kind: number for number, kind in enumerate((*KINDS, SAME))}
+    limit = pair.tolerance
+    found.sort(key=lambda each: (order[each.kind], -_own_size(each, limit), -limit.times(each.seen)))
+    return Comparison(
+        [each for each in found if each.kind != SAME],
+        [each for each in found if each.kind == SAME],
+        [*pair.notes, *_times(a, b, at_ns)],
+        [frame for frame in pair.common if pair.is_blind(frame)],
+    )
+
+
+def _own_size(each: Difference, tolerance: Tolerance) -> float:
+    """Return by how much a frame moved itself: what only went along with its parent comes behind."""
+    return -1.0 if tolerance.covers(each.own) else tolerance.times(each.own)
+
+
+class _Pair:
+    """Two trees at one time, side by side."""
+
+    def __init__(self, a: Frames, b: Frames, at_ns: int | None, tolerance: Tolerance) -> None:
+        """Take both at that time."""
+        self.a, self.b = Snapshot(a, at_ns), Snapshot(b, at_ns)
+        self.tolerance = tolerance
+        in_b = frozenset(b.frames)
+        self.common = [frame for frame in a.frames if frame in in_b]
+        self.notes: list[str] = []
+        self.seen: dict[str, tuple[str, Apart]] = {}  # frame -> from where, how far it moved
+        self.start: str | None = None  # from where all frames are seen, if that was told
+
+    # --- seen from one frame ---
+
+    def see(self, start: str | None) -> None:
+        """Compare all frames as they are seen from `start`, or each part of the trees from a frame of its own."""
+        if start is not None:
+            self.start = start
+            self._see_from(start)
+            return
+        parts: dict[tuple[str, str], set[str]] = {}
+        for frame in self.common:
+            parts.setdefault((self.a.roots[frame], self.b.roots[frame]), set()).add(frame)
+        for (root, other), frames in parts.items():
+            if len(frames) > 1:
+                start = next(frame for frame in self.a.below(root) if frame in frames)
+                if start != root:
+                    where = f"of B hangs from {shown(other)}" if root in self.b.tree.frames else "is not in B"
+                    self.notes.append(f"seen from {shown(start)}, because the root of A, {shown(root)}, {where}")
+                self._see_from(start)
+        if len(parts) > 1 and not (self.a.without_data or self.b.without_data):
+            self.notes.append(f"{len(parts)} parts that hang together in A and in B, each seen from a frame of its own")
+
+    def _see_from(self, start: str) -> None:
+        in_a, in_b = self.a.seen_from(start), self.b.seen_from(start)
+        for frame in self.common:
+            if frame != start and frame in in_a and frame in in_b and frame not in self.seen:
+                self.seen[frame] = start, _apart_seen(in_a[frame], in_b[frame])
+
+    # --- what there is to say ---
+
+    def only(self) -> Iterator[Difference]:
+        """Yield the frames that only one has."""
+        in_a, in_b = frozenset(self.a.tree.frames), frozenset(self.b.tree.frames)
+        gone = [frame for frame in self.a.tree.frames if frame not in in_b]
+        new = [frame for frame in self.b.tree.frames if frame not in in_a]
+        renamed = self._renamed(gone, new)
+        before = {after: frame for frame, after in renamed.items()}
+        for frame in gone:
+            note = f"renamed to {shown(renamed[frame])}? it has the same pose" if frame in renamed else ""
+            yield Difference("only-in-a", frame, self.a.parent(frame), None, note=note)
+        for frame in new:
+            note = f"renamed from {shown(before[frame])}? it has the same pose" if frame in before else ""
+            yield Difference("only-in-b", frame, None, self.b.parent(frame), note=note)
+
+    def _renamed(self, gone: Sequence[str], new: Sequence[str]) -> dict[str, str]:
+        """Find the frames of A that stand under another name in B: the one pair with the same pose in one parent."""
+        by_parent: dict[str, tuple[list[str], list[str]]] = {}
+        for side, frames, at in ((self.a, gone, 0), (self.b, new, 1)):
+            for frame in frames:
+                if parent := side.parent(frame):
+                    by_parent.setdefault(parent, ([], []))[at].append(frame)
+        found: dict[str, str] = {}
+        for old, fresh in by_parent.values():
+            if len(old) * len(fresh) > MOST_PAIRS:
+                continue
+            pairs = [(frame, each) for frame in old for each in fresh if self._same_pose(frame, each)]
+            froms, tos = ([pair[at] for pair in pairs] for at in (0, 1))
+            found.update(pair for pair in pairs if froms.count(pair[0]) == tos.count(pair[1]) == 1)
+        return found
+
+    def _same_pose(self, frame: str, other: str) -> bool:
+        return self.tolerance.covers(_apart(self.a.edges[frame][1], self.b.edges[other][1]))
+
+    def about(self, frame: str) -> Iterator[Difference]:
+        """Yield what differs about a frame that both have; `same` if nothing does."""
+        parent_a, parent_b = self.a.parent(frame), self.b.parent(frame)
+        blind_a, blind_b = frame in self.a.without_data, frame in self.b.without_data
+        start, seen = self.seen.get(frame, (None, None))
+        said = Difference(SAME, frame, parent_a, parent_b, None, start, seen)
+        if seen is None and self.start not in (None, frame):
+            said = said._replace(note=f"not connected to {shown(self.start)} in both")
+        if note := self._other_motion(frame):
+            yield Difference("motion", frame, parent_a, parent_b, note=note)
+        if blind_a or blind_b:
+            where = "A and B" if blind_a and blind_b else "A" if blind_a else "B"
+            yield said._replace(kind="no-data", note=f"no data in {where} at {format_stamp(self.a.at_ns or 0)}")
+        elif parent_a != parent_b:
+            yield said._replace(kind="parent")
+        else:
+            own = _apart(self.a.edges[frame][1], self.b.edges[frame][1]) if parent_a is not None else None
+            if self.a.at_ns is None and (other := self._other_samples(frame)):
+                yield other
+            same = self.tolerance.covers(own) and self.tolerance.covers(seen)
+            yield said._replace(kind=SAME if same else "moved", own=own)
+
+    def is_blind(self, frame: str) -> bool:
+        """Return whether neither has data on a frame at that time."""
+        return frame in self.a.without_data and frame in self.b.without_data
+
+    def _other_motion(self, frame: str) -> str:
+        """Say in which of the two a frame moves, if it stands still in the other."""
+        one, other = self.a.tree.track(frame), self.b.tree.track(frame)
+        if one is None or other is None or one.standing == other.standing:
+            return ""
+        return "stands still in A, moves in B" if one.standing else "moves in A, stands still in B"
+
+    def _other_samples(self, frame: str) -> Difference | None:
+        """Compare all samples of a frame that moves in both."""
+        one, other = self.a.tree.track(frame), self.b.tree.track(frame)
+        if one is None or other is None or one.standing or other.standing:
+            return None
+        found = Difference("samples", frame, one.parent, other.parent)
+        if one.count != other.count or one.span != other.span:
+            return found._replace(note=f"{_covered(one)} in A, {_covered(other)} in B")
+        farthest = Apart(0.0, 0.0)
+        at_ns = None
+        for (stamp_a, parent_a, pose_a), (stamp_b, parent_b, pose_b) in zip(one.walk(), other.walk(), strict=True):
+            if stamp_a != stamp_b or parent_a != parent_b:
+                what = "another stamp" if stamp_a != stamp_b else "another parent"
+                return found._replace(note=f"{what} in B, first for that of A at {format_stamp(stamp_a)}")
+            apart = _apart(pose_a, pose_b) if pose_a != pose_b else None
+            if apart is not None and self.tolerance.times(apart) > self.tolerance.times(farthest):
+                farthest, at_ns = apart, stamp_a
+        if at_ns is None or self.tolerance.covers(farthest):
+            return None
+        return found._replace(own=farthest, note=f"farthest at {format_stamp(at_ns)}")
+
+
+MOST_PAIRS = 10_000  # of frames below one parent that are compared
+
+
+def _apart(a: Rigid, b: Rigid) -> Apart:
+    return Apart(*rigid.distance(*a, *b, floats))
+
+
+def _apart_seen(a: SeenPose, b: SeenPose) -> Apart:
+    apart = _apart(a.components, b.components)
+    return apart._replace(rounding=ROUNDING * max(a.reach, b.reach), turn_rounding=ROUNDING)
+
+
+def _covered(track: MovingTrack) -> str:
+    first, last = map(format_stamp, track.span)
+    return f"{track.count} sample{'s' * (track.count != 1)} {first} .. {last}"
+
+
+def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
+    """Say at which times the two are compared, if anything moves and no time was told."""
+    if at_ns is not None or not (a.moves or b.moves):
+        return
+    told = " and ".join(f"{name} {format_stamp(_newest(tree))}" for name, tree in (("A", a), ("B", b)) if tree.moves)
+    yield f"what moves is compared at its latest ({told}), and sample by sample; --at TIME compares at one time"
+
+
+def _newest(tree: Frames) -> int:
+    return max(track.last_ns for track in tree.tracks() if not track.standing)

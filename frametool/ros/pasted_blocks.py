@@ -1,0 +1,166 @@
+"""What people paste from ROS tools: blocks of tf2_echo, arguments of publishers, parts of `rostopic echo`.
+
+    At time 1253924110.083                                            ROS 1 and tf_echo
+    - Translation: [0.000, 0.000, 0.025]
+    - Rotation: in Quaternion [0.000, 0.000, 0.000, 1.000]            ROS 2: in Quaternion (xyzw) [..]
+                in RPY (radian) [0.000, -0.000, 0.000]
+    args="0 0 5 0 0 0 world odom 100"                                 x y z yaw pitch roll parent child ms
+
+All become text of the grammar of poses, and what `pasted_poses` knows with them.  Of a block the quaternion counts:
+its angles and its matrix say the same with as few digits.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.json_reader import looks_like_json, parse_json
+from frametool.documents.json_writer import Verbatim, dump
+from frametool.documents.source import Pasted, Source
+from frametool.errors import FormatError, ValueInvalid, warn
+from frametool.frames.stamps import parse_stamp
+from frametool.grammar.pasted import DECIMAL, NUMBER, pasted_poses
+from frametool.grammar.readers import Reading
+from frametool.ros.publisher import CALL, read_call
+
+if TYPE_CHECKING:
+    from frametool.geometry.representations import Notation
+
+MOST_PASTED = 1 << 16  # characters
+_LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
+_TRANSLATION = re.compile(rf"(?m)^\s*-\s+Translation:\s*{_LIST}")
+_TIME = re.compile(rf"(?m)^\s*At time ({NUMBER})")
+_HEADING = re.compile(r"(?m)^(\S+) seen from (\S+) \(maps points")  # frametool's own block
+_ROTATIONS = (
+    ("xyzw", re.compile(rf"in Quaternion(?: \(xyzw\))?\s*{_LIST}")),
+    ("rpy", re.compile(rf"in RPY \(radian\)\s*{_LIST}")),
+    ("rpy_deg", re.compile(rf"in RPY \(degree\)\s*{_LIST}")),
+)
+_ARGS = re.compile(r"\bargs\s*[=:]\s*([\"'])(.*?)\1", re.DOTALL)
+_ROW = rf"{NUMBER}(?:[ \t]*,[ \t]*|[ \t]+){NUMBER}"
+_BEGIN = re.compile(
+    rf"""(?x)\s*(?:
+    (?:[A-Za-z_]\w*\s*=\s*)?                                # T =
+    (?: [A-Za-z_][\w.]*\(\s*[-+.\d\[(A-Za-z_]               # array([[.., Quaternion(x=..
+      | [\[({{][\[({{\s]*(?:{NUMBER}(?:[\s;]|\s*[,\])}}])|np\.)  # [[1. 0., [1 0; 0 1], [0, 0, 0.7, 0.7]
+      | {NUMBER}(?:\s*[,;\n]|[ \t]+[-+.\d*]|\s*\Z)           # bare numbers, MATLAB's factor
+      | [-+]?\s*(?:{DECIMAL})?\s*\*?\s*[ijk]\s*(?:[-+]|\Z) | {NUMBER}\s*[-+] )
+    | <(?:origin|joint|node)\b | (?:args|x)\s*=
+    | (?:\[\w+\]\ .*\n\s*)*(?:At\ (?:any\ )?time\b|-\ +(?:Translation|Rotation):|\S+\ seen\ from\ )
+    | .*\b{CALL}\s | --(?:[xyz]|roll|pitch|yaw|q[xyzw]|(?:child-)?frame-id)[ =]
+    )"""
+)
+
+
+def may_be_pasted(text: str) -> bool:
+    """Tell by the beginning of a text whether it is worth looking for what people paste."""
+    return bool(_BEGIN.match(text) or _TRANSLATION.search(text, 0, 4096)) or _mended(text) != text
+
+
+def in_grammar(
+    source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
+) -> Source | None:
+    """Return a pasted text as text of the grammar, a value a line; None for what is none, or is grammar already.
+
+    given: the notation of numbers that do not say theirs; normalize: accept any non-zero quaternion
+    points: three numbers are a point
+    Raises FormatError for what is known and cannot be taken.
+    """
+    text = source.text
+    if len(text) > MOST_PASTED or not may_be_pasted(text):
+        return None
+    values: list[Any] | None
+    try:
+        values = _blocks(text) or _published(source, normalize=normalize)
+        values = values or _unless_grammar(source, given, points=points)
+    except ValueInvalid as error:
+        raise FormatError(str(error), source=source.name) from error
+    if values is not None:
+        return Pasted(source.name, "\n".join(map(dump, values)))
+    return Source(source.name, mended) if (mended := _mended(text)) != text else None
+
+
+def _unless_grammar(source: Source, given: Notation | None, *, points: bool) -> list[Any] | None:
+    """Return the values of pasted numbers; of JSON only what the grammar would refuse."""
+    if looks_like_json(source.text) and (points or given is None):
+        read = parse_json(source)
+        if read is not None and (points or {*map(_size, read)} & {(3, 3), (4, 4)}):
+            return None
+    return pasted_poses(source.text, given)
+
+
+def _size(value: Any) -> tuple[int, int]:
+    """Count the rows of a list, and what is in the first."""
+    is_rows = type(value) is list and value and type(value[0]) is list
+    return (len(value), len(value[0])) if is_rows else (0, 0)
+
+
+def _blocks(text: str) -> list[Any]:
+    """Read every block that tf2_echo printed; one may lack its position or its time."""
+    begins = [match.start() for match in _TRANSLATION.finditer(text)]
+    if not begins:
+        return [value] if (value := _block(text)) else []
+    ends = [*begins[1:], len(text)]
+    names = _HEADING.search(text)
+    values, before = [], 0
+    for begin, end in zip(begins, ends, strict=True):
+        value = _block(text[begin:end])
+        times = _TIME.findall(text[before:begin])
+        before = begin
+        stamp = _stamp(times[-1]) if times else None
+        known = {"name": names[1], "parent": names[2]} if names else {}
+        values.append({**known, **({} if not stamp else {"stamp_ns": Verbatim(stamp)}), **value})
+    return values
+
+
+def _block(text: str) -> dict[str, Any]:
+    """Read position and rotation of one block; of several notations the first that is there."""
+    value: dict[str, Any] = {}
+    if moved := _TRANSLATION.search(text):
+        value["xyz"] = moved[1].replace(",", " ").split()
+    for key, pattern in _ROTATIONS:
+        if turned := pattern.search(text):
+            return {**value, key: turned[1].replace(",", " ").split()}
+    return value
+
+
+def _stamp(seconds: str) -> int | None:
+    """Return the time of a block; 0 is that of a static one, and what has too many digits is left out."""
+    try:
+        return parse_stamp(seconds)
+    except ValueInvalid:
+        return None
+
+
+def _published(source: Source, *, normalize: bool) -> list[Any]:
+    """Read the arguments of static_transform_publisher: `args=".."` of launch files, or a whole call."""
+    text = source.text
+    calls = [match[2] for match in _ARGS.finditer(text)]
+    if not calls:
+        lines = [line for line in text.replace("\\\n", " ").splitlines() if line.strip()]
+        calls = [line for line in lines if CALL in line or re.match(r"\s*--(?:[a-z]+-)*[a-z]+[ =]", line)]
+        if len(calls) < len(lines):
+            return []
+    values = []
+    for call in calls:
+        reading = Reading(source, normalize=normalize)
+        pose = read_call(call, reading)
+        for note in reading.notes:
+            warn(f"{source.name}: {note.message}", rule=note.rule)
+        numbers = [repr(each) for each in pose.components]
+        values.append({"name": pose.name, "parent": pose.parent, "xyz": numbers[:3], "xyzw": numbers[3:]})
+    return values
+
+
+def _mended(text: str) -> str:
+    """Put back the blanks that a selection from the middle of a line has lost before its first word."""
+    first, newline, rest = text.partition("\n")
+    lines = [line for line in rest.split("\n")[:200] if line.strip() and not line.startswith("---")]
+    if not lines or not re.fullmatch(r"[A-Za-z_]\w*:( .*)?", first.rstrip()):
+        return text
+    indents = [len(line) - len(line.lstrip(" ")) for line in lines]
+    holds = not first.rstrip().endswith(":")
+    if not min(indents) or not (holds or indents[0] > min(indents)):
+        return text
+    return " " * min(indents) + first + newline + rest

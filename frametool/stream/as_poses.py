@@ -1,0 +1,213 @@
+"""Streams whose results come out in another form than theirs: rows of tables and listed poses, block by block.
+
+rows or listed poses -> the operation -> blocks of poses -> the text of the other form
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from itertools import chain
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from frametool.documents.input_file import InputFile
+from frametool.errors import FormatError, ValueInvalid, warn
+from frametool.formats import FORMATS
+from frametool.formats.pose_rows import HALF_TURN, IMAGE, NUMBER
+from frametool.formats.trajectory import StampFile, blocks, describe
+from frametool.frames.stamps import BILLION
+from frametool.geometry.representations import notation
+from frametool.grammar.edges import Options, Tally, Topics, stop
+from frametool.stream.blocks import Plan, Run, State
+from frametool.stream.faults import NULL, STOP, Fault, Misused
+from frametool.stream.point_writer import PointWriter
+from frametool.stream.pose_writer import PoseWriter, kept, spans_of
+from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
+from frametool.stream.rows import Block
+from frametool.stream.run import Outcome, RowNote, notes_of
+from frametool.stream.table_names import rename_of
+from frametool.stream.table_poses import RowPoses, TablePoses
+from frametool.stream.table_samples import FORMS, TABLE
+from frametool.stream.table_stream import DELIMITERS, begin_table, moves_in_time, settle_stamps
+from frametool.text.spans import Spans, framed
+
+if TYPE_CHECKING:
+    from collections.abc import Generator, Iterator
+    from io import BufferedReader
+
+    from frametool.formats.trajectory import PoseBlock, Poses
+    from frametool.grammar.edges import Answers
+    from frametool.grammar.result import Style
+    from frametool.stream.request import Request
+
+QUATERNION = notation("quaternion")
+
+
+class Step(NamedTuple):
+    """What a block became: its poses, and what is reported about it."""
+
+    poses: RowPoses
+    outcome: Outcome
+
+
+class OtherForm:
+    """A stream on its way into another form than its own."""
+
+    def __init__(self, form: str, request: Request, style: Style, source: str, answers: Answers) -> None:
+        """Take what is asked for; raises Misused for what only a table can hold."""
+        if request.keep or (request.prefix and request.operation.formula is None) or request.on_error == NULL:
+            raise Misused("--keep, --prefix and --on-error null are for tables that stay in their form")
+        self.form = form
+        self.source = source
+        self.answers = answers
+        self.tally = Tally()
+        self.module: Any = None if form in DELIMITERS else import_module(FORMATS[form].reader)
+        self.style = style.in_form(style.form)
+        self.request = request._replace(whole=True, notations=(QUATERNION,), keep_sign=True)
+        self.stamps = StampFile(answers.stamps) if answers.stamps else None
+
+    def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
+        """Yield the text of the results, block by block, and what comes behind the last."""
+        writer: PoseWriter | PointWriter | None = None
+        for step in self._listed(stream) if self.module else self._rows(stream, header=header):
+            poses, outcome = step
+            if writer is None:
+                writer = self._writer()
+            if self.request.on_error == STOP and outcome.faults:
+                before = int(np.searchsorted(poses.lines, outcome.faults[0].line))
+                poses = kept(poses, slice(0, before))
+            yield outcome._replace(text=writer.of_block(poses))
+        if writer is None:
+            raise FormatError("nothing in it", source=self.source)
+        yield Outcome(writer.end())
+        for told in self.tally.told():
+            warn(f"{self.source}:{told.line}: {told.message}")
+
+    def _writer(self) -> PoseWriter | PointWriter:
+        """Choose what writes the results, by what they are."""
+        operation = self.request.operation
+        kind = operation.result_kind(self.shape.kind)
+        extras = [self.request.prefix + name for name in operation.extras(self.shape.kind)]
+        if operation.only_adds or kind not in (POSE, POINT, VECTOR) or (extras and kind != POSE):
+            raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
+        return PointWriter(self.style, kind) if kind != POSE else PoseWriter(self.style, extras, placed=self.placed)
+
+    def _turned(self, form: Poses) -> Request:
+        """Return the request with the axes of cameras turned if that was asked for; keep what they then are."""
+        operation = self.request.operation
+        wanted = self.answers.camera_axes
+        if not (operation.inverse or operation.right or operation.of):
+            self.style.axes = wanted or form.axes
+        if wanted and form.axes and wanted != form.axes:
+            operation = operation._replace(before=HALF_TURN)
+        return self.request._replace(operation=operation)
+
+    # --- tables ---
+
+    def _rows(self, stream: BufferedReader, *, header: bool) -> Iterator[Step]:
+        """Yield the rows of a table."""
+        form = FORMS.get(self.form, TABLE)
+        request = self._turned(form)
+        begun = begin_table(stream, self.form, request, source=self.source, header=header)
+        request, unasked = settle_stamps(begun.table, request, self.source)
+        rows = TablePoses(begun, self.form, request, self.source)
+        self.shape = rows.shape
+        if rows.shape.kind == POSE and rows.shape.notation is None and request.operation.keeps_position:
+            raise FormatError(
+                f"no rotation among the columns {rows.columns}: {self.style.form} is written of poses",
+                source=self.source,
+                line=1,
+            )
+        self.placed = rows.plan.targets[0].unit is not None
+        count = 0
+        yield Step(_none(), Outcome(b"", lines=begun.lines, size=begun.taken))
+        for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
+            before = rows.rows
+            poses = rows.of_block(text)
+            stamps = self._stamps(poses, form, count)
+            count += len(poses.numbers)
+            if unasked is not None and len(poses.numbers) and moves_in_time(unasked, {*poses.given} or {None}):
+                rows.notes.insert(0, RowNote.of_latest(int(poses.lines[0]), unasked.name))
+                unasked = None
+            yield Step(
+                poses._replace(stamps_ns=stamps),
+                Outcome(b"", rows.faults, rows.rows - before, text.count(b"\n"), notes=rows.notes, size=len(text)),
+            )
+        if self.stamps:
+            self.stamps.finish(count, self.source)
+        if self.form in FORMS:
+            describe(Options(self.tally, Topics(), answers=self.answers), form, count)
+
+    def _stamps(self, poses: RowPoses, form: Poses, before: int) -> Any:
+        """Return the stamps of poses: their own, those of a file, or their numbers as seconds."""
+        size = len(poses.numbers)
+        if self.stamps:
+            return np.array([self.stamps.at(before + at) for at in range(size)], np.int64)
+        if poses.stamps_ns is None and form.counted:
+            return np.arange(before, before + size, dtype=np.int64) * BILLION
+        return poses.stamps_ns
+
+    # --- forms that list poses ---
+
+    def _listed(self, stream: BufferedReader) -> Iterator[Step]:
+        """Yield the poses of a form whose lines are no table."""
+        file = InputFile(self.source if self.source != "stdin" else "-", stream)
+        form: Poses = self.module.form_of(file) if hasattr(self.module, "form_of") else self.module.POSES
+        before, request = self.request, self._turned(form)
+        request = request._replace(operation=before.operation)  # the reader turns them
+        if request.frames:
+            raise ValueInvalid("poses do not say their frame; name SOURCE")
+        self.placed, self.shape = True, Shape(POSE, 1.0, QUATERNION)
+        faults: list[Fault] = []
+        report = stop if request.on_error == STOP else lambda error: faults.append(_fault(error))
+        options = Options(self.tally, Topics(), report, normalize=request.normalize, answers=self.answers)
+        plan = _plan(request)
+        state = State()
+        rename = rename_of(request)
+        parent, name = (None, None) if rename is None else rename(None, None)
+        for each in blocks(self.module.poses(file, options), form, file, options):
+            block = _block(each)
+            run = Run(plan, block, state)
+            good = run.rows.tolist()
+            images = [each.images[row] for row in good]
+            extras = {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {}
+            if self.form == self.style.form:
+                extras[NUMBER] = spans_of([b"%d" % each.numbers[row] for row in good])
+            lines = np.array(each.lines, np.int64)[run.rows]
+            poses = RowPoses(run.results, each.stamps_ns[run.rows], lines, [parent], [name], extras)
+            found = sorted(faults + run.faults())
+            yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
+            faults.clear()
+
+
+def _fault(error: FormatError) -> Fault:
+    """Make the fault of a pose that was refused; lines from 0."""
+    return Fault(max(error.line, 1) - 1, "", error.message)
+
+
+def _none() -> RowPoses:
+    return RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
+
+
+def _plan(request: Request) -> Plan:
+    """Plan poses that are no text."""
+    shape = Shape(POSE, 1.0, QUATERNION)
+    target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
+    edge = request.way if request.operation.moves and request.timed is not None else None
+    return Plan(
+        (shape,), (target,), request.operation, (), ("x", "y", "z", "qx", "qy", "qz", "qw"), edge_of=edge,
+        normalize=request.normalize, on_error=request.on_error,
+        timed=request.timed if request.timed is not None and request.timed.name else None,
+    )  # fmt: skip
+
+
+def _block(poses: PoseBlock) -> Block:
+    """Make a block of rows of poses."""
+    count = len(poses.lines)
+    nothing = np.zeros((count, 0), np.int64)
+    lines = poses.lines
+    return Block(
+        Spans(framed(b""), nothing, nothing), (), np.arange(count), lambda row: lines[row] - 1,
+        values=np.array(poses.poses).T.copy(), times=poses.stamps_ns,
+    )  # fmt: skip

@@ -1,0 +1,347 @@
+"""Poses in blocks to the text of any form that writes poses: in bulk where the form's rows are all alike.
+
+What a row looks like is said by the form (`ROWS`), or learned from what it writes for one pose; where neither can be,
+its own `write_poses` writes row after row.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from frametool.documents.json_reader import JSON_NUMBER
+from frametool.documents.json_writer import Verbatim, dump
+from frametool.errors import ValueInvalid
+from frametool.formats import FORMATS
+from frametool.formats.pose_rows import IMAGE, NUMBER, Lost, Numbers, RowForm, field, image_name, is_turned, turned
+from frametool.frames.stamps import BILLION
+from frametool.geometry import arrays, floats, quaternion
+from frametool.geometry.representations import notation
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+from frametool.stream.row_layout import Target
+from frametool.stream.rows import number_spans
+from frametool.stream.table_poses import RowPoses
+from frametool.text.cells import without_quotes
+from frametool.text.csv_line import quoted
+from frametool.text.spans import MARGIN, Spans, framed, join
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.types import Components
+    from frametool.grammar.result import Style
+    from frametool.text.array_types import Floats
+
+LEARNED = ("csv", "json", "yaml")
+PROBE_NS = 1234567890987654321
+PROBE = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,
+         0.7416198487095663)  # fmt: skip
+MARK = "@@{}@@"
+
+
+class PoseWriter:
+    """Write blocks of poses one after the other; `end` says what comes behind the last."""
+
+    def __init__(self, style: Style, extras: Sequence[str] = (), *, placed: bool = True) -> None:
+        """Choose how the form of a style is written.
+
+        extras: the numbers beside each pose; placed: whether poses have a position
+        Raises ValueInvalid for notations that the form does not have.
+        """
+        self.style = style
+        self.module: Any = import_module(FORMATS[style.form].writer)
+        self.fixed: RowForm | None = getattr(self.module, "ROWS", None)
+        self.lost = None if self.fixed is None else Lost(self.fixed, style)
+        self.extras = tuple(extras)
+        self.placed = placed
+        forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
+        whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
+        self.target = Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
+        self.count = 0
+        self.rows: RowForm | None = None
+        self.order: list[int] = []
+        self.first: Result | None = None
+
+    def of_block(self, block: RowPoses) -> bytes:
+        """Return the text of a block of poses; numbers are metres and x y z w."""
+        if not len(block.numbers):
+            return b""
+        text = self._fixed(self.fixed, block) if self.fixed else self._free(block)
+        self.count += len(block.numbers)
+        return text
+
+    def end(self) -> bytes:
+        """Return what comes behind the last pose, and tell what was left out."""
+        if self.fixed is None or self.lost is None:
+            return b""
+        self.lost.tell()
+        return self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
+
+    # --- forms that say what a row is ---
+
+    def _fixed(self, form: RowForm, block: RowPoses) -> bytes:
+        lost = self.lost
+        if lost is not None:
+            there = [name for names in (block.parents, block.names) for name in names if name]
+            images = block.extras.get(IMAGE)
+            lost.add(
+                frames=bool(there),
+                stamps=block.stamps_ns is not None and NUMBER not in block.extras,
+                extras=bool(self.extras or block.extras.keys() - {IMAGE, NUMBER}),
+            )
+            lost.counted |= "stamps" in form.holds and block.stamps_ns is None
+            lost.by_stamp |= IMAGE in form.row and images is None
+            lost.turned = is_turned(form, self.style)
+        pose = self._canonical(block)
+        return self._joined(form, np.array(form.numbers(*turned(form, self.style, pose))).T, block)
+
+    def _canonical(self, block: RowPoses) -> Components:
+        """Return position and quaternion of a block, with the sign that is written."""
+        tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
+        unit = quaternion.unit(x, y, z, w, arrays)
+        return (tx, ty, tz, *(unit if self.style.keep_sign else quaternion.from_quaternion(*unit, arrays)))
+
+    def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
+        """Put the rows of a block together."""
+        after = bytearray()
+        for piece in form.row:
+            if isinstance(piece, Numbers):
+                after += (piece.between[:1] or b",") * piece.size
+        if not np.isfinite(values).all():
+            raise ValueInvalid("a result is too large for a double")
+        numbers = number_spans(
+            np.ascontiguousarray(values), self.style.precision, bytes(after), yaml=self.style.form == "yaml"
+        )
+        size, first = len(values), 0
+        parts = [_constant(form.between, size)] if form.between else []
+        for piece in form.row:
+            if isinstance(piece, bytes):
+                parts.append(_constant(piece, size))
+            elif isinstance(piece, Numbers):
+                parts += _numbers(numbers, first, piece)
+                first += piece.size
+            else:
+                parts.append(self._field(piece, block, form.first))
+        text = join(parts)
+        return text if self.count else form.head + text[len(form.between) :]
+
+    def _field(self, name: str, block: RowPoses, first: int) -> Spans:
+        """Return what is written in one field of each row."""
+        size = len(block.numbers)
+        if name.startswith("@@"):
+            return self._cells(name, block)
+        stamps = self._stamps(block)
+        if name == IMAGE:
+            images = texts_of(block.extras[IMAGE]) if IMAGE in block.extras else [None] * size
+            return spans_of([image_name(*each).encode() for each in zip(images, stamps, strict=True)])
+        if name == "seconds" and min(stamps) >= 0:
+            return spans_of([b"%d.%09d" % divmod(stamp, BILLION) for stamp in stamps])
+        numbers: Sequence[int] = range(self.count + first, self.count + first + size)
+        if NUMBER in block.extras and name in (NUMBER, "next"):
+            numbers = [int(text) for text in texts_of(block.extras[NUMBER])]
+        return spans_of([field(name, stamp, number).encode() for stamp, number in zip(stamps, numbers, strict=True)])
+
+    def _stamps(self, block: RowPoses) -> list[int]:
+        if block.stamps_ns is None:
+            return [at * BILLION for at in range(self.count, self.count + len(block.numbers))]
+        stamps: list[int] = block.stamps_ns.tolist()
+        return stamps
+
+    def _cells(self, mark: str, block: RowPoses) -> Spans:
+        """Return a column of names or of what is not ours, as the form writes texts."""
+        what = mark[2:-2]
+        if what in ("name", "parent"):
+            texts: Sequence[str | None] = block.names if what == "name" else block.parents
+            texts = list(texts) * (len(block.numbers) if len(texts) == 1 else 1)
+        else:
+            texts = texts_of(list(block.extras.values())[int(what)])
+        write: Callable[[str | None], bytes] = _csv_cell if self.style.form == "csv" else _json_cell
+        known = {text: write(text) for text in dict.fromkeys(texts)}
+        return spans_of([known[text] for text in texts])
+
+    # --- forms whose rows depend on what is written ---
+
+    def _free(self, block: RowPoses) -> bytes:
+        """Write a block as the form was seen to write poses; one by one where it was not, or angles are not unique."""
+        if self.rows is None and self.count == 0:
+            self._learn(block)
+            if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
+                self.rows = None
+        columns = self._own(tuple(block.numbers.T))
+        locked = self.target.locked(columns[:7])
+        if self.rows is None or (locked is not None and bool(np.any(locked))):
+            return self._one_by_one(block)
+        return self._filled(self.rows, block)
+
+    def _own(self, columns: Components) -> Components:
+        """Return seven components and what comes beside them; a pose without a position is at 0."""
+        own = tuple(np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part for part in columns)
+        return own if self.placed or len(own) == len(PROBE) else (*[own[0] * 0.0] * 3, *own)
+
+    def _filled(self, rows: RowForm, block: RowPoses) -> bytes:
+        """Fill the numbers of a block into the rows that were learned."""
+        written = self.target.written(self._own(tuple(block.numbers.T)), arrays)
+        values = np.empty((len(block.numbers), len(self.order)))
+        for at, place in enumerate(self.order):
+            values[:, at] = written[place]
+        return self._joined(rows, values, block)
+
+    def _learn(self, block: RowPoses) -> None:
+        """See how the form writes a pose whose numbers are all different, and take them for places to fill in."""
+        style = self.style.in_form(self.style.form)
+        style.precision = None
+        if style.form not in LEARNED or (style.form == "yaml" and (block.extras or _vary(block))):
+            return
+        probe = self._probe(block)
+        alone, twice = (self.module.write_poses([probe] * count, style) for count in (1, 2))
+        row = twice[len(alone) :]
+        head, between = (alone[: -len(row)], "") if alone.endswith(row) else ("", row[: -len(alone)])
+        row = row[len(between) :]
+        written = [*self.target.written(self._own(PROBE), floats), *probe.extras.values()]
+        marks = {repr(value): at for at, value in enumerate(written) if type(value) is float}
+        marks |= {MARK.format(what): -1 for what in ("name", "parent", *range(len(block.extras)))}
+        marks[str(PROBE_NS)] = -1
+        pieces: list[str | bytes | Numbers] = []
+        for text in re.split("(" + "|".join(map(re.escape, marks)) + ")", row):
+            if text not in marks:
+                pieces += [text.encode()] if text else []
+            elif marks[text] >= 0:
+                pieces.append(Numbers(1, b""))
+                self.order.append(marks[text])
+            else:
+                pieces.append("nanoseconds" if text == str(PROBE_NS) else text)
+        self.rows = RowForm(tuple(pieces), head=head.encode(), between=between.encode())
+
+    def _probe(self, block: RowPoses) -> Result:
+        """Make a pose with what this block's have; what differs from row to row is marked."""
+        names = [
+            each[0] if len(each) == 1 else Verbatim(MARK.format(what))
+            for what, each in (("name", block.names), ("parent", block.parents))
+        ]
+        pose = Pose.of(PROBE, *names)
+        extras: dict[str, Any] = {name: 0.7310585786300049 + at for at, name in enumerate(self.extras)}
+        if block.stamps_ns is not None:
+            extras["stamp_ns"] = PROBE_NS
+        extras |= {name: Verbatim(MARK.format(at)) for at, name in enumerate(block.extras)}
+        return Result(pose if self.placed else pose._replace(position=None), extras)
+
+    def _one_by_one(self, block: RowPoses) -> bytes:
+        """Write the rows as the form does for single results."""
+        results = list(results_of(block, self.extras, placed=self.placed))
+        first = self.first = self.first or results[0]
+        known = "" if not self.count else self.module.write_poses([first], self.style)
+        text: str = self.module.write_poses(results if not self.count else [first, *results], self.style)
+        return text[len(known) :].encode()
+
+
+def first_of(block: RowPoses) -> RowPoses:
+    """Return the first pose of a block."""
+    return kept(block, slice(0, 1))
+
+
+def kept(block: RowPoses, rows: slice) -> RowPoses:
+    """Return some poses of a block."""
+    size = len(block.numbers)
+    return block._replace(
+        numbers=block.numbers[rows],
+        stamps_ns=None if block.stamps_ns is None else block.stamps_ns[rows],
+        lines=block.lines[rows],
+        parents=block.parents[rows] if len(block.parents) == size else block.parents,
+        names=block.names[rows] if len(block.names) == size else block.names,
+        extras={name: Spans(each.data, each.starts[rows], each.ends[rows]) for name, each in block.extras.items()},
+    )
+
+
+def block_of(results: Sequence[Result]) -> RowPoses:
+    """Return results as a block of poses; raises ValueInvalid for one without a rotation."""
+    if any(result.pose.rotation is None for result in results):
+        raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+    stamps = [result.extras.get("stamp_ns") for result in results]
+    others = {name for result in results for name in result.extras} - {"stamp_ns"}
+    images = [str(result.extras.get(IMAGE, "")).encode() for result in results]
+    blank = [b""] * len(results)
+    names = {(result.pose.parent, result.pose.name) for result in results}
+    parent, name = next(iter(names))
+    return RowPoses(
+        np.array([result.pose.components for result in results]),
+        None if None in stamps else np.array(stamps, np.int64),
+        np.arange(len(results)),
+        [parent],
+        [name],
+        {each: spans_of(images if each == IMAGE else blank) for each in sorted(others)},
+    )
+
+
+def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
+    """Return a block as results, one a pose."""
+    size = len(block.numbers)
+    names, parents = (each if len(each) == size else list(each) * size for each in (block.names, block.parents))
+    others = {name: [plain_cell(text) for text in texts_of(spans)] for name, spans in block.extras.items()}
+    stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
+    made = []
+    for at, numbers in enumerate(block.numbers.tolist()):
+        own = 7 if placed else 4
+        pose = Pose.of(tuple(numbers[:7]) if placed else (0.0, 0.0, 0.0, *numbers[:4]), names[at], parents[at])
+        said: dict[str, Any] = dict(zip(extras, numbers[own:], strict=True))
+        if stamps is not None:
+            said["stamp_ns"] = stamps[at]
+        said |= {name: texts[at] for name, texts in others.items()}
+        made.append(Result(pose if placed else pose._replace(position=None), said))
+    return made
+
+
+def _vary(block: RowPoses) -> bool:
+    return len(block.names) != 1 or len(block.parents) != 1
+
+
+def _constant(text: bytes, size: int) -> Spans:
+    starts = np.full(size, MARGIN, np.int64)
+    return Spans(framed(text), starts, starts + len(text))
+
+
+def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
+    """Return the spans of neighbouring numbers, with what stands between them."""
+    last = first + piece.size
+    ends = numbers.ends[:, first:last].copy()
+    if len(piece.between) == 1:
+        ends[:, -1] -= 1
+        return [Spans(numbers.data, numbers.starts[:, first:last], ends)]
+    ends -= 1
+    each = [Spans(numbers.data, numbers.starts[:, at], ends[:, at - first]) for at in range(first, last)]
+    between = _constant(piece.between, len(ends))
+    return list(chain(*([part, between] for part in each)))[:-1]
+
+
+def spans_of(texts: list[bytes]) -> Spans:
+    """Return texts, one a row, as spans."""
+    lengths = np.fromiter(map(len, texts), np.int64, len(texts))
+    ends = np.cumsum(lengths) + MARGIN
+    return Spans(framed(b"".join(texts)), ends - lengths, ends)
+
+
+def texts_of(cells: Spans) -> list[str]:
+    """Return the text of each cell, without its quotes."""
+    bare = without_quotes(cells)
+    data = bare.data.tobytes()
+    places = zip(bare.starts.tolist(), bare.ends.tolist(), strict=True)
+    return [data[start:end].decode("utf-8", "replace").strip().replace('""', '"') for start, end in places]
+
+
+def plain_cell(text: str) -> str | Verbatim | None:
+    """Return a cell as a plain value: numbers and truth values as they are written."""
+    if not text:
+        return None
+    return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text
+
+
+def _csv_cell(text: str | None) -> bytes:
+    return quoted(text or "").encode()
+
+
+def _json_cell(text: str | None) -> bytes:
+    return dump(plain_cell(text or "")).encode()

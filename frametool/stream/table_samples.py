@@ -1,0 +1,129 @@
+"""Tables as frames that move: every row a pose at its time, read in bulk. Trajectories (TUM, EuRoC, KITTI), CSV.
+
+stamp,x,y,z,qx,qy,qz,qw                      frames as --frames says, `world` and `body` if it does not
+stamp_ns,parent,name,x,y,yaw_deg             each row names its frames
+parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that stand still
+"""
+
+from __future__ import annotations
+
+from itertools import chain, groupby
+from typing import TYPE_CHECKING, cast
+
+from frametool.documents.source import not_text
+from frametool.errors import FormatError
+from frametool.formats.pose_rows import with_axes_turned
+from frametool.formats.trajectory import Poses, StampFile, describe
+from frametool.frames.stamps import BILLION
+from frametool.geometry.representations import notation
+from frametool.grammar.edges import Edge, Samples
+from frametool.stream.faults import BadRow
+from frametool.stream.request import Request
+from frametool.stream.table_poses import TablePoses
+from frametool.stream.table_stream import begin_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.documents.input_file import InputFile
+    from frametool.geometry.types import Components
+    from frametool.grammar.edges import Options
+    from frametool.stream.table_poses import RowPoses
+    from frametool.text.lines import ByteStream
+
+FORMS = {
+    "tum": Poses("xyzw", counted=""),
+    "euroc": Poses("wxyz", counted=""),
+    "kitti": Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),
+}
+TABLE = Poses("quaternion", counted="")
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
+    """Yield the rows of a table as poses of one frame, or of those that its columns name.
+
+    Raises or reports FormatError with the line of a row that is no pose.
+    """
+    form = FORMS.get(file.form, TABLE)
+    if what := not_text(file.head()):
+        raise FormatError(what, source=file.name)
+    request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)
+    begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
+    rows = TablePoses(begun, file.form, request, file.name)
+    _check(rows, form, file, options)
+    stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
+    line, count = 1 + begun.lines, 0
+    for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
+        block = rows.of_block(text)
+        for fault in rows.faults:
+            options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))
+        yield from _pieces(block, _times(block, stamps, form, count), line, form, options)
+        line, count = line + text.count(b"\n"), count + len(block.numbers)
+    if stamps:
+        stamps.finish(count, file.name)
+    _tell(rows, form, options, count)
+
+
+def _check(rows: TablePoses, form: Poses, file: InputFile, options: Options) -> None:
+    """Refuse a table that is no poses, or poses without time and names."""
+    if rows.shape.notation is None:
+        message = f"no rotation among the columns {rows.columns}: points are no frames"
+        raise FormatError(message, source=file.name, line=1)
+    if rows.stamp_at is None and not form.counted and not options.answers.stamps and len(rows.roles) < 2:
+        raise FormatError(
+            f"no column of stamps among {rows.columns}; call it stamp or stamp_ns, or give --stamps FILE",
+            source=file.name,
+            line=1,
+        )
+
+
+def _times(block: RowPoses, stamps: StampFile | None, form: Poses, before: int) -> list[int] | None:
+    """Return the stamps of a block's rows; None where they stand still."""
+    count = len(block.numbers)
+    if stamps:
+        return [stamps.at(before + at) for at in range(count)]
+    if block.stamps_ns is not None:
+        times: list[int] = block.stamps_ns.tolist()
+        return times
+    return [(before + at) * BILLION for at in range(count)] if form.counted else None
+
+
+def _pieces(
+    block: RowPoses, times: Sequence[int] | None, line: int, form: Poses, options: Options
+) -> Iterator[Edge | Samples]:
+    """Yield the poses of a block: as samples of one frame after the other, or as edges that stand still."""
+    columns: Components = tuple(block.numbers.T)
+    if len(columns) == len("xyzw"):
+        columns = (*[columns[0] * 0.0] * 3, *columns)
+    if options.answers.camera_axes and form.axes and options.answers.camera_axes != form.axes:
+        columns = with_axes_turned(columns)
+    poses = list(zip(*(column.tolist() for column in columns), strict=True))
+    lines = (block.lines + line).tolist()
+    world, body = options.answers.names(*form.frames)
+    count = len(poses)
+    parents, names = _spread(block.parents, count, world), _spread(block.names, count, body)
+    for (parent, name), group in groupby(range(count), key=lambda at: (parents[at], names[at])):
+        some = list(group)
+        part = slice(some[0], some[-1] + 1)
+        if times is not None:
+            yield Samples(parent, name, times[part], poses[part], lines[part])
+        else:
+            yield from (Edge(parent, name, poses[at], None, lines[at]) for at in some)
+    if form.axes:
+        options.tally.axes[body] = options.answers.camera_axes or form.axes
+
+
+def _spread(names: Sequence[str | None], count: int, otherwise: str) -> list[str]:
+    """Return a name for each row."""
+    given = [name or otherwise for name in names]
+    return given if len(given) == count else given * count
+
+
+def _tell(rows: TablePoses, form: Poses, options: Options, count: int) -> None:
+    """Keep what is worth telling: what was taken for granted, rotations that were not quite."""
+    if len(rows.roles) < 2:
+        describe(options, form, count)
+    if form.rotation == "matrix":
+        options.tally.projected = rows.off
+    else:
+        options.tally.rough += [1] * rows.mended

@@ -1,0 +1,111 @@
+"""`formats`: the table of forms as people and programs read it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+import yaml
+
+import frametool
+from frametool.formats import FORMATS, Format
+from frametool.grammar.edges import Answers
+from frametool.view.form_list import option_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Outcome
+
+    Run = Callable[..., Outcome]
+
+LISTED = ("summary", "reads", "writes", "suffixes", "states", "asks", "instead")
+
+
+def words(text: str) -> str:
+    """Undo the folding of lines."""
+    return " ".join(text.split())
+
+
+def test_the_list_names_every_form_with_what_the_table_says_of_it(run: Run) -> None:
+    found = run("formats")
+    assert (found.status, found.err) == (0, "")
+    for name, row in FORMATS.items():
+        assert f"\n  {name} " in found.out
+        assert all(words(said) in words(found.out) for said in (row.summary, row.states, row.instead))
+    assert max(map(len, found.out.splitlines())) <= 80
+
+
+def test_the_list_is_parted_into_what_is_read_what_is_only_written_and_what_is_only_known(run: Run) -> None:
+    parts = [part.splitlines()[0] for part in run("formats").out.split("\n\n")]
+    assert parts == ["read:", "only written:", "known and not read; what to do:"]
+
+
+def test_json_has_one_object_a_line_with_all_the_table_says(run: Run) -> None:
+    entries = [json.loads(line) for line in run("formats", "-f", "json").out.splitlines()]
+    assert [entry["name"] for entry in entries] == list(FORMATS)
+    for entry in entries:
+        row = FORMATS[entry.pop("name")]._asdict()
+        row["asks"] = map(option_of, row["asks"])
+        assert entry == {key: (row[key] or None) if isinstance(row[key], str) else list(row[key]) for key in LISTED}
+
+
+def test_yaml_and_csv_say_the_same_as_json(run: Run) -> None:
+    entries = [json.loads(line) for line in run("formats", "-f", "json").out.splitlines()]
+    assert list(yaml.safe_load_all(run("formats", "-f", "yaml").out)) == entries
+    rows = list(csv.DictReader(io.StringIO(run("formats", "-f", "csv").out)))
+    assert rows == [
+        {key: " ".join(value) if isinstance(value, list) else value or "" for key, value in entry.items()}
+        for entry in entries
+    ]
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_one_form_is_told_in_full_within_80_columns(run: Run, name: str) -> None:
+    found = run("formats", name)
+    assert (found.status, found.err) == (0, "")
+    assert found.out.startswith(f"{name}: {FORMATS[name].summary}"[:80])
+    assert max(map(len, found.out.splitlines())) <= 80
+    assert all(suffix in found.out for suffix in FORMATS[name].suffixes)
+
+
+@pytest.mark.parametrize(
+    ("name", "example"),
+    [("csv", "camera,map,1.0,2.0,3.0"), ("calls", "--x 0.1 --y 0.0"), ("yaml", "{name: lidar, parent: base")],
+)
+def test_an_example_stands_where_the_reader_or_the_writer_shows_one(run: Run, name: str, example: str) -> None:
+    assert f"\n    {example}" in run("formats", name).out.partition("  example\n")[2].join(["\n", ""])
+
+
+def test_a_row_with_all_there_can_be_is_told(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    row = Format("a toy", (".toy",), ("tree",), "frametool.formats.tree_reader", states="toy<-child, feet",
+                 asks=("direction", "frames"), signs=(("xml", "toy"), ("line", r"toy \d")))  # fmt: skip
+    monkeypatch.setitem(FORMATS, "a-toy-with-a-long-name", row)
+    told = words(run("formats", "a-toy-with-a-long-name").out)
+    assert "means toy<-child, feet" in told
+    assert "asks for --direction parent-from-child|child-from-parent, --frames" in told
+    assert "known by xml toy, line" in told
+    assert "a-toy-with-a-long-name a toy (.toy) read as tree toy<-child, feet asks for --direction" in words(run("formats").out)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_what_a_form_asks_for_is_an_answer_that_options_give(name: str) -> None:
+    assert set(FORMATS[name].asks) <= set(Answers._fields)
+
+
+def test_a_misspelled_form_is_told_with_the_nearest(run: Run) -> None:
+    found = run("formats", "jsno")
+    assert (found.status, found.out) == (2, "")
+    assert "no form 'jsno' is known; did you mean 'json'?; `frametool formats` lists all" in found.err
+
+
+def test_the_suffix_of_the_output_chooses_the_form_of_the_list(run: Run, tmp_path: object) -> None:
+    assert run("formats", "-o", "a.json").status == 0
+    assert json.loads((tmp_path / "a.json").read_text().splitlines()[0])["name"] == "yaml"  # type: ignore[operator]
+
+
+def test_python_users_have_the_same_table() -> None:
+    assert frametool.FORMATS is FORMATS

@@ -1,0 +1,329 @@
+"""Launch files: the transforms that stand in them literally, in three languages, and what is said of the rest."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from scipy.spatial.transform import Rotation
+
+from frametool.errors import FormatError, heard_by
+from frametool.formats.load import load
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+NODE = '<node pkg="tf2_ros" exec="static_transform_publisher" args="{}"/>'
+POSITIONAL = "0.1 -0.2 0.3 1.5 0.2 -0.1 base cam"
+FLAGS = "--x 0.1 --y -0.2 --z 0.3 --yaw 1.5 --pitch 0.2 --roll -0.1 --frame-id base --child-frame-id cam"
+EXPECTED = [0.1, -0.2, 0.3, *Rotation.from_euler("ZYX", [1.5, 0.2, -0.1]).as_quat()]  # yaw, pitch, roll about moving axes
+
+ROS1 = '<launch><node pkg="{}" type="static_transform_publisher" name="a" args="{}"/></launch>'
+YAML = "launch:\n- node:\n    pkg: tf2_ros\n    exec: static_transform_publisher\n    args: {}\n"
+PYTHON = """from launch import LaunchDescription
+from launch_ros.actions import Node
+
+def generate_launch_description():
+    return LaunchDescription([Node(package='tf2_ros', executable='static_transform_publisher', arguments={})])
+"""
+
+
+def read(folder: Path, text: str, name: str = "a.launch") -> tuple[Any, list[str]]:
+    """Load a launch file; return its frames and what was said."""
+    (folder / name).write_text(text)
+    said: list[str] = []
+    with heard_by(lambda message, *_: said.append(message.replace(f"{folder}/", ""))):
+        return load(folder / name), said
+
+
+def unheard(*_: object) -> None:
+    """Let a warning pass."""
+
+
+def python(folder: Path, body: str) -> tuple[Any, list[str]]:
+    """Load a launch file in Python with this body."""
+    return read(folder, f"import os\ndef generate_launch_description():\n{body}", "a.launch.py")
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        (ROS1.format("tf", f"{POSITIONAL} 100"), "a.launch"),
+        (ROS1.format("tf2_ros", POSITIONAL), "a.launch"),
+        (f"<launch>{NODE.format(FLAGS)}</launch>", "a.launch.xml"),
+        (f"<launch>{NODE.format(POSITIONAL)}</launch>", "a.launch.xml"),
+        (f"<launch><group><group ns='a'>{NODE.format(POSITIONAL)}</group></group></launch>", "a.launch.xml"),
+        (f"<launch>{NODE.format(FLAGS + ' --ros-args --log-level warn -r __node:=x')}</launch>", "a.launch.xml"),
+        (f"<launch><executable cmd='ros2 run tf2_ros static_transform_publisher {FLAGS}'/></launch>", "a.launch"),
+        (YAML.format(FLAGS), "a.launch.yaml"),
+        (YAML.format(f'"{POSITIONAL}"'), "a.yaml"),
+        (f"%YAML 1.2\n---\n{YAML.format(POSITIONAL)}", "a.launch.yml"),
+        ("launch:\n- group:\n  - push_ros_namespace: {namespace: a}\n" + YAML[8:].replace("\n", "\n  ").replace("- node", "  - node").format(FLAGS), "a.yaml"),
+        (f"launch: [{{executable: {{cmd: ros2 run tf2_ros static_transform_publisher {POSITIONAL}}}}}]", "a.yaml"),
+        (PYTHON.format(POSITIONAL.split()), "a.launch.py"),
+        (PYTHON.format(FLAGS.split()), "a_launch.py"),
+        (PYTHON.format(f"{POSITIONAL!r}.split()"), "a"),
+        (PYTHON.format("['0.1', str(-0.2), '0.3'] + ['1.5', '0.2', '-' '0.1', 'base', 'cam']"), "a"),
+        (PYTHON.format("[*'0.1 -0.2 0.3'.split(' '), '1.5', '0.2', '-0.1', 'ba' + 'se', 'cam']"), "a"),
+        (PYTHON.format("[0.1, -0.2, 0.3, 1.5, 0.2, -0.1, 'base', 'cam']"), "a"),
+        (PYTHON.format(POSITIONAL.split()).replace("executable", "node_executable"), "a"),
+        (PYTHON.format(POSITIONAL.split()).replace("Node(", "launch_ros.actions.Node("), "a"),
+    ],
+)  # fmt: skip
+def test_a_call_is_read_in_every_language_and_spelling(tmp_path: Path, text: str, name: str) -> None:
+    tree, said = read(tmp_path, text, name)
+    assert [(parent, child) for parent, child, _ in tree.edges()] == [("base", "cam")]
+    assert tree.lookup("base", "cam").components == pytest.approx(EXPECTED, abs=1e-15)
+    assert not said
+
+
+def test_a_quaternion_is_x_y_z_w(tmp_path: Path) -> None:
+    tree, _ = read(tmp_path, ROS1.format("tf", "1 2 3 0.5 -0.5 0.5 -0.5 base cam 10"))
+    assert tree.lookup("base", "cam").components == (1.0, 2.0, 3.0, 0.5, -0.5, 0.5, -0.5)
+
+
+def test_the_transforms_of_a_lidar_odometry_turn_its_camera_axes_into_those_of_the_map(tmp_path: Path) -> None:
+    node = '<node pkg="tf" type="static_transform_publisher" name="{}" args="{}" />'
+    first = node.format("a", "0 0 0 1.570795   0        1.570795 /map    /camera_init 10")
+    second = node.format("b", "0 0 0 -1.570795 -1.570795 0        /camera /base_link   10")
+    tree, said = read(tmp_path, f"<launch>\n{first}\n{second}\n</launch>")
+    assert tree.lookup("map", "camera_init").apply([0, 0, 1]) == pytest.approx([1, 0, 0], abs=2e-6)  # forward
+    assert tree.lookup("map", "camera_init").apply([1, 0, 0]) == pytest.approx([0, 1, 0], abs=2e-6)  # left
+    assert tree.lookup("camera", "base_link").apply([1, 0, 0]) == pytest.approx([0, 0, 1], abs=2e-6)
+    assert said[0] == "a.launch:2: frame '/map': the leading / is no part of a name and was left out"
+
+
+
+
+@pytest.mark.parametrize(
+    ("before", "arguments"),
+    [
+        ("    p = '1'\n    q = [p, '2', '3']\n", "q + ['0', '0', '0', 'a', 'b']"),
+        ("    p: list = ['1', '2', '3', '0', '0', '0']\n", "p + ['a', 'b']"),
+        ("    h = 1\n    frames = ('a', 'b')\n", "[str(h), '2', '3', '0', '0', '0', *frames]"),
+        ("    package = 'tf2_ros'\n", "['1', '2', '3', '0', '0', '0', 'a', 'b']"),
+    ],
+)
+def test_a_name_bound_once_to_a_literal_is_that_literal(tmp_path: Path, before: str, arguments: str) -> None:
+    package = "package" if "package" in before else "'tf2_ros'"
+    call = f"Node(package={package}, executable='static_transform_publisher', arguments={arguments})"
+    tree, said = python(tmp_path, f"{before}    return [{call}]\n")
+    assert tree.lookup("a", "b").components == (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)
+    assert not said
+
+
+def test_a_function_sees_the_names_of_the_module_and_its_own_first(tmp_path: Path) -> None:
+    call = "Node(package='tf2_ros', executable='static_transform_publisher', arguments=[x, y, '0', '0', '0', '0', 'a', 'b'])"
+    text = f"x = '1'\ny = '2'\ndef other():\n    y = '9'\ndef generate_launch_description():\n    x = '5'\n    return {call}\n"
+    assert read(tmp_path, text)[0].lookup("a", "b").components[:2] == (5.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("before", "number", "said"),
+    [
+        ("", "LaunchConfiguration('x')", "\"LaunchConfiguration('x')\" is not a literal"),
+        ("    x = LaunchConfiguration('x')\n", "x", "\"LaunchConfiguration('x')\" is not a literal"),
+        ("", "f'{x}'", "\"f'{x}'\" is not a literal"),
+        ("    x = 1\n", "str(x + 1)", "'x + 1' is not a literal"),
+        ("    x = 1\n", "x + 1", "'x + 1' is not a literal"),
+        ("", "str(-math.pi / 2)", "'-math.pi / 2' is not a literal"),
+        ("", "os.environ['X']", "\"os.environ['X']\" is not a literal"),
+        ("    x = '1'\n    x = '2'\n", "x", "'x' is not a literal"),
+        ("    x = '1'\n    x += '2'\n", "x", "'x' is not a literal"),
+        ("    for x in ['1', '2']: pass\n", "x", "'x' is not a literal"),
+        ("    x, y = '1', '2'\n", "x", "'x' is not a literal"),
+        ("    x = ['1']\n    x.append('2')\n", "*x", "'x' is not a literal"),
+        ("    x = ['1']\n    x[0] = '2'\n", "*x", "'x' is not a literal"),
+        ("    x = x\n", "x", "'x' is not a literal"),
+        ("    global x\n    x = '1'\n", "x", "'x' is not a literal"),
+        ("    from other import x\n", "x", "'x' is not a literal"),
+        ("", "True", "'True' is not a literal"),
+        ("", "['1', '2']", "\"['1', '2']\" is not a literal"),
+        ("", "nowhere", "'nowhere' is not a literal"),
+    ],
+)
+def test_what_python_would_have_to_work_out_is_listed_as_not_read(
+    tmp_path: Path, before: str, number: str, said: str
+) -> None:
+    publisher = "Node(package='tf2_ros', executable='static_transform_publisher', arguments="
+    body = f"{before}    a = {publisher}['0', {number}, '0', '0', '0', '0', 'a', 'b'])\n"
+    tree, told = python(tmp_path, f"{body}    b = {publisher}{POSITIONAL.split()})\n")
+    assert set(tree.frames) == {"base", "cam"}
+    assert told == [f"a.launch.py:{3 + before.count(chr(10))}: static_transform_publisher not read: {said}"]
+
+
+def test_the_argument_of_a_function_or_lambda_is_no_literal_even_if_the_module_has_its_name(tmp_path: Path) -> None:
+    call = "Node(package='tf2_ros', executable='static_transform_publisher', arguments=[x, '0', '0', '0', '0', '0', 'a', 'b'])"
+    for text in (f"x = '1'\ndef f(x): return {call}\n", f"x = '1'\nf = lambda x: {call}\n", f"x = '1'\nf = [{call} for x in '12']\n"):
+        (tmp_path / "a.py").write_text(f"{text}def generate_launch_description(): pass\n")
+        with heard_by(unheard), pytest.raises(FormatError, match="no frames in it"):
+            load(tmp_path / "a.py")
+
+
+def test_python_is_never_run(tmp_path: Path) -> None:
+    trap = tmp_path / "trap"
+    call = "Node(package='tf2_ros', executable='static_transform_publisher', arguments=[str(open('{}', 'w')), 'a'])"
+    body = f"    open({str(trap)!r}, 'w')\n    {call.format(trap)}\n    {call.replace('str(open', '(lambda: open').format(trap)}\n"
+    with pytest.raises(FormatError, match="no frames"), heard_by(unheard):
+        python(tmp_path, body)
+    assert not trap.exists()
+
+
+@pytest.mark.parametrize("count", [30, 3000])
+def test_names_that_double_a_text_again_and_again_are_given_up_at_once(tmp_path: Path, count: int) -> None:
+    for empty in ("''", "'0'", "[]", "['0']"):
+        lines = "".join(f"    x{n} = x{n - 1} + x{n - 1}\n" for n in range(1, count))
+        call = f"    Node(package='tf2_ros', executable='static_transform_publisher', arguments=[x{count - 1}])\n"
+        with pytest.raises(FormatError), heard_by(unheard):
+            python(tmp_path, f"    x0 = {empty}\n{lines}{call}")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "found"),
+    [
+        ("0 0 $(arg z) 0 0 0 a b", "$(arg z)"),
+        ("0 0 $(var z) 0 0 0 a b", "$(var z)"),
+        ("0 0 0 0 0 0 $(env ROBOT)/a b", "$(env ROBOT)"),
+        ("0 0 $(eval 1 + 2) 0 0 0 a b", "$(eval 1 + 2)"),
+    ],
+)
+def test_a_call_with_a_substitution_is_listed_and_the_others_are_read(
+    tmp_path: Path, arguments: str, found: str
+) -> None:
+    default = "<arg name='z' default='1'/>"
+    xml = f"<launch>{default}\n{NODE.format(arguments)}\n{NODE.format(POSITIONAL)}\n{NODE.format(arguments)}</launch>"
+    tree, said = read(tmp_path, xml)
+    assert set(tree.frames) == {"base", "cam"}
+    told = f"static_transform_publisher not read: its arguments have '{found}'"
+    assert said == [f"a.launch:2: {told}", f"a.launch:4: {told}"]
+    tree, said = read(tmp_path, f"{YAML.format(arguments)}{YAML[8:].format(POSITIONAL)}", "a.yaml")
+    assert (set(tree.frames), said) == ({"base", "cam"}, [f"a.yaml:5: {told}"])
+
+
+def test_what_starts_under_a_condition_is_read_and_said_with_its_line(tmp_path: Path) -> None:
+    nodes = [NODE.format(f"0 0 {n} 0 0 0 base c{n}") for n in range(4)]
+    xml = f"<launch>\n<group if='$(arg a)'>\n{nodes[0]}\n<group unless='$(arg b)'>\n{nodes[1]}</group></group>\n{nodes[2]}\n<group if='1'>{nodes[3]}</group></launch>"
+    tree, said = read(tmp_path, xml)
+    assert len(tree.frames) == 5
+    assert said == [
+        "a.launch:3: frame 'c0' is published under a condition: if=\"$(arg a)\"",
+        "a.launch:5: frame 'c1' is published under a condition: if=\"$(arg a)\" and unless=\"$(arg b)\"",
+    ]
+    body = (
+        "    if x:\n        N(package='tf2_ros', executable='static_transform_publisher', arguments={})\n"
+        "    else:\n        G([N(package='tf2_ros', executable='static_transform_publisher', arguments={})], condition=Unless(y))\n"
+    )
+    tree, said = python(tmp_path, body.format("'0 0 0 0 0 0 a b'.split()", "'0 0 0 0 0 0 a c'.split()"))
+    assert said == [
+        "a.launch.py:4: frame 'b' is published under a condition: if x",
+        "a.launch.py:6: frame 'c' is published under a condition: if not (x) and Unless(y)",
+    ]
+    tree, said = read(tmp_path, "launch:\n- group:\n    if: $(var s)\n    children:\n    - node: {pkg: tf2_ros, exec: static_transform_publisher, args: 0 0 0 0 0 0 a b}\n", "a.yaml")
+    assert said == ["a.yaml:5: frame 'b' is published under a condition: if=\"$(var s)\""]
+
+
+@pytest.mark.parametrize("off", ["if='false'", "if='0'", "if='False'", "unless='true'", "unless='1'"])
+def test_what_never_starts_is_left_out_and_said(tmp_path: Path, off: str) -> None:
+    tree, said = read(tmp_path, f"<launch>{NODE.format(POSITIONAL)}\n<group {off}>{NODE.format(FLAGS.replace('cam', 'x'))}</group></launch>")
+    assert set(tree.frames) == {"base", "cam"}
+    written = off.replace("'", '"')
+    assert said == [f"a.launch:2: static_transform_publisher not read: it never starts ({written})"]
+
+
+def test_included_files_are_named(tmp_path: Path) -> None:
+    followed = "is not followed; read that file too: --with FILE"
+    assert read(tmp_path, f"<launch>{NODE.format(FLAGS)}\n<include file='$(find x)/y.launch'/></launch>")[1] == [
+        f"a.launch:2: <include> '$(find x)/y.launch' {followed}"
+    ]
+    assert read(tmp_path, f"{YAML.format(FLAGS)}- include: {{file: y.yaml}}\n", "a.yaml")[1] == [f"a.yaml:6: include 'y.yaml' {followed}"]
+    call = f"N(package='tf2_ros', executable='static_transform_publisher', arguments={FLAGS.split()})"
+    assert python(tmp_path, f"    {call}\n    IncludeLaunchDescription('y.py')\n")[1] == [
+        f"a.launch.py:4: IncludeLaunchDescription \"'y.py'\" {followed}"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "said"),
+    [
+        (f"<launch>\n  {NODE.format('0 0 0 x 0 0 a b')}</launch>", "a.launch", "a.launch:2:63: 'x' is not a number"),
+        (f"<launch>\n  {NODE.format('0 0 0 0 0 a b')}</launch>", "a.launch", "a.launch:2:63: static_transform_publisher takes"),
+        (f"<launch>\n  {NODE.format('--qz 0.5 --frame-id a --child-frame-id b')}</launch>", "a.launch", "a.launch:2:63: quaternion 0 0 0.5 1 has norm 1.11803"),
+        (f"<launch>{NODE.format('0 0 0 0 0 0 a a')}</launch>", "a.launch", "a.launch:1:69: frame 'a' is its own parent"),
+        (f"<launch>{NODE.format(POSITIONAL)}", "a.launch", "a.launch:1:"),
+        (YAML.format("0 0 0 nan 0 0 a b"), "a.yaml", "a.yaml:5:11: 'nan' is not finite"),
+        ("launch: 3\n", "a.yaml", "a.yaml:1:9: expected a list of actions, found '3'"),
+        ("launch:\n- node\n", "a.yaml", "a.yaml:2:3: expected an action as - node: .., found 'node'"),
+        (PYTHON.format("['0', '0', '0', '0', '0', '1,5', 'a', 'b']"), "a.py", "a.py:5:31: '1,5' has a decimal comma"),
+        ("def generate_launch_description():\n  x = (\n", "a.py", "a.py:2:7: not Python 3: '(' was never closed"),
+        ("print 'x'\ndef generate_launch_description(): pass\n", "a.py", "a.py:1:1: not Python 3: Missing parentheses"),
+        (f"def generate_launch_description(): return {'(' * 150}0{')' * 150}\n", "a.py", "a.py"),
+        ("def generate_launch_description(): return " + "-" * 100_000 + "0\n", "a.py", "a.py"),
+        ("def generate_launch_description(): return 0" + " + 0" * 50_000 + "\n", "a.py", "a.py"),
+        ("<launch/>", "a.launch", "a.launch: no frames in it"),
+        ("launch:\n", "a.yaml", "a.yaml: no frames in it"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_line_with_its_place(run: Callable[..., Any], text: str, name: str, said: str) -> None:
+    done = run("tree", name, files={name: text})
+    assert done.status == 1
+    lines = [line for line in done.err.splitlines() if line.startswith("frametool: ")]
+    assert len(lines) == 1
+    assert lines[0].startswith(f"frametool: {said}")
+    assert len(lines[0]) < 260
+    assert "Traceback" not in done.err
+
+
+def test_two_calls_that_disagree_name_both_lines(tmp_path: Path) -> None:
+    text = f"<launch>\n{NODE.format('0 0 0 0 0 0 a b')}\n{NODE.format('0 0 1 0 0 0 a b')}\n</launch>"
+    with pytest.raises(FormatError, match=r"a\.launch:3: frame 'b' has two different poses in 'a': line 2 and line 3"):
+        read(tmp_path, text)
+
+
+def test_check_finds_what_is_wrong_in_each_call(run: Callable[..., Any]) -> None:
+    text = f"<launch>\n{NODE.format('0 0 x 0 0 0 a b')}\n{NODE.format('0 0 0 0 0 7 a b')}\n{NODE.format('0 0 1 2 a c')}</launch>"
+    done = run("check", "a.launch", files={"a.launch": text})
+    assert done.status == 1
+    assert [line.split(": ")[0] for line in done.out.splitlines()] == ["a.launch:2:61", "a.launch:3:1", "a.launch:4:61"]
+
+
+NAMES_TO_KEEP = ("base", "camera é", "a/b", "it's", 'say "x"', "<&>", "-1")
+
+
+def test_what_is_written_reads_back_to_the_same_bits(run: Callable[..., Any]) -> None:
+    entries = [
+        {"name": name, "parent": "world", "xyz": [0.1 * n, -1e-17, math.pi], "rpy": [n / 7, -0.3, 3.0]}
+        for n, name in enumerate(NAMES_TO_KEEP)
+    ]
+    source = json.dumps({"frames": entries})
+    written = run("tree", "a.json", "-f", "launch", files={"a.json": source})
+    assert written.status == 0
+    again = run("tree", "a.launch", "-f", "json", "--quiet", files={"a.launch": written.out})
+    assert again.out == run("tree", "a.json", "-f", "json").out
+    assert run("tree", "a.json", "-o", "b.launch").status == 0
+    assert run("tree", "b.launch", "-f", "launch", "--quiet").out == written.out
+
+
+def test_a_name_that_launch_files_would_replace_is_not_written(run: Callable[..., Any]) -> None:
+    done = run("tree", "a.json", "-f", "launch", files={"a.json": '{"frames": {"a": {"$(arg x)": {}}}}'})
+    assert (done.status, done.out) == (1, "")
+    assert "a frame name with $( has no place in a launch file" in done.err
+
+
+def test_what_was_read_is_said_once(run: Callable[..., Any]) -> None:
+    done = run("lookup", "a.launch", "base", "cam", files={"a.launch": f"<launch>{NODE.format(FLAGS)}</launch>"})
+    assert done.err == (
+        "frametool: a.launch: launch file, 1 static transform; "
+        "parent<-child, metres, radians; angles yaw pitch roll where they have no flags\n"
+    )
+
+
+def test_reading_a_launch_file_in_xml_loads_neither_numpy_nor_the_reader_of_python(tmp_path: Path) -> None:
+    (tmp_path / "a.launch").write_text(f"<launch>{NODE.format(FLAGS)}</launch>")
+    code = "import sys; from frametool.cli import run; run(['lookup', 'a.launch', 'base', 'cam']); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert not {"numpy", "rich", "yaml", "frametool.formats.launch_python"} & set(done.stdout.split())

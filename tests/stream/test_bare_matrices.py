@@ -1,0 +1,33 @@
+"""A matrix without a key keeps its spelling only while it has the same numbers."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Outcome
+
+    Run = Callable[..., Outcome]
+
+
+@pytest.mark.parametrize("right", ["{xyz: [1, 2, 3]}", "{rpy_deg: [0, 0, 90]}", "{xyz: [0, 0, 0]}"])
+@pytest.mark.parametrize("command", ["compose", "relative"])
+def test_a_bare_matrix_that_gains_a_position_becomes_a_mapping(run: Run, command: str, right: str) -> None:
+    matrix = "[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]"
+    streamed = json.loads(run(command, "-", right, "-f", "json", stdin=matrix + "\n").out)
+    single = json.loads(run(command, matrix, right, "-f", "json", "--to", "matrix,quaternion").out)
+    rows = streamed["matrix"] if len(streamed["matrix"]) == 3 else [row[:3] for row in streamed["matrix"][:3]]
+    assert rows == [row[:3] for row in single["matrix"][:3]]
+    xyz = streamed["xyz"] if "xyz" in streamed else [row[3] for row in streamed["matrix"][:3]]
+    assert xyz == [row[3] for row in single["matrix"][:3]]
+    assert streamed.get("distance") == single.get("distance")
+
+
+def test_a_bare_matrix_as_angles_is_json(run: Run) -> None:
+    outcome = run("convert", "--to", "rpy", "-f", "json", stdin="[[0, -1, 0], [1, 0, 0], [0, 0, 1]]\n")
+    assert list(json.loads(outcome.out)) == ["rpy"]
