@@ -22,7 +22,7 @@ from frametool.errors import FrametoolError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from frametool.calc.evaluate import Scope
+    from frametool.calc.scope import Scope
     from frametool.cli.output import Output
 
 PROMPT = "> "
