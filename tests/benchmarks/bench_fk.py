@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,7 +55,7 @@ def best(*calls: Callable[[], Any]) -> list[float]:
 def peer(path: str, values: Any) -> Callable[[], Any] | None:
     """Give the call of pinocchio for all rows; None where it is not installed."""
     try:
-        import pinocchio
+        pinocchio: Any = import_module("pinocchio")
     except ImportError:
         return None
     model = pinocchio.buildModelFromUrdf(path)

@@ -33,7 +33,7 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
     \b
       frametool fk arm.urdf arm_base tool -i joints.csv
       frametool fk arm.urdf tool right_finger -i joints.csv --to rpy_deg --prefix finger_
-      printf 'shoulder_pan_deg\n30\n' | frametool fk arm.urdf arm_base shoulder
+      printf 't,gripper_mm\\n0,12.5\\n' | frametool fk arm.urdf tool left_finger
       ros2 topic echo /joint_states | frametool fk arm.urdf arm_base tool -f csv
 
     Rows are a table with a column for each joint, JSON lines or YAML documents with a key for each, or JointState
