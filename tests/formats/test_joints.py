@@ -160,6 +160,12 @@ def test_a_wrong_option_is_misuse(arguments: tuple[str, ...], said: str, run: Ru
     assert said in done.err
 
 
+@pytest.mark.parametrize("command", [["tree"], ["check"], ["monitor"], ["view", "-f", "svg"]])
+def test_every_command_that_reads_a_robot_refuses_a_joint_it_does_not_have(command: list[str], run: Run) -> None:
+    done = run(*command, "arm.urdf", "-j", "nose=1", files={"arm.urdf": URDF})
+    assert (done.status, done.out, "no joint 'nose'" in done.err) == (2, "", True)
+
+
 def test_joints_need_a_robot(run: Run) -> None:
     done = run("lookup", "-j", "pan=1", "a.yaml", "a", "b", files={"a.yaml": "frames: {a: {b: {}}}"})
     assert (done.status, "--joint: there are no joints in a.yaml" in done.err) == (2, True)
