@@ -158,6 +158,9 @@ class Stream:
                 return self._run_as_values(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
+            from frametool.stream.row_layout import POSE
+
+            listed |= output.is_trajectory and bool(request.operation.extras(POSE))  # a trajectory has no room for them
             if form not in RECORDS and (listed or output.told not in (None, form)) and not kindred:
                 return self._run_as_poses(stream, form, request, output)
             return self._run(stream, form, request, output)

@@ -113,7 +113,8 @@ class OtherForm:
         request, unasked = settle_stamps(begun.table, request, self.source)
         rows = TablePoses(begun, self.form, request, self.source)
         self.shape = rows.shape
-        if rows.shape.kind == POSE and rows.shape.notation is None and request.operation.keeps_position:
+        bare = rows.shape.kind == POSE and rows.shape.notation is None and request.poses
+        if bare and request.operation.keeps_position:
             raise FormatError(
                 f"no rotation among the columns {rows.columns}: {self.style.form} is written of poses",
                 source=self.source,

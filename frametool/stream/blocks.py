@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, floats, rigid
 from frametool.geometry.batch_validation import read_rotations
 from frametool.stream.faults import NULL, STOP, Fault
+from frametool.stream.operation import ROW_BY_ROW
 from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, POSE, TURN, pose_of
 from frametool.stream.row_transforms import NOWHERE, by_frame, by_time
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
@@ -62,13 +63,14 @@ class Plan(NamedTuple):
 
 
 class State:
-    """What one block leaves for the next: the row before, and how often each angle has turned around."""
+    """What one block leaves for the next: the row before, the first one, and how often each angle has turned around."""
 
-    __slots__ = ("angles", "previous", "turns")
+    __slots__ = ("angles", "previous", "start", "turns")
 
     def __init__(self) -> None:
         """Begin before the first row."""
         self.previous: list[float] | None = None
+        self.start: list[float] | None = None
         self.angles: dict[int, float] = {}
         self.turns: dict[int, float] = {}
 
@@ -211,9 +213,12 @@ class Run:
         return "the result is not finite: the numbers are too large"
 
     def _with_previous(self, pose: Rigid, state: State) -> list[Rigid]:
-        if self.plan.operation.of != "previous":
+        if self.plan.operation.of not in ROW_BY_ROW:
             return [pose]
-        return _with_previous(pose, [row for row in range(self.count) if row not in self.reasons], state, self.count)
+        good = [row for row in range(self.count) if row not in self.reasons]
+        if self.plan.operation.of == "start":
+            return _with_first(pose, good, state, self.count)
+        return _with_previous(pose, good, state, self.count)
 
     def _rotation(self, shape: Shape, numbers: list[Floats], first: int) -> Components:
         if shape.notation is None:
@@ -327,6 +332,20 @@ def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]
         if beyond.size:
             return [(int(beyond[0]), f"{form.spec} {given[index][beyond[0]]:g}")]
     return []
+
+
+def rigid_of(parts: Sequence[Any]) -> Rigid:
+    """Return seven parts as the tuple they are."""
+    tx, ty, tz, x, y, z, w = parts
+    return tx, ty, tz, x, y, z, w
+
+
+def _with_first(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
+    """Return the very first good row, for each row, and the row."""
+    full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
+    if state.start is None and good:
+        state.start = [float(part[good[0]]) for part in full]
+    return [pose if state.start is None else rigid_of(state.start), rigid_of(full)]
 
 
 def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:

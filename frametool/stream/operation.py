@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.row_layout import Shape
 
+ROW_BY_ROW = ("previous", "start")  # what a row is compared with is another row
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 
 
@@ -72,7 +73,8 @@ class Operation(NamedTuple):
     left, right: applied as left @ row @ right[0] @ right[1] ..
     inverse: the row itself is inverted first
     of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
-        "pair" the two poses of a row, "previous" the row before and this one
+        "pair" the two poses of a row, "previous" the row before and this one,
+        "start" the very first row and this one
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: only the rotation changes; the position, if there is one, stays as it is

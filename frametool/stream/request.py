@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.stream.faults import STOP
-from frametool.stream.operation import Operation
+from frametool.stream.operation import ROW_BY_ROW, Operation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,7 +62,7 @@ class Request(NamedTuple):
     @property
     def in_order(self) -> bool:
         """Tell whether a row's result depends on the rows before it."""
-        return self.unwrap or self.operation.of == "previous"
+        return self.unwrap or self.operation.of in ROW_BY_ROW
 
     def for_kind(self, kind: str) -> Request:
         """Return what is asked of rows of one kind: how an expression names its result depends on it."""

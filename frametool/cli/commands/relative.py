@@ -29,9 +29,12 @@ if TYPE_CHECKING:
     "--consecutive", is_flag=True, help="of a stream, each row seen from the row before; the first is the identity"
 )
 @explain_options
+@click.option("--first", is_flag=True, help="of a stream, each row seen from the first, which is then the identity")
 @stream_options
 @pose_reading_options
-def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutive: bool, **options: Any) -> int:
+def command(
+    a: str | None, b: str | None, deg: bool, normalize: bool, consecutive: bool, first: bool, **options: Any
+) -> int:  # fmt: skip
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
     \b
@@ -45,21 +48,26 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
     output = Output("poses", deg=deg, **options)
     if explaining:
         plan = explaining.plan(output, stream)
-        if consecutive:
-            raise click.UsageError("--consecutive is about the rows of a stream; leave it or --explain out")
+        if consecutive or first:
+            option = "--first" if first else "--consecutive"
+            raise click.UsageError(f"{option} is about the rows of a stream; leave it or --explain out")
         from frametool.calc.explain.derive import derive_relative
 
         arguments = [str(one_argument(each)) for each in (a, b)]
-        first, second = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
-        return explaining.write(derive_relative(first, second, plan), output)
+        one, other = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
+        return explaining.write(derive_relative(one, other, plan), output)
     from frametool.stream.request import Request
 
     given = [each for each in (a, b) if each is not None]
-    if consecutive and given not in ([], ["-"]):
-        raise click.UsageError("--consecutive is about the rows of a stream; leave A and B out")
+    if consecutive and first:
+        raise click.UsageError("--consecutive and --first are two answers; give one")
+    if (consecutive or first) and given not in ([], ["-"]):
+        option = "--first" if first else "--consecutive"
+        raise click.UsageError(f"{option} is about the rows of a stream; leave A and B out")
     if len(given) < 2 or "-" in given:
         request = Request(given=stream.given, degrees=deg, normalize=normalize)
-        return stream.run(_asked(a, b, request, consecutive=consecutive), output)
+        other_row = "start" if first else "previous" if consecutive else ""
+        return stream.run(_asked(a, b, request, other_row), output)
     if stream.path:
         raise click.UsageError("-i FILE is read where - stands for A or B")
     pairs = combinations(given, stream.given, degrees=deg, normalize=normalize)
@@ -67,17 +75,17 @@ def command(a: str | None, b: str | None, deg: bool, normalize: bool, consecutiv
     return 0
 
 
-def _asked(a: str | None, b: str | None, plain: Request, *, consecutive: bool) -> Request:
-    """Compare a stream's rows with a fixed A or B, with the row before, or with the row's own second pose."""
+def _asked(a: str | None, b: str | None, plain: Request, other_row: str) -> Request:
+    """Compare a stream's rows with a fixed A or B, with another row, or with the row's own second pose."""
     from frametool.stream.operation import Operation
 
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
-        if not consecutive:
+        if not other_row:
             return plain._replace(operation=Operation(of="pair"), poses=2)
-        # a row is seen from the one before it, which is the same thing a moment earlier
-        return plain._replace(operation=Operation(of="previous"), rename=lambda _parent, name: (name, name))
+        # a row is seen from one before it, which is the same thing at an earlier time
+        return plain._replace(operation=Operation(of=other_row), rename=lambda _parent, name: (name, name))
     if a == b == "-":
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     first = a != "-"
