@@ -82,7 +82,7 @@ def load(
     given = {} if joints is None or isinstance(joints, str | PathLike) else joints
     values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in given.items()}
     joint_files = () if joints is None or given is joints else (str(joints),)
-    known = Answers(tuple(frames), joints=values, joint_files=joint_files, **answers)
+    known = Answers(tuple(frames), joints=values, joint_files=joint_files)._replace(**answers)
     files = (Recording(path, form=format, topics=chosen, answers=known) for path in paths)
     return load_sources(opened_together(files), rules)
 

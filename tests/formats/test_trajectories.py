@@ -241,6 +241,17 @@ def test_the_quaternion_of_euroc_begins_with_w(run: Run) -> None:
     assert done.out.splitlines()[1] == "1403636579.763555585 1.0 2.0 3.0 0.5 0.5 -0.5 0.5"
 
 
+def test_the_edges_of_a_graph_are_poses_of_one_vertex_in_another(run: Run) -> None:
+    information = " 1" * 21
+    text = f"VERTEX_SE2 0 9 9 0\nVERTEX_SE2 1 9 9 0\nEDGE_SE3:QUAT 0 1 1 2 3 0 0 0 1{information}\nEDGE_SE2 1 0 1 2 0.5 1 0 0 1 0 1\n"
+    done = run("convert", "--edges", "-f", "json", stdin=text)
+    found = [json.loads(line) for line in done.out.splitlines()]
+    assert [(each["parent"], each["name"], each["xyz"]) for each in found] == [("0", "1", [1.0, 2.0, 3.0]), ("1", "0", [1.0, 2.0, 0.0])]
+    assert "stamp_ns" not in found[0]
+    bad = run("convert", "--edges", "-f", "json", stdin=text.replace(information, " 1"))
+    assert (bad.status, "stdin:3: expected EDGE_SE3:QUAT i j x y z qx qy qz qw" in bad.err) == (1, True)
+
+
 # --- KITTI ---
 
 
