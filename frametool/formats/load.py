@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from os import PathLike
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.collector import paused_collector
 from frametool.documents.document import format_error, locate, locate_many
@@ -63,7 +63,7 @@ def load(
     format: str | None = None,  # noqa: A002 - what it is
     joints: Mapping[str, float | str] | str | PathLike[str] | None = None,
     frames: Sequence[str] = (),
-    **answers: str,
+    **answers: Any,
 ) -> FrameTree | TransformBuffer:
     """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 
@@ -82,7 +82,7 @@ def load(
     given = {} if joints is None or isinstance(joints, str | PathLike) else joints
     values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in given.items()}
     joint_files = () if joints is None or given is joints else (str(joints),)
-    known = Answers(tuple(frames), joints=values, joint_files=joint_files)._replace(**answers)
+    known = Answers(tuple(frames), joints=values, joint_files=joint_files, **answers)
     files = (Recording(path, form=format, topics=chosen, answers=known) for path in paths)
     return load_sources(opened_together(files), rules)
 
