@@ -26,15 +26,14 @@ if TYPE_CHECKING:
 FORMS = ("text", "markdown", "latex")
 ONE_RECORD = "--explain derives one record; write it as an argument"
 EXPLAIN = click.option(
-    "--explain", type=click.Choice(FORMS), metavar="[=text|markdown|latex]",
-    help="derive the result step by step: formula, formula with these numbers, value; --precision then counts "
-    "significant digits  [default: text of 6]",
+    "--explain", type=click.Choice(FORMS), metavar="[=FORM]",
+    help="derive it step by step: text, markdown, latex",
 )  # fmt: skip
 
 
 def explain_options(function: Function) -> Function:
     """Add to a command the options of derivations; `Explaining` takes them."""
-    every = click.option("--explain-full", is_flag=True, help="--explain with all products of long chains")
+    every = click.option("--explain-full", is_flag=True, help="that with all products of long chains")
     return decorated(function, [EXPLAIN, every])
 
 

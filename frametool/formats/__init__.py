@@ -348,7 +348,7 @@ FORMATS = {
         reads=("tree", "joints"),
         reader="frametool.formats.mjcf",
         signs=(("xml", "mujoco"),),
-        states="parent<-child, metres; sites and cameras (looking along -z) are site:NAME, camera:NAME",
+        states="parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)",
     ),
     "sdf": Format(
         "SDF of Gazebo",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
+from itertools import accumulate, islice
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.document import Document, parse_documents
@@ -53,6 +54,10 @@ SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
 # .. and these in the mappings that hold the record
 _WORDS = frozenset(word.partition("_deg")[0].partition("_rad")[0] for word in (*OURS, *POSE_KEYS, "theta"))
+
+
+MOST_LEAVES = 2000
+"""Scalars of a record that is learned for others: an expression for more takes longer than they are worth."""
 
 
 class Entry(NamedTuple):
@@ -127,6 +132,18 @@ class Template:
         if request.timed is None or request.timed.name or request.operation.formula is None:
             return request.timed
         return request.timed._replace(name=str(found))
+
+    @cached_property
+    def is_long(self) -> bool:
+        """Tell whether the record has so many scalars that no other one is looked for that is written alike."""
+        leaves = _leaves(self._root, ())
+        return next(islice(leaves, MOST_LEAVES, None), None) is not None
+
+    def places(self) -> list[tuple[int, int]]:
+        """Return where each stretch stands in the record that was learned, in bytes."""
+        sizes = [len(segment.encode()) for segment in self.segments()]
+        ends = list(accumulate(sizes))
+        return list(zip([0, *ends[:-1]], ends, strict=True))
 
     def segments(self) -> list[str]:
         """Return the text of each stretch."""

@@ -81,10 +81,9 @@ def command(
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
       ros2 topic echo /clicked_point | frametool apply tf.txt map
 
-    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point. Without SOURCE
-    each record says its own frame; without records standard input is read.
-
-    Records may be ROS messages, moved by the frame and at the stamp of their headers: frametool help records.
+    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point; ROS messages go
+    by their headers (frametool help records). Without SOURCE each record says its own frame; without records standard
+    input is read.
     """
     stream, explaining = Stream(options), Explaining(options)
     output = Output("points", "trajectory", deg=deg, **options)

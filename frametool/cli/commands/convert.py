@@ -50,14 +50,13 @@ class ConvertCommand(Command):
     "--axes",
     type=TEXT,
     metavar="NAME",
-    help="the pose at the same place with these axes; alone, the pose of such axes on a ROS body: "
-    "optical, opengl, frd, flu, enu, ned, or A_from_B",
+    help="the pose at the same place in these axes (help axes)",
 )
 @click.option(
     "--find",
     type=TEXT,
     metavar="A,B,C",
-    help="show the Euler conventions in which these angles are the rotation, radians or with --deg degrees",
+    help="Euler conventions with these angles (help euler)",
 )
 @click.option(
     "--tolerance", type=Number(), default=1e-6, metavar="RAD", help="how near --find wants it  [default: 1e-06]"
@@ -66,7 +65,7 @@ class ConvertCommand(Command):
 @pose_options
 @result_options("poses")
 @explain_options
-@click.option("--unwrap", is_flag=True, help="in a stream, let angles go on beyond half a turn instead of jumping")
+@click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
 @stream_options
 @pose_reading_options
 def command(
