@@ -160,6 +160,9 @@ class Stream:
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
             if request.gathered is not None and not listed:
                 return self._gather(stream, form, request._replace(notations=()), name)
+            from frametool.stream.row_layout import POSE
+
+            listed |= output.is_trajectory and bool(request.operation.extras(POSE))  # a trajectory has no room for them
             if form not in RECORDS and (listed or output.told not in (None, form)) and not kindred:
                 return self._run_as_poses(stream, form, request, output)
             return self._run(stream, form, request, output)

@@ -224,7 +224,7 @@ FORMATS = {
         writes=("poses", "trajectory"),
         writer="frametool.formats.g2o",
         signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
-        states="vertices, world<-body, quaternion x y z w; edges are not read",
+        states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
     ),
     "open3d": Format(
         "Open3D camera trajectory",
