@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.calc.explain.operations import inverse
-from frametool.calc.explain.to_quaternion import TO_QUATERNION
+from frametool.calc.explain.to_quaternion import TO_QUATERNION, block_of
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, printable
 from frametool.grammar import pose_algebra
@@ -51,7 +51,7 @@ class Given(NamedTuple):
             sheet.heading("The rotation")
             sheet.say("None is given: the identity, x 0, y 0, z 0, w 1.")
             return IDENTITY
-        block = TO_QUATERNION[self.notation.representation.name]
+        block = block_of(TO_QUATERNION, self.notation)
         return block(sheet, self.numbers, self.notation.bound_axes(), self.degrees)
 
     def components(self, sheet: Sheet, target: str, source: str) -> Rigid:

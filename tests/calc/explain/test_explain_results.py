@@ -12,6 +12,7 @@ from written import HOSTILE, ROTATIONS, SPECS, rotation, seeded
 import frametool
 from frametool.calc.explain import derive, operations
 from frametool.calc.explain.agreement import DerivationWrong
+from frametool.calc.explain.to_quaternion import TO_QUATERNION
 from frametool.geometry import euler
 
 if TYPE_CHECKING:
@@ -147,3 +148,10 @@ def test_a_derivation_that_leads_elsewhere_is_never_printed(monkeypatch: pytest.
     monkeypatch.setattr(derive, "SHORT", {("rpy", "matrix"): lambda *_: (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)})
     with pytest.raises(DerivationWrong, match="off by 1 rad"):
         frametool.explain("convert", {"rpy": [1, 0, 0]}, to="matrix")
+
+
+def test_a_representation_without_a_block_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch, run: Callable[..., Outcome]) -> None:
+    monkeypatch.delitem(TO_QUATERNION, "mrp")
+    outcome = run("convert", "--from", "mrp", "0.1", "0", "0", "--explain")
+    assert (outcome.status, outcome.out) == (1, "")
+    assert outcome.err.startswith("frametool: there is no derivation of 'mrp'; derived are quaternion, xyzw, wxyz, rpy")
