@@ -75,7 +75,8 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
 def written(sheet: Sheet, q: Quaternion, form: Notation, plan: DerivationStyle) -> Sequence[float]:
     """Add the way from the quaternion to a notation; return its numbers."""
     block = block_of(FROM_QUATERNION, form)
-    return block(sheet, q, form.bound_axes(), plan.style.in_degrees(form), plan.style.keep_sign)
+    numbers: Sequence[float] = block(sheet, q, form.bound_axes(), plan.style.in_degrees(form), plan.style.keep_sign)
+    return numbers
 
 
 def matrix_of_pose(sheet: Sheet, form: Notation, own: Result) -> None:

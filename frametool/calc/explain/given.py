@@ -52,7 +52,8 @@ class Given(NamedTuple):
             sheet.say("None is given: the identity, x 0, y 0, z 0, w 1.")
             return IDENTITY
         block = block_of(TO_QUATERNION, self.notation)
-        return block(sheet, self.numbers, self.notation.bound_axes(), self.degrees)
+        q: Quaternion = block(sheet, self.numbers, self.notation.bound_axes(), self.degrees)
+        return q
 
     def components(self, sheet: Sheet, target: str, source: str) -> Rigid:
         """Add the way from the numbers as written to target_from_source."""
