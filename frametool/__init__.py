@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "calc": "frametool.calc",

@@ -32,9 +32,7 @@ EXPLAIN = click.option(
 
 def explain_options(function: Function) -> Function:
     """Add to a command the options of derivations; `Explaining` takes them."""
-    every = click.option(
-        "--explain-full", is_flag=True, hidden=True, help="--explain with all products of long chains"
-    )
+    every = click.option("--explain-full", is_flag=True, help="that with all products of long chains")
     return decorated(function, [EXPLAIN, every])
 
 

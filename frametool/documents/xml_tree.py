@@ -13,18 +13,14 @@ if TYPE_CHECKING:
 class XmlNode:
     """One element: its attributes and place, its text, and those of the elements in it that are kept."""
 
-    __slots__ = ("children", "element", "text")
+    __slots__ = ("children", "element", "tag", "text")
 
     def __init__(self, element: Element) -> None:
         """Create it as it begins."""
         self.element = element
+        self.tag = element.tag
         self.children: list[XmlNode] = []
         self.text = ""
-
-    @property
-    def tag(self) -> str:
-        """Return what it is."""
-        return self.element.tag
 
     def all(self, *tags: str) -> Iterator[XmlNode]:
         """Yield the elements of some kinds that stand directly in it."""
@@ -32,7 +28,10 @@ class XmlNode:
 
     def first(self, tag: str) -> XmlNode | None:
         """Return the first element of a kind, if there is one."""
-        return next(self.all(tag), None)
+        for child in self.children:
+            if child.tag == tag:
+                return child
+        return None
 
     def text_of(self, tag: str, default: str = "") -> str:
         """Return the text of the first element of a kind."""

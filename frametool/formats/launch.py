@@ -26,17 +26,22 @@ if TYPE_CHECKING:
 
     from frametool.documents.input_file import InputFile
     from frametool.formats.launch_actions import Action
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
 
 
-def write_tree(tree: FrameTree, style: Style) -> str:
-    """Return XML of ROS 2: one node an edge."""
+def write_tree(tree: Frames, style: Style) -> str:
+    """Return XML of ROS 2: one node an edge.
+
+    Raises ValueInvalid for frames that move, and names that have no place there.
+    """
     from html import escape
 
+    if moving := [track.child for track in tree.tracks() if not track.standing]:
+        raise ValueInvalid(f"{publisher.moving_frames(moving[:10])}; give --at TIME")
     lines = publisher.write_tree(tree, style.in_form("static2")).splitlines()
     if unsafe := next((line for line in lines if "$(" in line), None):
         names = unsafe[unsafe.index("--frame-id") :]

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 PACKAGES = frozenset(("tf", "tf2_ros"))
+COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"
+IN_PARAMETERS = "it is a composable node, whose transform stands in its parameters"
 _SUBSTITUTION = re.compile(r"\$\([^()]*\)?")
 _NO, _YES = ("0", "false"), ("1", "true")
 

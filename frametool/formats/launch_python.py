@@ -11,7 +11,15 @@ import warnings
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
-from frametool.formats.launch_actions import PACKAGES, Action, not_followed, not_read, runs_publisher
+from frametool.formats.launch_actions import (
+    COMPOSABLE,
+    IN_PARAMETERS,
+    PACKAGES,
+    Action,
+    not_followed,
+    not_read,
+    runs_publisher,
+)
 from frametool.formats.launch_literals import NotLiteral, Scope, evaluate, scopes_of
 from frametool.ros.publisher import CALL
 
@@ -76,6 +84,8 @@ def _action(node: ast.Call, scope: Scope, conditions: tuple[str, ...]) -> Action
     if _name_of(node.func) == "IncludeLaunchDescription":
         named = node.args[0] if node.args else given.get("launch_description_source", node.func)
         return not_followed("IncludeLaunchDescription", _written(named), node.lineno)
+    if _text(given.get("plugin"), scope) == COMPOSABLE:
+        return not_read(IN_PARAMETERS, node.lineno, node.col_offset + 1)
     name = "cmd" if "cmd" in given else "arguments"
     if not (_is_command(given["cmd"], scope) if name == "cmd" else _is_publisher(given, scope)):
         return _NO_CALL

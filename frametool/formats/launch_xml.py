@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.documents.xml_events import XmlFile
-from frametool.formats.launch_actions import PACKAGES, Action, call, condition, not_followed, not_read, runs_publisher
+from frametool.formats.launch_actions import (
+    COMPOSABLE,
+    IN_PARAMETERS,
+    PACKAGES,
+    Action,
+    call,
+    condition,
+    not_followed,
+    not_read,
+    runs_publisher,
+)
 from frametool.ros.publisher import CALL
 
 if TYPE_CHECKING:
@@ -33,6 +43,8 @@ def actions(file: InputFile) -> Iterator[Action]:
         conditions = [each for _, group in outer for each in group] + own
         if element.tag == "include":
             yield not_followed("<include>", element.attributes.get("file", ""), element.line)
+        elif element.tag == "composable_node" and element.attributes.get("plugin") == COMPOSABLE:
+            yield not_read(IN_PARAMETERS, element.line, element.column)
         elif arguments := _command(element):
             yield _call(xml, element, arguments, conditions)
 

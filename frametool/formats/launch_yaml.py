@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, locate_many, parse_documents
-from frametool.formats.launch_actions import PACKAGES, Action, call, condition, not_followed, not_read, runs_publisher
+from frametool.formats.launch_actions import (
+    COMPOSABLE,
+    IN_PARAMETERS,
+    PACKAGES,
+    Action,
+    call,
+    condition,
+    not_followed,
+    not_read,
+    runs_publisher,
+)
 from frametool.grammar.readers import Misfit, kind
 from frametool.ros.publisher import CALL
 
@@ -60,6 +70,10 @@ def _action(key: str, held: Any, path: Path, conditions: list[str]) -> Iterator[
         yield path, not_followed("include", texts.get("file", ""), 0)
     elif key == "node" and texts.get("pkg") in PACKAGES and texts.get("exec") == CALL:
         yield _call(held, "args", path, under)
+    elif key == "node_container" and type(held.get("composable_node")) is list:
+        for index, node in enumerate(held["composable_node"]):
+            if type(node) is dict and node.get("plugin") == COMPOSABLE:
+                yield (*path, "composable_node", index), not_read(IN_PARAMETERS, 0)
     elif key == "executable" and runs_publisher(texts.get("cmd", "").split()):
         yield _call(held, "cmd", path, under)
 

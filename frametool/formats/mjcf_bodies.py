@@ -131,9 +131,9 @@ class MjcfModel:
         attributes = self.classes.attributes(node.element, inside.around)
         pose = self.poses.pose_of_site(attributes) if node.tag == "site" else self.poses.pose(attributes)
         placed = self._place(node, inside, pose)
-        if "mode" in attributes and attributes["mode"].text.startswith("target"):
-            message = f"{placed.name} looks at a body; its orientation is that in the file"
-            self.options.tally.note_each(message, node.element.line)
+        if "mode" in attributes and (mode := attributes["mode"].text.strip()) != "fixed":
+            message = f"{placed.name} has the mode {shown(mode)}, in which MuJoCo turns it over time"
+            self.options.tally.note_each(f"{message}; it stands as written", node.element.line)
 
     def _place(self, node: XmlNode, inside: _Inside, pose: Rigid) -> Placed:
         """Register a body, site or camera; sites and cameras have names of their own, and show it."""

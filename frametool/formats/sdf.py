@@ -50,6 +50,7 @@ class _SdfTree:
         self.joints = joints
         self.options = options
         self.hung: dict[str, SdfJoint] = {}  # link -> the joint that it hangs on
+        self._above: dict[str, str] = {}  # link -> one on which it hangs, if not at once
         for joint in joints.all:
             self._hang(joint)
         ends = [end for joint in joints.all for end in (joint.parent, joint.child)]
@@ -57,13 +58,27 @@ class _SdfTree:
         self.carried = {model.name: self._carrier(model) for model in frames.all.values() if model.kind == "model"}
 
     def _hang(self, joint: SdfJoint) -> None:
-        """Let a link hang on a joint; a second one closes a loop, and is told."""
+        """Let a link hang on a joint; one that would close a loop is left out, and told."""
         link = joint.hanging.name
-        first = self.hung.setdefault(link, joint)
-        if first is not joint:
-            where = f"{shown(link)} hangs on joint {shown(first.frame.local)} already"
-            message = f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}"
-            self.options.tally.note_each(message, joint.frame.holder.element.line)
+        if link in self.hung:
+            where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
+        elif self._root_of(joint.outer.name) == link:
+            where = f"{shown(joint.outer.name)} hangs on {shown(link)} already"
+        else:
+            self.hung[link] = joint
+            self._above[link] = joint.outer.name
+            return
+        message = f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}"
+        self.options.tally.note_each(message, joint.frame.holder.element.line)
+
+    def _root_of(self, link: str) -> str:
+        """Return the link at the top of those on which a link hangs; the way is cut short for the next time."""
+        way = []
+        while link in self._above:
+            way.append(link)
+            link = self._above[link]
+        self._above.update(dict.fromkeys(way, link))
+        return link
 
     def _carrier(self, model: SdfFrame) -> SdfFrame | None:
         """Return the link on which a model's frame hangs; None where its links hang on it."""
@@ -131,7 +146,7 @@ class _SdfTree:
     def _across(self, joint: SdfJoint, posture: Posture) -> Iterator[Edge]:
         """Yield the edge across a joint: for good, or a sample at each time."""
         hanging = joint.hanging
-        outer = joint.child if joint.turned else joint.parent
+        outer = joint.outer
         rest = self.frames.relative(outer, hanging)
         line = joint.frame.holder.element.line
         for stamp_ns, moved in posture.motions(*(motion.name for motion in joint.motions)):

@@ -21,7 +21,7 @@ IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 _AXIS = frozenset(("xyz", "limit", "mimic", "use_parent_model_frame"))
 HELD = {
     "sdf": frozenset(("world", "model", "include")),
-    "world": frozenset(("model", "frame", "joint", "include")),
+    "world": frozenset(("model", "frame", "joint", "include", "state")),
     "model": frozenset(("model", "link", "joint", "frame", "pose", "include")),
     "link": frozenset(("pose", "sensor")),
     "sensor": frozenset(("pose",)),

@@ -10,7 +10,7 @@ from __future__ import annotations
 from functools import reduce
 from typing import TYPE_CHECKING
 
-from frametool.errors import alternatives, did_you_mean, shown
+from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.sdf_elements import IDENTITY, read_pose
 from frametool.geometry import rigid
 
@@ -73,12 +73,12 @@ class SdfFrames:
         self.top = SdfFrame(WORLD, WORLD, None, worlds[0] if worlds else root)
         self.all: dict[str, SdfFrame] = {WORLD: self.top}
         self.sensors: list[SdfFrame] = []
-        self.left_out: list[XmlNode] = []
         self.version = _version(root)
+        self.missing: FormatError | None = None  # the last error about a name that was left out
+        self.gone: set[str] = set()
         self._take([self.top])
-        for frame in [*self.all.values(), *self.sensors]:
-            if frame is not self.top:
-                self._read(frame)
+        while self._read_all():  # as long as names are lost with what was left out
+            pass
         for frame in self.all.values():
             self._settle(frame)
 
@@ -90,6 +90,9 @@ class SdfFrames:
             for holder in scope.holder.children:
                 if holder.tag == "include":
                     self._leave_out(holder)
+                elif holder.tag == "state":
+                    message = "<state> is left out: every model stands where its own pose has it"
+                    self.options.tally.note_each(message, holder.element.line)
                 elif holder.tag in ("model", "link", "joint", "frame"):
                     frame = self._named(holder, scope)
                     if holder.tag == "model":
@@ -121,10 +124,31 @@ class SdfFrames:
         return frame
 
     def _leave_out(self, include: XmlNode) -> None:
-        self.left_out.append(include)
         name = shown(include.text_of("name") or include.text_of("uri"))
         message = f"<include> {name} is left out, it needs other files; with them: gz sdf -p FILE > whole.sdf"
         self.options.tally.note_each(message, include.element.line)
+
+    def _read_all(self) -> bool:
+        """Read every frame; return whether some were left out because they build on what is included."""
+        lost: list[SdfFrame] = []
+        for frame in [*self.all.values(), *self.sensors]:
+            try:
+                if frame is not self.top:
+                    self._read(frame)
+            except FormatError as error:
+                if error is not self.missing:
+                    raise
+                lost.append(frame)
+                message = f"{frame.kind} {shown(frame.name)} is left out: {error.message}"
+                self.options.tally.note_each(message, frame.holder.element.line)
+        self.gone |= {frame.name for frame in lost}
+        self.all = {name: each for name, each in self.all.items() if not self._is_gone(each)}
+        self.sensors = [each for each in self.sensors if not self._is_gone(each)]
+        return bool(lost)
+
+    def _is_gone(self, frame: SdfFrame) -> bool:
+        """Tell whether a frame, or a scope around it, was left out."""
+        return any(each.name in self.gone for each in (frame, *frame.below(self.top)))
 
     def _read(self, frame: SdfFrame) -> None:
         """Read the pose of a frame and find what it is relative to."""
@@ -134,14 +158,19 @@ class SdfFrames:
         if frame.kind == "sensor":  # which stands in its link, but sees the names around that
             around = scope.scope or self.top
             frame.relative_to = self.find(told, around, pose or holder, "relative_to") if told else scope
-        elif told:
-            frame.relative_to = self.find(told, scope, pose or holder, "relative_to")
-        elif frame.kind == "frame":
-            frame.relative_to = self.attached(frame)
-        elif frame.kind == "joint":
-            frame.relative_to = self.end(frame, "child")
+        else:
+            outer = self._default(frame)
+            frame.relative_to = self.find(told, scope, pose or holder, "relative_to") if told else outer
         if frame.kind == "model" and (placed := holder.attribute("placement_frame")):
             frame.placement = self.find(placed, frame, holder, "placement_frame")
+
+    def _default(self, frame: SdfFrame) -> SdfFrame | None:
+        """Return what the pose of a frame is relative to unless told; what it needs besides must be there too."""
+        if frame.kind == "frame":
+            return self.attached(frame)
+        if frame.kind == "joint":
+            return [self.end(frame, which) for which in ("parent", "child")][1]
+        return frame.scope
 
     def attached(self, frame: SdfFrame) -> SdfFrame:
         """Return what an explicit frame is attached to."""
@@ -170,17 +199,28 @@ class SdfFrames:
         if found is not None and found is not self.top:
             return found
         place = "the world" if scope.kind == WORLD else f"model {shown(scope.name)}"
-        raise self.xml.error(holder.element, f"no frame {shown(told)} in {place}{self._hint(told, scope)}", attribute)
+        message = f"no frame {shown(told)} in {place}"
+        if self._is_left_out(told, name, scope):
+            self.missing = self.xml.error(holder.element, message, attribute)
+            raise self.missing
+        raise self.xml.error(holder.element, message + self._hint(told, scope), attribute)
+
+    def _is_left_out(self, told: str, name: str, scope: SdfFrame) -> bool:
+        """Tell whether a name is one that was left out, or begins with that of an included model."""
+        if any(name == gone or name.startswith(f"{gone}::") for gone in self.gone):
+            return True
+        for include in scope.holder.all("include"):
+            file = include.text_of("uri").rstrip("/").rsplit("/", 1)[-1]
+            names = (include.text_of("name"), file, file.rsplit(".", 1)[0])
+            if told.split("::", maxsplit=1)[0] in names or include.attribute("merge") == "true":
+                return True
+        return False
 
     def _hint(self, told: str, scope: SdfFrame) -> str:
         """Say what could have been meant by a name that is not there."""
-        names = [frame.local for frame in self.all.values() if frame.scope is scope]
-        if self.left_out and not did_you_mean(told, names):
-            line = self.left_out[0].element.line
-            return f"; it may be in what line {line} includes: gz sdf -p FILE > whole.sdf"
         if told == WORLD:
             return "; poses in a model are relative to frames of the model"
-        return alternatives(told, names, "frames")
+        return alternatives(told, [frame.local for frame in self.all.values() if frame.scope is scope], "frames")
 
     def _settle(self, frame: SdfFrame) -> None:
         """Work out the pose of a frame in its scope, after those it depends on; a stack, for chains may be long.

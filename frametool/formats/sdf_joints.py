@@ -9,7 +9,7 @@ from collections import Counter
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import alternatives, shown
+from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.joints import Joint, Mimic
 from frametool.formats.sdf_frames import WORLD
 from frametool.geometry import floats, quaternion
@@ -48,6 +48,11 @@ class SdfJoint(NamedTuple):
     def hanging(self) -> SdfFrame:
         """Return the body that hangs on the other one."""
         return self.parent if self.turned else self.child
+
+    @property
+    def outer(self) -> SdfFrame:
+        """Return the body that it hangs on."""
+        return self.child if self.turned else self.parent
 
 
 class SdfJoints:
@@ -89,11 +94,15 @@ class SdfJoints:
     def canonical(self, model: SdfFrame) -> SdfFrame | None:
         """Return the link that a model's frame is attached to: the one it names, or the first, also of nested ones."""
         if told := model.holder.attribute("canonical_link"):
-            return self.frames.find(told, model, model.holder, "canonical_link")
-        for tag in ("link", "model"):
-            if first := model.holder.first(tag):
-                return self.frames.find(first.attribute("name"), model, first, "name")
-        return None
+            try:
+                return self.frames.find(told, model, model.holder, "canonical_link")
+            except FormatError as error:
+                if error is not self.frames.missing:
+                    raise
+                return None
+        inside = [frame for frame in self.frames.all.values() if frame.scope is model]
+        links = (frame for kind in ("link", "model") for frame in inside if frame.kind == kind)
+        return next(links, None)
 
     def _read(self, frame: SdfFrame) -> SdfJoint:
         holder = frame.holder
@@ -114,15 +123,18 @@ class SdfJoints:
         if kind == "ball":
             return (Joint(name, "ball", line=line),)
         plain = {"continuous": "continuous", "prismatic": "prismatic"}.get(kind, "revolute")
-        tags = ("axis", "axis2")[: KINDS[kind]]
-        return tuple(self._axis(frame, tag, f"{name}:2" if tag == "axis2" else name, plain) for tag in tags)
+        motions = []
+        for tag, called in (("axis", name), ("axis2", f"{name}:2"))[: KINDS[kind]]:
+            if axis := frame.holder.first(tag):
+                motions.append(self._axis(frame, axis, called, plain))
+            else:
+                message = f"joint {shown(frame.local)} has no <{tag}>: it takes no value there"
+                self.frames.options.tally.note_each(message, line)
+        return tuple(motions)
 
-    def _axis(self, frame: SdfFrame, tag: str, name: str, kind: str) -> Joint:
+    def _axis(self, frame: SdfFrame, axis: XmlNode, name: str, kind: str) -> Joint:
         """Read one axis of a joint, with its limits and what it mimics."""
         line = frame.holder.element.line
-        axis = frame.holder.first(tag)
-        if axis is None:
-            raise self.xml.error(frame.holder.element, f"joint {shown(frame.local)} has no <{tag}>")
         lower, upper = self._limits(axis)
         return Joint(name, kind, self._direction(frame, axis), lower, upper, self._mimic(frame, axis), line=line)
 

@@ -5,29 +5,40 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError
+from frametool.formats.recordings import refuse_unknown_joints
 from frametool.frames.edge_log import EdgeLog, chain, common_interval
 from frametool.frames.no_data import frames_on
 from frametool.frames.stamps import BILLION
+from frametool.grammar.edges import stop
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.formats.recordings import Recording
+    from frametool.grammar.edges import Report
 
 
-def monitor(files: Sequence[Recording], *ends: str, normalize: bool = False) -> list[dict[str, Any]]:
+def monitor(
+    files: Sequence[Recording], *ends: str, normalize: bool = False, clashing: Report = stop
+) -> list[dict[str, Any]]:
     """Describe every edge of some files; or, of `ends` (target, source), those between the two and their chain.
 
+    clashing: takes the errors about frames that come by the topics of two robots, whose samples are then told as one
     Raises FormatError for files without transforms, UnknownFrame, NotConnected.
     """
+
+    def report(error: FormatError) -> None:
+        (clashing if error.rule == "two-topics" else stop)(error)
+
     logs: dict[str, EdgeLog] = {}
     for file in files:
-        for edge in file.edges(normalize=normalize):
+        for edge in file.edges(report, normalize=normalize):
             if edge.parent is not None:
                 log = logs.get(edge.child) or logs.setdefault(edge.child, EdgeLog(edge.child))
                 log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)
                 if edge.topic:
                     log.topics[edge.topic] = log.topics.get(edge.topic, 0) + 1
+    refuse_unknown_joints(files)
     if not logs:
         raise FormatError("no transforms in it", source=", ".join(file.name for file in files))
     if not ends:

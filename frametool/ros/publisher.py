@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.documents.input_file import InputFile
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Result, Style
 
@@ -64,7 +64,7 @@ def moving_frames(names: Iterable[str]) -> str:
     return f"frames move and cannot be published as static: {', '.join(names)}"
 
 
-def write_tree(tree: FrameTree, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return one line an edge."""
     return "".join(
         f"{_line(Pose.of(transform.components, child, parent), style)}\n" for parent, child, transform in tree.edges()

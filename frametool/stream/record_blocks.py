@@ -21,13 +21,15 @@ from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
-    import re
     from collections.abc import Sequence
+    from typing import TypeAlias
 
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part, Splitter
     from frametool.stream.template import Template
     from frametool.text.array_types import Bytes, Ints
+
+    Places: TypeAlias = Sequence[tuple[int, int]]
 
 MOST_TEMPLATES = 256  # kept in mind
 MOST_TRIED = 8  # of them tried on whole blocks
@@ -119,14 +121,14 @@ class RecordBlocks:
     def _take_singly(self, text: bytes, start: int, end: int, found: Found) -> None:
         """Take records one by one, learning new templates; what stands between them passes."""
         chunk = text[start:end]
-        matches: dict[int, tuple[Template, re.Match[bytes]]] = {}
+        matches: dict[int, tuple[Template, Places]] = {}
 
         def match(at: int) -> int | None:
             """Match the template used last, which most records follow."""
             hit = self.templates[-1].pattern.match(chunk, at) if self.templates and clean else None
             if hit is None:
                 return None
-            matches[at] = self.templates[-1], hit
+            matches[at] = self.templates[-1], hit.regs[1:]
             return hit.end()
 
         clean = _is_text(chunk)
@@ -138,42 +140,47 @@ class RecordBlocks:
             at = part.after
             hit = None if part.problem else matches.get(part.start) or self._match(chunk, part.start, part.end)
             if hit is None:
-                problem = self._learn(chunk, part)
-                if isinstance(problem, Fault):
+                learned = self._learn(chunk, part)
+                if isinstance(learned, Fault):
                     line = text.count(b"\n", 0, start)
-                    found.faults.append((start + part.begin, problem._replace(line=problem.line + line)))
+                    found.faults.append((start + part.begin, learned._replace(line=learned.line + line)))
                     if self.request.on_error == NULL and not part.outside:
                         nulled = null_of(chunk[part.start : part.end], json=self.form == "json")
                         row = chunk[part.begin : part.start] + nulled + chunk[part.end : part.after]
                         found.odd.append((start + part.begin, row))
                     continue
-                hit = None if problem is not None else self._match(chunk, part.start, part.end)
+                hit = None if isinstance(learned, bytes) else self._own_places(learned, chunk, part)
             if hit is None:
                 found.odd.append((start + part.begin, chunk[part.begin : part.after]))
                 continue
-            template, groups = hit
-            spans = [*groups.regs[1:], (part.end, part.after), (part.begin, part.start)]
+            template, places = hit
+            spans = [*places, (part.end, part.after), (part.begin, part.start)]
             found.singles.setdefault(template, []).append(tuple((a + start, b + start) for a, b in spans))
         if at < len(chunk):
             found.odd.append((start + at, chunk[at:]))
 
-    def _match(self, chunk: bytes, begin: int, stop: int) -> tuple[Template, re.Match[bytes]] | None:
+    def _own_places(self, learned: Template, chunk: bytes, part: Part) -> tuple[Template, Places] | None:
+        """Return where the stretches of the record stand from which a template was learned."""
+        if not learned.is_long or learned.text.encode() != chunk[part.start : part.end]:
+            return self._match(chunk, part.start, part.end)
+        return learned, [(begin + part.start, end + part.start) for begin, end in learned.places()]
+
+    def _match(self, chunk: bytes, begin: int, stop: int) -> tuple[Template, Places] | None:
         """Find the template that a record follows."""
         if not _is_text(chunk[begin:stop]):
             return None
         for template in reversed(self.templates):
             found = template.pattern.fullmatch(chunk, begin, stop)
             if found is not None:
-                return template, found
+                return template, found.regs[1:]
         return None
 
-    def _learn(self, chunk: bytes, part: Part) -> Fault | bytes | None:
-        """Keep the template of a record in mind, not too many; return why it has none."""
+    def _learn(self, chunk: bytes, part: Part) -> Fault | bytes | Template:
+        """Return the template of a record, or why it has none; keep it in mind unless it is long, not too many."""
         learned = attempt(chunk, part, self.form, self.request, self.source)
-        if isinstance(learned, (Fault, bytes)):
-            return learned
-        self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], learned]
-        return None
+        if not isinstance(learned, (Fault, bytes)) and not learned.is_long:
+            self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], learned]
+        return learned
 
     def _outcome(self, text: bytes, data: Bytes, found: Found) -> Outcome:
         """Run every template's records, and put all of it in order."""
@@ -241,6 +248,8 @@ class RecordBlocks:
             unwrap=request.unwrap,
             yaml=self.form == "yaml",
             timed=template.timed(request),
+            beside=template.beside if request.beside is not None else "",
+            gathered=request.gathered,
             sources=tuple(entry.record.parent.text for entry in template.entries),
         )
 

@@ -81,16 +81,23 @@ def _has_ended(stream: ByteStream) -> bool:
 
 
 def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
-    """Let no comma stand before the first record that is left, and make the lack of the closing bracket a fault."""
+    """Let no comma stand before the first record that is left, and make the lack of the closing bracket a fault.
+
+    What stands before that record is held back: where the first one is an error nothing is written.
+    """
     any_kept, is_open, ended = False, None, True
+    held = b""
     for outcome in outcomes:
         is_open = outcome.is_open if is_open is not False else False
-        text = outcome.text
+        text = held + outcome.text
         if outcome.is_open is not None and not any_kept and outcome.kept:
             text = _LEADING_COMMA.sub(rb"\1", text)
         any_kept = any_kept or bool(outcome.kept)
         ended = text.endswith(b"\n") if text else ended
-        yield outcome._replace(text=text)
+        held = b"" if any_kept or outcome.is_open is None else text
+        yield outcome._replace(text=text[len(held) :])
+    if held and not (is_open and on_error == STOP):
+        yield Outcome(held, ())
     if is_open:
         fault = Fault(-1 if ended else 0, "", "the array does not end: its ] is missing")
         yield Outcome(b"" if on_error == STOP else b"]\n", (fault,))

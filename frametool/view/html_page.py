@@ -19,30 +19,36 @@ from frametool import __version__
 from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.frames.track import MovingTrack
     from frametool.view.frame_scene import FrameScene
 
 FOLDER = os.path.join(os.path.dirname(__file__), "page")
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
+WITH_JOINTS = (*SCRIPTS[:-1], "joints", "main")
 PACKED = 48_000  # bytes of doubles, from where on they are compressed
 NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def write_page(
     scene: FrameScene, *, title: str, file: str = "", eye: tuple[float, float] | None = None,
-    other: FrameScene | None = None, other_title: str = "",
+    other: FrameScene | None = None, other_title: str = "", joints: Sequence[dict[str, Any]] = (),
 ) -> str:  # fmt: skip
     """Return the page.
 
     title: its heading.  file: the tree's name in the command that the page offers to copy.
     eye: azimuth and elevation of the first view, radians.
     other: another tree seen in the same frame, laid over this one; other_title: what it is called.
+    joints: those with a slider, as `joint_sliders` makes them.
     """
     head, numbers = _data(scene)
     data = numbers.tobytes()
     packed = len(data) > PACKED
     head |= {"title": title, "file": file or title, "made": f"frametool {__version__}", "packed": packed}
     head["show"] = _shown(scene, eye)
+    if joints:
+        head["joints"] = list(joints)
     if other is not None:
         here = {name: number for number, name in enumerate(scene.names)}
         poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
@@ -51,7 +57,7 @@ def write_page(
         from zlib import compress
 
         data = compress(data, 6)
-    script, style = "".join(map(_file, [f"{name}.js" for name in SCRIPTS])), _file("page.css")
+    script, style = "".join(_file(f"{name}.js") for name in (WITH_JOINTS if joints else SCRIPTS)), _file("page.css")
     parts = {
         "POLICY": _policy(script, style),
         "TITLE": escape(title),

@@ -235,6 +235,22 @@ def test_what_never_starts_is_left_out_and_said(tmp_path: Path, off: str) -> Non
     assert said == [f"a.launch:2: static_transform_publisher not read: it never starts ({written})"]
 
 
+PLUGIN = "tf2_ros::StaticTransformBroadcasterNode"
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "line"),
+    [
+        (f"<launch>{NODE.format(FLAGS)}\n<node_container><composable_node pkg='tf2_ros' plugin='{PLUGIN}'/></node_container></launch>", "a.launch", 2),
+        (f"{YAML.format(FLAGS)}- node_container:\n    composable_node:\n    - {{pkg: tf2_ros, plugin: '{PLUGIN}'}}\n", "a.yaml", 8),
+        (PYTHON.format(FLAGS.split()) + f"\nx = ComposableNode(package='tf2_ros', plugin='{PLUGIN}')\n", "a.py", 7),
+    ],
+)  # fmt: skip
+def test_a_composable_publisher_is_listed_as_not_read(tmp_path: Path, text: str, name: str, line: int) -> None:
+    why = "it is a composable node, whose transform stands in its parameters"
+    assert read(tmp_path, text, name)[1] == [f"{name}:{line}: static_transform_publisher not read: {why}"]
+
+
 def test_included_files_are_named(tmp_path: Path) -> None:
     followed = "is not followed; read that file too: --with FILE"
     assert read(tmp_path, f"<launch>{NODE.format(FLAGS)}\n<include file='$(find x)/y.launch'/></launch>")[1] == [
@@ -312,6 +328,14 @@ def test_a_name_that_launch_files_would_replace_is_not_written(run: Callable[...
     done = run("tree", "a.json", "-f", "launch", files={"a.json": '{"frames": {"a": {"$(arg x)": {}}}}'})
     assert (done.status, done.out) == (1, "")
     assert "a frame name with $( has no place in a launch file" in done.err
+
+
+def test_frames_that_move_are_not_written_as_static_but_as_they_stood_at_a_time(run: Callable[..., Any]) -> None:
+    moving = "{frames: [{name: b, parent: a, samples: [{stamp: 0, xyz: [0, 0, 0]}, {stamp: 1, xyz: [1, 0, 0]}]}]}"
+    done = run("tree", "a.yaml", "-f", "launch", files={"a.yaml": moving})
+    assert (done.status, done.out) == (1, "")
+    assert done.err == "frametool: frames move and cannot be published as static: b; give --at TIME\n"
+    assert "--x 0.5 " in run("tree", "a.yaml", "-f", "launch", "--at", "0.5").out
 
 
 def test_what_was_read_is_said_once(run: Callable[..., Any]) -> None:

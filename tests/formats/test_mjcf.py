@@ -208,6 +208,13 @@ def test_a_key_holds_values_of_all_joints_in_the_order_of_the_bodies(run: Callab
     assert json.loads(partly.out)["xyz"] == [0.0, 0.0, 0.0]
 
 
+def test_joints_move_over_time_where_a_file_of_values_has_stamps(run: Callable[..., Any]) -> None:
+    rows = "stamp,elbow,grip\n0,0,0\n1,0.5,0.25\n"
+    done = run("lookup", "a.xml", "base", "hand", "--joints", "v.csv", "--at", "1", "-f", "json", files={"a.xml": KEYS, "v.csv": rows})
+    still = run("lookup", "a.xml", "base", "hand", "-j", "elbow=0.5", "-j", "grip=25cm", "-f", "json")
+    assert {key: value for key, value in json.loads(done.out).items() if key != "stamp_ns"} == json.loads(still.out)
+
+
 @pytest.mark.parametrize(
     ("key", "text", "said"),
     [
@@ -303,11 +310,11 @@ def test_a_thousand_bodies_inside_one_another_are_read(tmp_path: Path) -> None:
 
 def test_what_cannot_be_known_from_the_file_alone_is_said(tmp_path: Path) -> None:
     _, said = read(tmp_path, '<camera name="c" mode="targetbody" target="b"/><body name="b"/>\n<flexcomp/>')
-    assert said[0] == "a.xml:2: camera:c looks at a body; its orientation is that in the file"
+    assert said[0] == "a.xml:2: camera:c has the mode 'targetbody', in which MuJoCo turns it over time; it stands as written"
     assert said[1].startswith("a.xml:3: <flexcomp> is left out: its bodies are made by MuJoCo; save it whole: mujoco.")
 
 
 def test_what_was_read_is_said_once(run: Callable[..., Any]) -> None:
     done = run("lookup", "a.xml", "world", "hand", files={"a.xml": KEYS})
-    states = "parent<-child, metres; sites and cameras (looking along -z) are site:NAME, camera:NAME"
+    states = "parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)"
     assert done.err == f"frametool: a.xml: MJCF of MuJoCo, 4 joints at rest (--joint NAME=VALUE); {states}\n"

@@ -443,3 +443,20 @@ def test_the_command_line_chooses_and_lists_topics(run: Callable[..., Any], tmp_
     assert "frame 'base' comes by /tf and by /robot1/tf" in found.out
     entry = json.loads(run("monitor", path, "--topic", "tf", "-f", "json").out)
     assert entry["topics"] == "/tf (1)"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_monitor_tells_of_frames_that_come_by_two_robots_and_prints_its_table(run: Callable[..., Any], kind: str, tmp_path: Path) -> None:
+    found = run("monitor", str(two_robots(kind, tmp_path)), "-f", "json")
+    (error,) = map(json.loads, found.err.splitlines())
+    assert "frame 'base' comes by /tf and by /robot1/tf; choose with --topic /tf or --topic /robot1/tf" in error["message"]
+    assert (found.status, [json.loads(line)["child"] for line in found.out.splitlines()]) == (1, ["base", "cam 1"])
+
+
+def test_monitor_names_the_first_of_many_frames_that_come_by_two_robots(run: Callable[..., Any], tmp_path: Path) -> None:
+    parent, _, *rest = EXPECTED[0]
+    many = [(topic, (parent, f"f{number}", *rest)) for topic in ("/tf", "/robot1/tf") for number in range(9)]
+    found = run("monitor", str(two_robots("rosbridge", tmp_path, many)))
+    assert found.status == 1
+    assert [line.split(":", 1)[0] for line in found.err.splitlines()] == ["frametool"] * 4
+    assert found.err.endswith("frametool: 6 more frames come by two topics\n")

@@ -77,3 +77,21 @@ def test_a_long_array_on_one_line_is_cut_at_its_records() -> None:
     splitter = Splitter("json")
     assert 0 < splitter.whole(text[:50000]) <= 50000
     assert len(json.loads(flow(text, MOVE, "json", size=1 << 15).text)) == 3000
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("size", [0, 1, 30])
+@pytest.mark.parametrize("more", [1, 40])
+def test_nothing_is_written_of_an_array_whose_first_record_is_an_error(layout: str, size: int, more: int) -> None:
+    for bad in (TEXT, HUGE):
+        found = flow(array(layout, [bad, *[GOOD] * more]).encode(), MOVE, "json", size=size)
+        assert (found.status, found.text) == (1, b"")
+    good = flow(array(layout, [GOOD, *[TEXT] * more]).encode(), MOVE, "json", size=size)
+    assert good.status == 1
+    assert good.text.lstrip().startswith(b"[")
+
+
+@pytest.mark.parametrize("text", ["[]\n", "[ ]", "[\n]\n"])
+def test_an_empty_array_stays_what_it_is(text: str) -> None:
+    for on_error in ("stop", "skip", "null"):
+        assert flow(text.encode(), MOVE._replace(on_error=on_error), "json").text == text.encode()

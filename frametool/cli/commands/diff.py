@@ -16,8 +16,7 @@ from frametool.errors import ValueInvalid, shown
 from frametool.formats.load import lines_of
 from frametool.lint.findings import github_command
 from frametool.lint.tree_diff import Tolerance, diff, entry
-from frametool.text.numbers import parse_number, read_number_or_angle
-from frametool.text.units import LENGTHS
+from frametool.text.numbers import parse_length, read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -56,7 +55,7 @@ def _tolerance(text: str) -> Tolerance:
     if len(set(are_angles)) != len(parts):
         raise ValueInvalid(f"{shown(text)} is not one length and one angle")
     for part, is_angle in zip(parts, are_angles, strict=True):
-        value = read_number_or_angle(part, degrees=False) if is_angle else _length(part)
+        value = read_number_or_angle(part, degrees=False) if is_angle else parse_length(part)
         if value < 0.0:
             raise ValueInvalid(f"{shown(part)} is less than 0")
         found = found._replace(radians=value) if is_angle else found._replace(metres=value)
@@ -66,12 +65,6 @@ def _tolerance(text: str) -> Tolerance:
 def _is_angle(text: str, *, bare: bool) -> bool:
     """Tell an angle from a length by its unit; `bare` says what it is without one."""
     return re.search("deg|rad|°|pi|π", text) is not None or (bare and not text.endswith("m"))
-
-
-def _length(text: str) -> float:
-    """Read `1mm`, `0.5 cm`, `0.001`."""
-    unit = next((unit for unit in sorted(LENGTHS, key=len, reverse=True) if text.endswith(unit)), "")
-    return parse_number(text.removesuffix(unit).rstrip()) / LENGTHS[unit]
 
 
 @click.command(cls=DiffCommand, name="diff")

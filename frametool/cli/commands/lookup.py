@@ -44,7 +44,7 @@ def command(
     source_at: int | str | None, fixed: str | None, times: str | None, moving: bool, cache: int | None, tf2: str | None,
     normalize: bool, **options: Any,
 ) -> int:  # fmt: skip
-    """Print the pose of SOURCE in TARGET: the transform that maps points in SOURCE to points in TARGET.
+    """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 
     \b
       frametool lookup robot.yaml map camera_optical

@@ -8,11 +8,17 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, verbose_option
 from frametool.cli.output import Output
+from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import opened, reading_options, state
 from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from frametool.errors import FormatError
+
+FAILED = 1
+MOST_TOLD = 3  # frames that come by the topics of two robots
 
 
 @click.command(cls=Command, name="monitor")
@@ -23,7 +29,7 @@ if TYPE_CHECKING:
 @verbose_option
 @pose_options
 @result_options("report")
-def command(recording: str, frames: Sequence[str], more: Sequence[str], normalize: bool, **options: Any) -> None:
+def command(recording: str, frames: Sequence[str], more: Sequence[str], normalize: bool, **options: Any) -> int:
     """Print the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
 
     \b
@@ -41,6 +47,12 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], normaliz
         raise click.UsageError(f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
     output = Output("report", **options)
     files = opened((recording, *more))
-    report = monitor(files, *frames, normalize=normalize)
+    clashes: list[FormatError] = []
+    report = monitor(files, *frames, normalize=normalize, clashing=clashes.append)
     state(files)
+    for error in clashes[:MOST_TOLD]:
+        say_error(error, in_json=output.told == "json")
+    if len(clashes) > MOST_TOLD:
+        say(f"{len(clashes) - MOST_TOLD} more frames come by two topics")
     output.report(report)
+    return FAILED if clashes else 0

@@ -14,7 +14,7 @@ from frametool.cli.pictures import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
+from frametool.cli.trees import FRAME, frame_name, load_tree, opened, reading_options
 from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import parse_angle
 
@@ -90,13 +90,14 @@ def scene_options(function: Any) -> Any:
 @click.option("--force", is_flag=True, help="let --output replace an existing file")
 @click.option("--live", is_flag=True, help="play what moves in the terminal, a second a second, from --at on")
 @click.option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
+@click.option("--sliders", is_flag=True, help="a slider for each joint of a URDF robot, on its page")
 @click.option("--open", "opens", is_flag=True, help="show the page in the browser")
 @click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
               help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], eye: tuple[float, float],
     moving: bool, cache: int | None, tf2: str | None, form: str | None, output: str | None, force: bool, opens: bool,
-    live: bool, overlay: bool, color: str, **options: Any,
+    live: bool, overlay: bool, sliders: bool, color: str, **options: Any,
 ) -> None:  # fmt: skip
     """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
 
@@ -121,6 +122,8 @@ def command(
         raise click.UsageError("--overlay takes two trees: frametool view AFTER BEFORE --overlay")
     if options["path_only"] and not (target and source):
         raise click.UsageError("--path draws the way between TARGET and SOURCE; name both")
+    if sliders and (chosen != "html" or tree == "-" or overlay):
+        raise click.UsageError("--sliders move the joints of a robot on a page: give a file, and -o FILE.html")
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
     from frametool.view.frame_scene import FrameScene
 
@@ -142,7 +145,7 @@ def command(
         columns, lines = os.get_terminal_size(sys.stdout.fileno())
         print_terminal(TerminalPicture(scene, columns, lines - 1, eye), color)
         return
-    content = _content(scene, chosen, tree, eye, before, str(target))
+    content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
     path = _page_file(tree) if opens and output is None else output
     with writing(path, force=force or output is None) as write:
         write(content)
@@ -166,13 +169,15 @@ def _form(form: str | None, output: str | None, *, opens: bool) -> str:
 
 def _content(
     scene: FrameScene, form: str, tree: str, eye: tuple[float, float], before: FrameScene | None, before_tree: str,
+    *, sliders: bool,
 ) -> str | bytes:  # fmt: skip
     """Return the picture in a form."""
     title, other_title = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, before_tree))
     if form == "html":
         from frametool.view.html_page import write_page
 
-        return write_page(scene, title=title, file=tree, eye=eye, other=before, other_title=other_title)
+        joints = _joints(tree, scene) if sliders else []
+        return write_page(scene, title=title, file=tree, eye=eye, other=before, other_title=other_title, joints=joints)
     if form == "glb":
         from frametool.view.glb import write_glb
 
@@ -186,6 +191,16 @@ def _content(
     still = still_picture(scene, eye, title, before)
     _tell_of_crowd(still, scene)
     return drawn(still.picture, f".{form}")
+
+
+def _joints(tree: str, scene: FrameScene) -> list[dict[str, Any]]:
+    """Return the joints of a robot's file that get a slider; its warnings were told when its frames were read."""
+    from frametool.errors import overheard
+    from frametool.formats.robot import robot_of
+    from frametool.view.joint_sliders import joint_sliders
+
+    (robot, posture), _ = overheard(robot_of, opened([tree])[0])
+    return joint_sliders(robot, posture.still, scene.names)
 
 
 def _tell_of_crowd(still: StillPicture, scene: FrameScene) -> None:

@@ -6,6 +6,7 @@ document.documentElement.classList.toggle("dark", is_dark);
 take_colours();
 add_buttons();
 listen();
+for (const begin of extras.begin) begin();
 
 const roots = ALL.filter((frame) => first_parent(frame) < 0).length;
 const moving = TRACKS.size ? `, ${TRACKS.size} moving` : "", several = roots > 1 ? `, ${roots} roots` : "";

@@ -74,11 +74,13 @@ function yaml() {
   return `{${names}, xyz: [${x}, ${y}, ${z}], quaternion: ${rotation_text}}`;
 }
 
+const quoted = (text) => (/^[\w./=-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
+
 // Return the command that answers the same.
 function command() {
-  const quoted = (text) => (/^[\w./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
   const at = TRACKS.size ? ` --at ${stamp(state.t)}` : "";
-  return `frametool lookup ${[head.file, NAMES[state.target], NAMES[state.source]].map(quoted).join(" ")}${at}`;
+  const names = [head.file, NAMES[state.target], NAMES[state.source]], more = extras.shell.map((part) => part());
+  return `frametool lookup ${names.map(quoted).join(" ")}${at}${more.join("")}`;
 }
 
 // ---- the list of frames, as a tree
@@ -196,6 +198,7 @@ function remember() {
   const fragment = new URLSearchParams({target: NAMES[state.target], source: NAMES[state.source]});
   if (state.fixed !== HOME) fragment.set("fixed", NAMES[state.fixed]);
   if (TRACKS.size) fragment.set("t", stamp(state.t));
+  for (const add of extras.fragment) add(fragment);
   try {
     history.replaceState(null, "", `#${fragment}`);
   } catch { /* some viewers forbid it */ }
