@@ -85,7 +85,7 @@ CALLS = [
     ["apply", "--transform", A, "{linear: {x: 1, y: 2, z: 3}, angular: {x: 0.1, y: 0, z: 0.2}}"],
     ["apply", "--transform", A, "{force: {x: 1, y: 2, z: 3}, torque: {x: 0.1, y: 0, z: 0.2}}"],
     ["apply", "drive.yaml", "map", "{header: {stamp: {sec: 1, nanosec: 500000000}, frame_id: lidar}, point: {x: 1, y: 2, z: 3}}"],
-    ["convert", "--axes", "optical"], ["convert", "--axes", "frd_from_flu", "--from", "rpy_deg", "10", "20", "30"],
+    ["convert", "--axes", "optical"], ["convert", "--axes", "optical", "--from", "rpy_deg", "10", "20", "30"],
     ["convert", "--from", "rpy_deg", "1", "2", "3", "10", "20", "30", "--to", "matrix"], ["convert", "{xyz: [1, 2, 3], inverse: true, rpy_deg: [0, 0, 30]}"],
     ["convert", "--from", "quaternion", "0.1", "0.2", "0.3", "-0.4", "--normalize", "--keep-sign"],
     ["convert", "1", "0.1", "0", "-0.1", "0.9", "0", "0", "0", "1", "--normalize", "--to", "axis_angle"],
