@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.calc.explain.from_quaternion import FROM_QUATERNION
 from frametool.calc.explain.render import Explanation
 from frametool.calc.explain.sheet import DEGREES, DIGITS, METRES, RADIANS, Row, Sheet
+from frametool.calc.explain.to_quaternion import block_of
 from frametool.errors import FrametoolError, printable
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
@@ -73,8 +74,9 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
 
 def written(sheet: Sheet, q: Quaternion, form: Notation, plan: DerivationStyle) -> Sequence[float]:
     """Add the way from the quaternion to a notation; return its numbers."""
-    block = FROM_QUATERNION[form.representation.name]
-    return block(sheet, q, form.bound_axes(), plan.style.in_degrees(form), plan.style.keep_sign)
+    block = block_of(FROM_QUATERNION, form)
+    numbers: Sequence[float] = block(sheet, q, form.bound_axes(), plan.style.in_degrees(form), plan.style.keep_sign)
+    return numbers
 
 
 def matrix_of_pose(sheet: Sheet, form: Notation, own: Result) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.calc.explain.operations import inverse
-from frametool.calc.explain.to_quaternion import TO_QUATERNION
+from frametool.calc.explain.to_quaternion import TO_QUATERNION, block_of
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, printable
 from frametool.grammar import pose_algebra
@@ -51,8 +51,9 @@ class Given(NamedTuple):
             sheet.heading("The rotation")
             sheet.say("None is given: the identity, x 0, y 0, z 0, w 1.")
             return IDENTITY
-        block = TO_QUATERNION[self.notation.representation.name]
-        return block(sheet, self.numbers, self.notation.bound_axes(), self.degrees)
+        block = block_of(TO_QUATERNION, self.notation)
+        q: Quaternion = block(sheet, self.numbers, self.notation.bound_axes(), self.degrees)
+        return q
 
     def components(self, sheet: Sheet, target: str, source: str) -> Rigid:
         """Add the way from the numbers as written to target_from_source."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from frametool.calc.explain.angles import HALF, UNIT, angle, direction, norm, sine_and_cosine
 from frametool.calc.explain.matrices import nearest_rotation
 from frametool.calc.explain.sheet import RADIANS
+from frametool.errors import ValueInvalid, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frametool.calc.explain.sheet import Sheet, Values
+    from frametool.geometry.representations import Notation
     from frametool.grammar.readers import Quaternion
 
     Block = Callable[..., Quaternion]  # (sheet, numbers as written, axes, degrees)
@@ -249,3 +251,11 @@ TO_QUATERNION: dict[str, Block] = {
     "mrp": mrp,
     "six_d": six_d,
 }
+
+
+def block_of(table: Mapping[str, Callable[..., Any]], form: Notation) -> Callable[..., Any]:
+    """Return the block of a notation; raises ValueInvalid for a representation without one."""
+    name = form.representation.name
+    if name not in table:
+        raise ValueInvalid(f"there is no derivation of {shown(name)}; derived are {', '.join(table)}")
+    return table[name]

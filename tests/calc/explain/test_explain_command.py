@@ -46,7 +46,7 @@ def test_the_form_follows_the_equals_sign(form: str, begins: str, run: Callable[
     (["compose", "-", POSE, "--explain"], "standard input is a stream"),
     (["invert", "--explain"], "standard input is a stream"),
     (["relative", POSE, "--explain"], "standard input is a stream"),
-    (["relative", "--consecutive", "--explain"], "--consecutive is about the rows of a stream"),
+    (["relative", "--consecutive", "--explain"], "about the rows of a stream; leave --explain out"),
     (["interpolate", POSE, POSE, "0", "1", "--explain"], "--explain derives one fraction, found 2"),
     (["lookup", "tree.yaml", "a", "b", "--times", "0:1:1", "--explain"], "--explain derives one lookup"),
     (["lookup", "tree.yaml", "--target-column", "a", "b", "--explain"], "--explain derives one lookup"),

@@ -12,6 +12,7 @@ from written import HOSTILE, ROTATIONS, SPECS, rotation, seeded
 import frametool
 from frametool.calc.explain import derive, operations
 from frametool.calc.explain.agreement import DerivationWrong
+from frametool.calc.explain.to_quaternion import TO_QUATERNION
 from frametool.geometry import euler
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ CALLS = [
     ["apply", "--transform", A, "{linear: {x: 1, y: 2, z: 3}, angular: {x: 0.1, y: 0, z: 0.2}}"],
     ["apply", "--transform", A, "{force: {x: 1, y: 2, z: 3}, torque: {x: 0.1, y: 0, z: 0.2}}"],
     ["apply", "drive.yaml", "map", "{header: {stamp: {sec: 1, nanosec: 500000000}, frame_id: lidar}, point: {x: 1, y: 2, z: 3}}"],
-    ["convert", "--axes", "optical"], ["convert", "--axes", "frd_from_flu", "--from", "rpy_deg", "10", "20", "30"],
+    ["convert", "--axes", "optical"], ["convert", "--axes", "optical", "--from", "rpy_deg", "10", "20", "30"],
     ["convert", "--from", "rpy_deg", "1", "2", "3", "10", "20", "30", "--to", "matrix"], ["convert", "{xyz: [1, 2, 3], inverse: true, rpy_deg: [0, 0, 30]}"],
     ["convert", "--from", "quaternion", "0.1", "0.2", "0.3", "-0.4", "--normalize", "--keep-sign"],
     ["convert", "1", "0.1", "0", "-0.1", "0.9", "0", "0", "0", "1", "--normalize", "--to", "axis_angle"],
@@ -147,3 +148,10 @@ def test_a_derivation_that_leads_elsewhere_is_never_printed(monkeypatch: pytest.
     monkeypatch.setattr(derive, "SHORT", {("rpy", "matrix"): lambda *_: (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)})
     with pytest.raises(DerivationWrong, match="off by 1 rad"):
         frametool.explain("convert", {"rpy": [1, 0, 0]}, to="matrix")
+
+
+def test_a_representation_without_a_block_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch, run: Callable[..., Outcome]) -> None:
+    monkeypatch.delitem(TO_QUATERNION, "mrp")
+    outcome = run("convert", "--from", "mrp", "0.1", "0", "0", "--explain")
+    assert (outcome.status, outcome.out) == (1, "")
+    assert outcome.err.startswith("frametool: there is no derivation of 'mrp'; derived are quaternion, xyzw, wxyz, rpy")
