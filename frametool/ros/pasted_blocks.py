@@ -83,11 +83,16 @@ def in_grammar(
 
 def _unless_grammar(source: Source, given: Notation | None, *, points: bool) -> list[Any] | None:
     """Return the values of pasted numbers; of JSON only what the grammar would refuse."""
-    if looks_like_json(source.text) and (points or given is None):
-        read = parse_json(source)
-        if read is not None and (points or {*map(_size, read)} & {(3, 3), (4, 4)}):
+    read = parse_json(source) if looks_like_json(source.text) else None
+    has_matrix = read is not None and not {*map(_size, read)}.isdisjoint({(3, 3), (4, 4)})
+    if (points and read is not None) or (has_matrix and given is None):
+        return None
+    try:
+        return pasted_poses(source.text, given)
+    except ValueInvalid:
+        if has_matrix:
             return None
-    return pasted_poses(source.text, given)
+        raise
 
 
 def _size(value: Any) -> tuple[int, int]:
