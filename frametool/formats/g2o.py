@@ -4,7 +4,7 @@ VERTEX_SE3:QUAT 0 1.0 2.0 0.5 0.0 0.0 0.0 1.0
 VERTEX_SE2 1 1.0 2.0 0.5
 EDGE_SE3:QUAT 0 1 1.0 0.0 0.0 0.0 0.0 0.0 1.0 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1
 
-Edges measure, and contradict each other: they are no tree and are counted; the vertices are what was made of them.
+Edges measure, and contradict each other: they are no tree; the vertices are what was made of them.
 """
 
 from __future__ import annotations
@@ -25,30 +25,43 @@ if TYPE_CHECKING:
 
 POSES = Poses("quaternion", counted="ids of vertices")
 ROWS = RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=())
-IN_SPACE, IN_PLANE = "VERTEX_SE3:QUAT", "VERTEX_SE2"
-WORDS = {IN_SPACE: "id x y z qx qy qz qw", IN_PLANE: "id x y theta"}
+EDGES = Poses("quaternion", counted="")
+IN_SPACE, IN_PLANE = "x y z qx qy qz qw", "x y theta"
+VERTICES = {"VERTEX_SE3:QUAT": IN_SPACE, "VERTEX_SE2": IN_PLANE}
+MEASURED = {"EDGE_SE3:QUAT": IN_SPACE, "EDGE_SE2": IN_PLANE}
+INFORMATION = {IN_SPACE: 21, IN_PLANE: 6}  # numbers behind an edge
 
 
-def poses(file: InputFile, options: Options) -> Iterator[Written]:  # noqa: ARG001 - as the other forms have it
-    """Yield the vertices as they are written."""
+def form_of(_file: InputFile, options: Options) -> Poses:
+    """Return what the poses are: of vertices in the world, or of one vertex in another."""
+    return EDGES if options.answers.edges else POSES
+
+
+def poses(file: InputFile, options: Options) -> Iterator[Written]:
+    """Yield the vertices as they are written, or the edges."""
+    edges = options.answers.edges
+    kinds = MEASURED if edges else VERTICES
     for number, line in text_lines(file):
         words = line.split()
-        if words and words[0] in WORDS:
-            yield _vertex(file, number, words)
+        if words and words[0] in kinds:
+            yield _pose(file, number, words, kinds[words[0]], ids=1 + edges)
 
 
-def _vertex(file: InputFile, line: int, words: list[str]) -> Written:
+def _pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int) -> Written:
+    """Read a vertex with its id, or an edge with the two it connects, which holds its information too."""
+    expected = f"{'id' if ids == 1 else 'i j'} {layout}"
+    size = len(expected.split())
     kind, *rest = words
-    expected = WORDS[kind]
-    if len(rest) != len(expected.split()):
+    if len(rest) != size and (ids == 1 or len(rest) != size + INFORMATION[layout]):
         raise FormatError(f"expected {kind} {expected}, found {len(words)} words", source=file.name, line=line)
-    if not rest[0].isdecimal():
-        raise FormatError(f"expected the id of a vertex, found {shown(rest[0])}", source=file.name, line=line)
-    numbers = numbers_in(file, line, rest[1:])
-    if kind == IN_PLANE:
+    for word in rest[:ids]:
+        if not word.isdecimal():
+            raise FormatError(f"expected the id of a vertex, found {shown(word)}", source=file.name, line=line)
+    numbers = numbers_in(file, line, rest[ids:size])
+    if layout == IN_PLANE:
         x, y, theta = numbers
         numbers = [x, y, 0.0, *euler.to_quaternion(0.0, 0.0, theta, "sxyz", floats)]
-    return Written(tuple(numbers), int(rest[0]), line)
+    return Written(tuple(numbers), int(rest[0]), line, names=(rest[0], rest[1]) if ids > 1 else None)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Samples]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from os import PathLike
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.collector import paused_collector
 from frametool.documents.document import format_error, locate, locate_many
@@ -63,7 +63,7 @@ def load(
     format: str | None = None,  # noqa: A002 - what it is
     joints: Mapping[str, float | str] | str | PathLike[str] | None = None,
     frames: Sequence[str] = (),
-    **answers: str,
+    **answers: Any,
 ) -> FrameTree | TransformBuffer:
     """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 

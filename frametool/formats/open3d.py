@@ -46,7 +46,7 @@ def is_json(file: InputFile) -> bool:
     return file.head().lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"{"
 
 
-def form_of(file: InputFile) -> Poses:
+def form_of(file: InputFile, _options: Options) -> Poses:
     """Return how the file writes its poses."""
     return EXTRINSIC if is_json(file) else LOG
 
@@ -97,7 +97,7 @@ def _position_and_rows(rows: list[list[float]]) -> tuple[float, ...]:
 
 def read(file: InputFile, options: Options) -> Iterator[Samples]:
     """Yield the poses of the camera in the world."""
-    return samples(poses(file, options), form_of(file), file, options)
+    return samples(poses(file, options), form_of(file, options), file, options)
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:

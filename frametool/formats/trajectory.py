@@ -53,6 +53,7 @@ class Written(NamedTuple):
     number: what it is counted as
     line: where it stands; path: the way to it, in a document
     image: the name of its picture, if it has one
+    names: of the frame it is seen from and of what it is the pose of, if each has its own
     """
 
     numbers: tuple[float, ...]
@@ -60,6 +61,7 @@ class Written(NamedTuple):
     line: int = 0
     image: str = ""
     path: Path = ()
+    names: tuple[str, str] | None = None
 
 
 class PoseBlock(NamedTuple):
@@ -67,6 +69,7 @@ class PoseBlock(NamedTuple):
 
     poses: tx, ty, tz, x, y, z, w, arrays of n; stamps_ns: int64 of n
     lines: where each stands; images: the names of their pictures, "" for none; numbers: what they are counted as
+    names: the two frames of each, or None where the form says which two they all have
     """
 
     poses: Components
@@ -74,6 +77,7 @@ class PoseBlock(NamedTuple):
     lines: Sequence[int]
     images: Sequence[str]
     numbers: Sequence[int]
+    names: Sequence[tuple[str, str] | None]
 
 
 def samples(rows: Iterator[Written], form: Poses, file: InputFile, options: Options) -> Iterator[Samples]:
@@ -87,9 +91,12 @@ def samples(rows: Iterator[Written], form: Poses, file: InputFile, options: Opti
         options.tally.axes[child] = axes
 
 
-def blocks(rows: Iterator[Written], form: Poses, file: InputFile, options: Options) -> Iterator[PoseBlock]:
+def blocks(
+    rows: Iterator[Written], form: Poses, file: InputFile, options: Options, *, named: bool = True
+) -> Iterator[PoseBlock]:
     """Yield the poses of a file, checked, block by block.
 
+    named: the two frames are called as the form or --frames says, which is told
     Raises or reports FormatError with the place of a rotation that is none.
     """
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
@@ -101,13 +108,13 @@ def blocks(rows: Iterator[Written], form: Poses, file: InputFile, options: Optio
         yield _block(some, good, poses, times)
     if stamps:
         stamps.finish(count, file.name)
-    describe(options, form, count)
+    describe(options, form, count, named=named)
 
 
-def describe(options: Options, form: Poses, count: int) -> None:
+def describe(options: Options, form: Poses, count: int, *, named: bool = True) -> None:
     """Keep what was taken for granted of a trajectory, to be told beside the name of its file."""
     parent, child = options.answers.names(*form.frames)
-    said = [f"{count} {'pose' if count == 1 else 'poses'} of {child} in {parent} (--frames)"]
+    said = [f"{count} {'pose' if count == 1 else 'poses'}" + f" of {child} in {parent} (--frames)" * named]
     if form.counted and not options.answers.stamps:
         said.append(f"seconds are {form.counted} (--stamps)")
     if form.axes:
@@ -146,9 +153,8 @@ def _block(some: Sequence[Written], good: Sequence[int], poses: Components, time
     if len(good) < len(some):
         poses, stamps = tuple(part[list(good)] for part in poses), stamps[list(good)]
         some = [some[at] for at in good]
-    return PoseBlock(
-        poses, stamps, [row.line for row in some], [row.image for row in some], [row.number for row in some]
-    )
+    _, numbers, lines, images, _, names = zip(*some, strict=True)
+    return PoseBlock(poses, stamps, lines, images, numbers, names)
 
 
 def _counted(row: Written, file: InputFile) -> int:

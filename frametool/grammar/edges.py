@@ -212,6 +212,7 @@ class Answers(NamedTuple):
     camera_axes: of cameras, `optical` (x right, y down, z forward) or `opengl` (x right, y up, z back)
     dh: `standard` or `modified` Denavit-Hartenberg parameters
     stamps: a file with a time for each pose, one a line
+    edges: of a graph of poses the edges are wanted, not the vertices
     joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
     joint_files: files with values of joints, over time or for good
     """
@@ -221,6 +222,7 @@ class Answers(NamedTuple):
     camera_axes: str = ""
     dh: str = ""
     stamps: str = ""
+    edges: bool = False
     joints: Mapping[str, str] = MappingProxyType({})
     joint_files: tuple[str, ...] = ()
 

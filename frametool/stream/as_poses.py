@@ -113,7 +113,8 @@ class OtherForm:
         request, unasked = settle_stamps(begun.table, request, self.source)
         rows = TablePoses(begun, self.form, request, self.source)
         self.shape = rows.shape
-        if rows.shape.kind == POSE and rows.shape.notation is None and request.operation.keeps_position:
+        bare = rows.shape.kind == POSE and rows.shape.notation is None and request.poses
+        if bare and request.operation.keeps_position:
             raise FormatError(
                 f"no rotation among the columns {rows.columns}: {self.style.form} is written of poses",
                 source=self.source,
@@ -137,7 +138,7 @@ class OtherForm:
         if self.stamps:
             self.stamps.finish(count, self.source)
         if self.form in FORMS:
-            describe(Options(self.tally, Topics(), answers=self.answers), form, count)
+            describe(Options(self.tally, Topics(), answers=self.answers), form, count, named=False)
 
     def _stamps(self, poses: RowPoses, form: Poses, before: int) -> Any:
         """Return the stamps of poses: their own, those of a file, or their numbers as seconds."""
@@ -145,28 +146,34 @@ class OtherForm:
         if self.stamps:
             return np.array([self.stamps.at(before + at) for at in range(size)], np.int64)
         if poses.stamps_ns is None and form.counted:
-            return np.arange(before, before + size, dtype=np.int64) * BILLION
+            return self._held(np.arange(before, before + size, dtype=np.int64) * BILLION, form)
         return poses.stamps_ns
+
+    def _held(self, stamps_ns: Any, form: Poses) -> Any:
+        """Return stamps, unless they only count and the other form has no place for them: they are not lost then."""
+        rows = getattr(import_module(FORMATS[self.style.form].writer), "ROWS", None)
+        counts = bool(form.counted) and self.stamps is None
+        return None if counts and rows is not None and "stamps" not in rows.holds else stamps_ns
 
     # --- forms that list poses ---
 
     def _listed(self, stream: BufferedReader) -> Iterator[Step]:
         """Yield the poses of a form whose lines are no table."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
-        form: Poses = self.module.form_of(file) if hasattr(self.module, "form_of") else self.module.POSES
+        faults: list[Fault] = []
+        report = stop if self.request.on_error == STOP else lambda error: faults.append(_fault(error))
+        options = Options(self.tally, Topics(), report, normalize=self.request.normalize, answers=self.answers)
+        has_kinds = hasattr(self.module, "form_of")
+        form: Poses = self.module.form_of(file, options) if has_kinds else self.module.POSES
         before, request = self.request, self._turned(form)
         request = request._replace(operation=before.operation)  # the reader turns them
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
         self.placed, self.shape = True, Shape(POSE, 1.0, QUATERNION)
-        faults: list[Fault] = []
-        report = stop if request.on_error == STOP else lambda error: faults.append(_fault(error))
-        options = Options(self.tally, Topics(), report, normalize=request.normalize, answers=self.answers)
         plan = _plan(request)
         state = State()
-        rename = rename_of(request)
-        parent, name = (None, None) if rename is None else rename(None, None)
-        for each in blocks(self.module.poses(file, options), form, file, options):
+        rename = rename_of(request) or (lambda parent, name: (parent, name))
+        for each in blocks(self.module.poses(file, options), form, file, options, named=False):
             block = _block(each)
             run = Run(plan, block, state)
             good = run.rows.tolist()
@@ -175,7 +182,11 @@ class OtherForm:
             if self.form == self.style.form:
                 extras[NUMBER] = spans_of([b"%d" % each.numbers[row] for row in good])
             lines = np.array(each.lines, np.int64)[run.rows]
-            poses = RowPoses(run.results, each.stamps_ns[run.rows], lines, [parent], [name], extras)
+            own = each.names[0] is not None
+            pairs = [rename(*(each.names[row] or (None, None))) for row in (good if own else good[:1])]
+            parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
+            stamps = None if own else each.stamps_ns[run.rows]
+            poses = RowPoses(run.results, self._held(stamps, form), lines, parents, names, extras)
             found = sorted(faults + run.faults())
             yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
             faults.clear()
@@ -197,7 +208,7 @@ def _plan(request: Request) -> Plan:
     edge = request.way if request.operation.moves and request.timed is not None else None
     return Plan(
         (shape,), (target,), request.operation, (), ("x", "y", "z", "qx", "qy", "qz", "qw"), edge_of=edge,
-        normalize=request.normalize, on_error=request.on_error,
+        normalize=request.normalize, on_error=request.on_error, gathered=request.gathered,
         timed=request.timed if request.timed is not None and request.timed.name else None,
     )  # fmt: skip
 

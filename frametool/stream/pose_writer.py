@@ -15,7 +15,7 @@ import numpy as np
 
 from frametool.documents.json_reader import JSON_NUMBER
 from frametool.documents.json_writer import Verbatim, dump
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, warn
 from frametool.formats import FORMATS
 from frametool.formats.pose_rows import IMAGE, NUMBER, Lost, Numbers, RowForm, field, image_name, is_turned, turned
 from frametool.frames.stamps import BILLION
@@ -63,6 +63,7 @@ class PoseWriter:
         whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
         self.target = Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
         self.count = 0
+        self.dropped = False
         self.rows: RowForm | None = None
         self.order: list[int] = []
         self.first: Result | None = None
@@ -72,12 +73,15 @@ class PoseWriter:
         if not len(block.numbers):
             return b""
         text = self._fixed(self.fixed, block) if self.fixed else self._free(block)
+        self.dropped |= self.style.form not in LEARNED and bool(self.extras or block.extras)
         self.count += len(block.numbers)
         return text
 
     def end(self) -> bytes:
         """Return what comes behind the last pose, and tell what was left out."""
         if self.fixed is None or self.lost is None:
+            if self.dropped:
+                warn(f"{self.style.form}: other columns left out")
             return b""
         self.lost.tell()
         return self.fixed.tail if self.count else self.fixed.head + self.fixed.tail

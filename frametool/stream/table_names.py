@@ -58,7 +58,7 @@ class Naming:
         may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.frames
         self.counts = request.counts if may_count else None
         self.rename = rename_of(request)
-        self.consecutive = request.operation.of == "previous"
+        self.consecutive = request.operation.looks_back
         self.before: str | None = None
 
     def of_block(self, cells: Cells) -> BlockNames:
@@ -148,7 +148,7 @@ def rename_of(request: Request) -> Rename | None:
         return request.rename
     if request.operation.moves:
         return lambda _parent, name: (request.told, name)
-    if request.operation.of == "previous":
+    if request.operation.looks_back:
         return lambda _parent, name: (name, name)
     return (lambda _parent, _name: (None, None)) if request.operation.of == "pair" else None
 

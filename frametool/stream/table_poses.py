@@ -72,7 +72,9 @@ class TablePoses:
         rename = rename_of(named)
         self.unnamed = (None, None) if rename is None else rename(None, None)
         self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
-        self.stamp_at = layout.time if layout.time is not None else stamp_column(self.table.names)
+        self.stamp_at = layout.time
+        if layout.time is None and (found := stamp_column(self.table.names)) not in layout.frames:
+            self.stamp_at = found
         used = {self.stamp_at, *layout.places, *self.naming.places}
         self.kept = [place for place in range(self.table.width) if place not in used]
         self.layout = self._with_stretches(layout)

@@ -241,6 +241,17 @@ def test_the_quaternion_of_euroc_begins_with_w(run: Run) -> None:
     assert done.out.splitlines()[1] == "1403636579.763555585 1.0 2.0 3.0 0.5 0.5 -0.5 0.5"
 
 
+def test_the_edges_of_a_graph_are_poses_of_one_vertex_in_another(run: Run) -> None:
+    information = " 1" * 21
+    text = f"VERTEX_SE2 0 9 9 0\nVERTEX_SE2 1 9 9 0\nEDGE_SE3:QUAT 0 1 1 2 3 0 0 0 1{information}\nEDGE_SE2 1 0 1 2 0.5 1 0 0 1 0 1\n"
+    done = run("convert", "--edges", "-f", "json", stdin=text)
+    found = [json.loads(line) for line in done.out.splitlines()]
+    assert [(each["parent"], each["name"], each["xyz"]) for each in found] == [("0", "1", [1.0, 2.0, 3.0]), ("1", "0", [1.0, 2.0, 0.0])]
+    assert "stamp_ns" not in found[0]
+    bad = run("convert", "--edges", "-f", "json", stdin=text.replace(information, " 1"))
+    assert (bad.status, "stdin:3: expected EDGE_SE3:QUAT i j x y z qx qy qz qw" in bad.err) == (1, True)
+
+
 # --- KITTI ---
 
 
@@ -497,6 +508,117 @@ def test_rows_in_bulk_are_written_as_single_results_are(target: str, options: tu
         assert bulk.out == single.out
     else:
         assert read.status == 0
+
+
+def test_each_row_seen_from_the_first_begins_with_the_identity(run: Run, tmp_path: Path) -> None:
+    poses = matrices(40)
+    (tmp_path / "a.tum").write_text(text_of("tum", poses))
+    assert run("relative", "--first", "-i", "a.tum", "-f", "tum", "-o", "b.tum").status == 0
+    assert abs(samples_of(tmp_path / "b.tum")[0] - np.linalg.inv(poses[0]) @ poses).max() < 1e-12
+
+
+def test_lookups_for_the_rows_of_a_table_come_out_in_other_forms(run: Run) -> None:
+    tree = "{name: a, parent: map, xyz: [1, 0, 0]}"
+    done = run("lookup", tree, "--target-column", "t", "--source-column", "s", "-f", "json", stdin="t,s\nmap,a\na,map\n")
+    assert [json.loads(line)["xyz"] for line in done.out.splitlines()] == [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
+
+
+# --- recordings ---
+
+HEADER = {"stamp": {"sec": 1, "nanosec": 5}, "frame_id": "odom"}
+POSE: dict[str, Any] = {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 1, "w": 0}}
+POSES: dict[str, dict[str, Any]] = {
+    "PoseStamped": {"header": HEADER, "pose": POSE},
+    "PoseWithCovarianceStamped": {"header": HEADER, "pose": {"pose": POSE, "covariance": [0] * 36}},
+    "Odometry": {"header": HEADER, "child_frame_id": "base", "pose": {"pose": POSE}, "twist": {"twist": {}}},
+}
+TF = {"transforms": [{"header": HEADER, "child_frame_id": "tf_base", "transform": {"translation": POSE["position"], "rotation": POSE["orientation"]}}]}
+
+
+def published(topic: str, message: dict[str, Any]) -> str:
+    return json.dumps({"op": "publish", "topic": topic, "msg": message}) + "\n"
+
+
+@pytest.mark.parametrize("kind", POSES)
+def test_a_topic_of_poses_is_a_frame_that_moves_if_it_was_named(kind: str, run: Run) -> None:
+    text = published("/tf", TF) + published("/robot1/pose", POSES[kind])
+    later = json.loads(json.dumps(POSES[kind]))
+    later["header"]["stamp"]["sec"] = 2
+    text += published("/robot1/pose", later)
+    child = "base" if kind == "Odometry" else "robot1/pose"
+    done = run("lookup", "a.jsonl", "odom", child, "--topic", "/robot1/pose", "-f", "tum", files={"a.jsonl": text})
+    assert done.out.splitlines() == [f"{second}.000000005 1.0 2.0 3.0 0.0 0.0 1.0 0.0" for second in (1, 2)]
+    if kind != "Odometry":
+        named = run("lookup", "a.jsonl", "odom", "me", "--topic", "robot1/pose", "--frames", "odom,me", "-f", "tum")
+        assert named.out == done.out
+    assert "tf_base" in run("tree", "a.jsonl").out
+    assert f"name: {child}," not in run("tree", "a.jsonl").out
+    refused = run("tree", "a.jsonl", "--topic", "/nope")
+    assert (refused.status, "no transforms on nope; topics: /robot1/pose, /tf" in refused.err) == (1, True)
+
+
+@pytest.mark.parametrize("kind", POSES)
+def test_poses_as_the_echo_tools_print_them_are_a_frame_that_moves(kind: str, run: Run) -> None:
+    from frametool.documents.yaml_writer import dump
+
+    child = "base" if kind == "Odometry" else "body"
+    done = run("lookup", "a.txt", "odom", child, "--topic", "/any", "-f", "json", files={"a.txt": dump(POSES[kind]) + "---\n"})
+    assert json.loads(done.out)["xyz"] == [1.0, 2.0, 3.0], done.err
+
+
+def test_two_robots_with_the_same_frames_need_a_topic(run: Run) -> None:
+    other = json.loads(json.dumps(TF))
+    other["transforms"][0]["transform"]["translation"]["x"] = 7
+    files = {"a.jsonl": published("/tf", TF) + published("/robot1/tf", other)}
+    refused = run("lookup", "a.jsonl", "odom", "tf_base", files=files)
+    assert (refused.status, "comes by /tf and by /robot1/tf; choose with --topic" in refused.err) == (1, True)
+    found = run("lookup", "a.jsonl", "odom", "tf_base", "--topic", "/robot1/tf", "-f", "json")
+    assert json.loads(found.out)["xyz"] == [7.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("kind", ["ros1", "MCAP"])
+def test_the_odometry_of_a_bag_is_a_frame_that_moves(kind: str, run: Run, tmp_path: Path) -> None:
+    write_odometry(tmp_path / "a.bag", kind)
+    path = "a.bag" if kind == "ros1" else next(each.name for each in (tmp_path / "a.bag").glob("*.mcap"))
+    where = path if kind == "ros1" else f"a.bag/{path}"
+    refused = run("tree", where)
+    assert (refused.status, "no transforms in the bag; its topics: /odom; --topic /odom reads its poses" in refused.err) == (1, True)
+    done = run("lookup", where, "odom", "base", "--topic", "/odom", "-f", "tum")
+    assert done.out.splitlines() == [f"{second}.000000007 {second}.0 2.0 3.0 0.0 0.0 0.0 1.0" for second in (1, 2)]
+
+
+def write_odometry(path: Path, kind: str) -> None:
+    """Write a bag with two messages of odometry."""
+    from rosbags import typesys
+
+    store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC if kind == "ros1" else typesys.Stores.ROS2_HUMBLE)
+    make, name = store.types, "nav_msgs/msg/Odometry"
+
+    def message(second: int) -> Any:
+        header = make["std_msgs/msg/Header"](
+            stamp=make["builtin_interfaces/msg/Time"](second, 7), frame_id="odom", **({"seq": 0} if kind == "ros1" else {})
+        )
+        point, turn = make["geometry_msgs/msg/Point"](float(second), 2.0, 3.0), make["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+        zero = make["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
+        pose = make["geometry_msgs/msg/PoseWithCovariance"](make["geometry_msgs/msg/Pose"](point, turn), np.zeros(36))
+        twist = make["geometry_msgs/msg/TwistWithCovariance"](make["geometry_msgs/msg/Twist"](zero, zero), np.zeros(36))
+        return make[name](header, "base", pose, twist)
+
+    if kind == "ros1":
+        from rosbags.rosbag1 import Writer
+
+        with Writer(path) as writer:
+            topic = writer.add_connection("/odom", name, typestore=store)
+            for second in (1, 2):
+                writer.write(topic, second, store.serialize_ros1(message(second), name))
+        return
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+
+    with Writer2(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer2:
+        topic2 = writer2.add_connection("/odom", name, typestore=store)
+        for second in (1, 2):
+            writer2.write(topic2, second, store.serialize_cdr(message(second), name))
 
 
 # --- lookups ---

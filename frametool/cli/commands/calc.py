@@ -13,6 +13,7 @@ from frametool.calc.functions import FUNCTIONS
 from frametool.calc.literals import Literals
 from frametool.calc.parser import mentions_row, walk
 from frametool.calc.scope import Scope
+from frametool.cli.calc_completion import Expression
 from frametool.cli.calc_names import file_named_in
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
@@ -47,10 +48,10 @@ def _begins_with_minus(argument: str) -> bool:
 
 
 @click.command(cls=CalcCommand, name="calc")
-@click.argument("arguments", nargs=-1, type=TEXT, metavar="[NAME=FILE ..] [EXPR ..]")
+@click.argument("arguments", nargs=-1, type=Expression(), metavar="[NAME=FILE ..] [EXPR ..]")
 @click.option("--tree", "trees", multiple=True, type=FILE, metavar="FILE",
               help="the tree of look-ups; may be repeated  [default: FRAMETOOL_TREE]")
-@click.option("-e", "expressions", multiple=True, type=TEXT, metavar="NAME=EXPR",
+@click.option("-e", "expressions", multiple=True, type=Expression(), metavar="NAME=EXPR",
               help="a row's result in columns of its own: NAME, NAME_x ..; may be repeated; also EXPR, @FILE")
 @click.option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
 @click.option("--time-column", "time_column", type=TEXT, metavar="NAME",
