@@ -9,7 +9,7 @@ from bisect import bisect_left
 from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import Source
-from frametool.errors import BadAnswer, FormatError, ValueInvalid, shown
+from frametool.errors import BadAnswer, FormatError, ValueInvalid, listing, shown
 from frametool.formats.joints import IDENTITY, TURNING, JointValue, followed, motion, read_value
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
@@ -86,6 +86,10 @@ class Posture:
         """Return the times at which any of some joints has a sample and all are known."""
         begin = max(min(self.moving[name]) for name in moving)
         end = min(max(self.moving[name]) for name in moving)
+        if begin > end:
+            problem = f"joints {listing(moving)} move one frame and have no time in common"
+            files = ", ".join(self._options.answers.joint_files)
+            raise FormatError(f"{problem}; their values end at {format_stamp(end)}, or begin later", source=files)
         return sorted({at for name in moving for at in self.moving[name] if begin <= at <= end})
 
     def _at(self, name: str, stamp_ns: int) -> Value:

@@ -12,6 +12,7 @@ from frametool.formats.joints import TURNING, JointValue
 from frametool.grammar.readers import Misfit
 from frametool.ros import joint_state, messages
 from frametool.stream.faults import Misused
+from frametool.stream.record_stream import without_noise
 from frametool.stream.row_layout import POSE
 from frametool.stream.splitter import Splitter
 
@@ -166,7 +167,7 @@ def _keys(begin: bytes, form: str, source: str) -> list[str]:
     """Return the keys of the first record, those further in with dots."""
     part = next(iter(Splitter(form).parts(begin).parts), None)
     text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")
-    documents = parse_documents(text, source)
+    documents = parse_documents(without_noise(text) if form == "yaml" else text, source)
     value: Any = documents[0].value if documents else {}
     value = value[0] if type(value) is list and value else value
     if type(value) is not dict:

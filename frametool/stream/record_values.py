@@ -376,6 +376,7 @@ def stream_results(
 ) -> Iterator[Value]:
     """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
     from frametool.stream.faults import Fault
+    from frametool.stream.record_stream import without_noise
     from frametool.stream.splitter import Splitter
     from frametool.text.lines import read_blocks
 
@@ -391,7 +392,8 @@ def stream_results(
                 continue
             try:
                 text = decode(block[part.start : part.end], bad.source)
-                yield from results(Source(bad.source, text), request, style, memory)
+                plain_text = without_noise(text) if form == "yaml" else text
+                yield from results(Source(bad.source, plain_text), request, style, memory)
             except FormatError as error:
                 bad.take([Fault(at + max(error.line, 1) - 1, str(error.column or ""), error.message)])
             except FrametoolError as error:

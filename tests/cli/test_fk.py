@@ -107,6 +107,14 @@ def test_messages_come_out_in_any_form_of_poses_with_their_stamps(form: str, run
     assert re.search({"csv": "3000000005", "ros2": r"sec: 3\n +nanosec: 5", "yaml": "3000000005"}[form], out)
 
 
+@pytest.mark.parametrize("form", [(), ("-f", "csv"), ("-f", "tum")])
+def test_what_the_tools_print_between_messages_is_passed_over(form: tuple[str, ...], run: Run) -> None:
+    state = {"header": {"stamp": {"sec": 3, "nanosec": 5}}, "name": [*JOINTS], "position": [*ROWS[0]], "velocity": [], "effort": []}
+    done = run(*FK, *form, "--quiet", stdin=f"WARNING: no messages received\nIs /clock being published?\n{yaml_of(state)}")
+    assert done.status == 0, done.err
+    assert f"{expected(ROWS[0])[0]!r}" in done.out
+
+
 ECHOED = {
     "rostopic echo -p": "%time,field.header.seq,field.header.stamp,field.header.frame_id,"
     + ",".join(f"field.name{at}" for at in range(4)) + "," + ",".join(f"field.position{at}" for at in range(4))

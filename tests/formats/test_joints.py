@@ -321,6 +321,9 @@ def test_joints_that_move_together_are_interpolated_at_each_others_times() -> No
         found.moving[name] = {at: JointValue(value) for at, value in values.items()}
     steps = {at: tuple(moved[0] for moved in both) for at, both in found.motions("a", "b")}
     assert steps == {5: (0.5, 0.5), 10: (1.0, 1.5)}
+    found.moving["b"] = {20: JointValue(0.0), 30: JointValue(1.0)}
+    with pytest.raises(FormatError, match="joints a, b move one frame and have no time in common"):
+        list(found.motions("a", "b"))
 
 
 def test_columns_are_found_by_name_and_unit() -> None:
