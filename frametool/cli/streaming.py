@@ -160,7 +160,8 @@ class Stream:
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
             from frametool.stream.row_layout import POSE
 
-            listed |= output.is_trajectory and bool(request.operation.extras(POSE))  # a trajectory has no room for them
+            # a trajectory has no room for more columns, or for other ones
+            listed |= output.is_trajectory and bool(request.operation.extras(POSE) or output.notations)
             if form not in RECORDS and (listed or output.told not in (None, form)) and not kindred:
                 return self._run_as_poses(stream, form, request, output)
             return self._run(stream, form, request, output)
@@ -170,7 +171,8 @@ class Stream:
         from frametool.cli.trees import answers
         from frametool.stream.as_poses import OtherForm
 
-        target = output.told or (form if "poses" in FORMATS[form].writes else "yaml")
+        keeps = "poses" in FORMATS[form].writes and not output.notations
+        target = output.told or (form if keeps else "csv")
         name = self.path or "stdin"
         converted = OtherForm(form, request, output.style.in_form(target), name, answers())
         status = self._write(converted.outcomes(stream, header=self.options["header"]), output, name)

@@ -330,6 +330,18 @@ def test_other_notations_are_refused_where_a_form_has_its_own(run: Run) -> None:
     assert (done.status, "writes rotations in its own way" in done.err) == (1, True)
 
 
+@pytest.mark.parametrize("form", ["colmap", "nerf", "open3d", "bundler", "g2o"])
+def test_other_notations_of_a_list_of_poses_come_as_a_table(form: str, run: Run) -> None:
+    done = run("convert", "--to", "rpy_deg", stdin=text_of(form, matrices(3)))
+    assert (done.status, done.out.splitlines()[0][:34]) == (0, "x,y,z,roll_deg,pitch_deg,yaw_deg,s")
+
+
+def test_a_trajectory_keeps_its_notation_where_its_form_is_asked_for(run: Run) -> None:
+    text = text_of("tum", matrices(3))
+    assert run("convert", "--in", "tum", "-f", "tum", "--to", "rpy", stdin=text).status == 1
+    assert run("convert", "--in", "tum", "--to", "rpy_deg", stdin=text).out.count("\n") == 3
+
+
 # --- hostile files ---
 
 BAD: dict[str, tuple[str, str]] = {
