@@ -466,6 +466,16 @@ def test_in_its_own_form_a_stream_passes_all_that_is_not_ours(form: str, run: Ru
         assert old.split(delimiter)[ours.stop :] == new.split(delimiter)[ours.stop :]
 
 
+def test_the_header_of_euroc_may_name_other_columns_too(run: Run) -> None:
+    head = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]"
+    text = head + "\n1403636579763555584, 1, 2, 3, 1, 0, 0, 0, 9\n1403636579763555585, 1, 2, 4, 1, 0, 0, 0, 9\n"
+    done = run("convert", "-f", "json", stdin=text)
+    assert json.loads(done.out.splitlines()[1]) == {
+        "xyz": [1.0, 2.0, 4.0], "quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, "stamp_ns": START + 1,
+        "v_RS_R_x [m s^-1]": 9,
+    }  # fmt: skip
+
+
 def test_the_header_of_euroc_stays(run: Run) -> None:
     text = text_of("euroc", matrices(2))
     turned = run("invert", stdin=text).out
