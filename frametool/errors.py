@@ -222,6 +222,16 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
     return f"; did you mean {shown(near[0])}?" if near else ""
 
 
+def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6, slack: float = 0.2) -> list[str]:
+    """Return the nearest known names: the best, and those that are nearly as near; empty where none is."""
+    from difflib import SequenceMatcher
+
+    ratios = {each: SequenceMatcher(None, each, name[:LONGEST_NAME]).ratio() for each in known}
+    best = max(ratios.values(), default=0.0)
+    near = [(ratio, each) for each, ratio in ratios.items() if ratio >= max(cutoff, best - slack)]
+    return [each for _, each in sorted(near, reverse=True)]
+
+
 def _likely(name: str, known: list[str]) -> list[str]:
     """Return the names worth comparing: of many those with the same first or second half that share the most beyond it.
 

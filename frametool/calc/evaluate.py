@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.calc import frame_rules as rules
+from frametool.calc.demands import wanted
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.literals import Literals
-from frametool.calc.parser import RESERVED, parse_line, walk
+from frametool.calc.parser import RESERVED, column_name, parse_line
+from frametool.calc.scope import Scope, pointed
 from frametool.calc.tokens import CalcError, NoTree
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POSE, UNITS, Term, Type
 from frametool.errors import FrametoolError, did_you_mean, shown, warn
@@ -27,39 +28,6 @@ if TYPE_CHECKING:
 
 TAKEN = frozenset(FUNCTIONS)
 PI = 3.141592653589793
-
-
-class Scope:
-    """What an expression may name: values, trees, the tree of bare look-ups, the row of a stream.
-
-    row: the type of a row; None outside of streams
-    seen: the frames of all that was evaluated
-    """
-
-    def __init__(
-        self,
-        *,
-        tree: Frames | None = None,
-        names: dict[str, Term] | None = None,
-        literals: Literals | None = None,
-        row: Type | None = None,
-    ) -> None:
-        """Keep all of it; `names` grows as lines bind."""
-        self.tree = tree
-        self.names = {} if names is None else names
-        self.literals = literals or Literals()
-        self.row = row
-        self.seen: set[str | None] = {None}
-
-    def with_row(self, row: Type) -> Scope:
-        """Return the same scope for rows of a type, its names its own."""
-        return Scope(tree=self.tree, names=dict(self.names), literals=self.literals, row=row)
-
-    @property
-    def trees(self) -> list[tuple[str, Frames]]:
-        """Return the trees by the names that look-ups in them have; the tree of bare ones first."""
-        named = [(name, term.tree) for name, term in self.names.items() if term.tree is not None]
-        return [("", self.tree), *named] if self.tree is not None else named
 
 
 def evaluate(text: str, scope: Scope) -> Term:
@@ -87,50 +55,6 @@ def evaluate_line(line: Line, scope: Scope) -> Term:
     return term
 
 
-def pointed(error: FrametoolError, text: str) -> FrametoolError:
-    """Add the expression with a caret to an error that says its place."""
-    at = getattr(error, "at", None)
-    if at is not None and not getattr(error, "snippet", ""):
-        from frametool.documents.source import line_of, places_of, pointer
-
-        ((row, column),) = places_of(f"{text}.", [at]) if at < len(text) else [_end_of(text)]
-        shown_line = pointer(line_of(text, row), column)
-        error.fields = {**error.fields, "column": column}
-        error.snippet = "\n".join(f"  {each}" for each in shown_line.split("\n"))  # type: ignore[attr-defined]
-    return error
-
-
-def _end_of(text: str) -> tuple[int, int]:
-    """Return line and column behind the last character that shows."""
-    lines = text.rstrip().splitlines() or [""]
-    return len(lines), len(lines[-1]) + 1
-
-
-def mentions_row(tree: Branch) -> bool:
-    """Tell whether an expression needs rows: `row`, `row.COLUMN`, `@ row`."""
-    return any(
-        branch.kind == "column"
-        or (branch.kind == "name" and branch.value == "row")
-        or (branch.kind == "lookup" and branch.value[2] == "row")
-        for branch in walk(tree)
-    )
-
-
-def columns_of(tree: Branch) -> list[str]:
-    """Name the columns that an expression asks for, each once."""
-    return list(dict.fromkeys(column_name(branch.value) for branch in walk(tree) if branch.kind == "column"))
-
-
-def needs_time(tree: Branch) -> bool:
-    """Tell whether an expression looks up at the time of the row."""
-    return any(branch.kind == "lookup" and branch.value[2] == "row" for branch in walk(tree))
-
-
-def column_name(text: str) -> str:
-    """Return the column of `row.COLUMN`."""
-    return text.partition(".")[2].strip().strip('"')
-
-
 class _Walk:
     """Understands the parts of one expression."""
 
@@ -153,7 +77,7 @@ class _Walk:
         """Return what is one value, neither a tree nor a list."""
         term = self.term(branch)
         try:
-            return rules.wanted(term)
+            return wanted(term)
         except CalcError as error:
             error.at = branch.at
             raise

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.calc.evaluate import columns_of, evaluate_line, kept, needs_time
-from frametool.calc.frame_rules import in_radians
-from frametool.calc.parser import walk
+from frametool.calc.demands import in_radians
+from frametool.calc.evaluate import evaluate_line, kept
+from frametool.calc.parser import columns_of, needs_time, walk
 from frametool.calc.tokens import CalcError
 from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, RADIAN, TREE, TWIST, VECTOR, RowValues, Type
 from frametool.errors import FrametoolError
@@ -21,8 +21,8 @@ from frametool.stream.row_layout import Target
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.calc.evaluate import Scope
     from frametool.calc.parser import Line
+    from frametool.calc.scope import Scope
     from frametool.calc.values import Term
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number

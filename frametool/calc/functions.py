@@ -4,25 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.calc.frame_rules import (
-    PLACED,
-    common,
-    in_radians,
-    inverse,
-    one_target,
-    plain_angle,
-    plain_number,
-    same_frames,
-    wanted,
-    with_unit,
-)
+from frametool.calc.demands import common, in_radians, need, one_target, plain_number, same_frames, wanted
+from frametool.calc.frame_rules import PLACED, inverse, with_unit
+from frametool.calc.number_functions import arc, arccosine, arcsine, arctangent, sqrt, trigonometric
 from frametool.calc.tokens import CalcError
 from frametool.calc.values import (
     ANGLES,
     LIST,
     METRE,
     NUMBER,
-    PLAIN,
     PLAIN_NUMBER,
     POINT,
     POSE,
@@ -38,7 +28,7 @@ from frametool.geometry import euler, quaternion, rigid, trig
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.calc.frame_rules import Trees
+    from frametool.calc.demands import Trees
     from frametool.geometry.types import Components, Namespace, Number
 
 MANY = 1 << 16
@@ -61,14 +51,6 @@ class Builtin:
         self.takes = takes
         self.gives = gives
         self.rule = rule
-
-
-def need(term: Term, kinds: Sequence[str], what: str) -> Term:
-    """Refuse a value of another kind."""
-    if term.type.kind not in kinds:
-        articles = " or ".join(f"a {kind}" if kind != ANGLES else kind for kind in kinds)
-        raise CalcError(f"{what}() takes {articles}, found {term.type.named}")
-    return term
 
 
 def _inv(name: str, terms: Sequence[Term], _: Trees) -> Term:
@@ -257,61 +239,6 @@ def _vector(name: str, terms: Sequence[Term], _: Trees) -> Term:
     return given.typed(given.type._replace(kind=VECTOR))
 
 
-def _sincos(angle: Number, xp: Namespace, *, degrees: bool) -> Components:
-    """Return sine and cosine; exact at whole quarter turns in degrees."""
-    found: Components = (trig.half_sincos_deg if degrees else trig.half_sincos)(2.0 * angle, xp)
-    return found
-
-
-def _trigonometric(pick: Callable[[Number, Number], Number]) -> Callable[[str, Sequence[Term], Trees], Term]:
-    def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
-        angle = plain_angle(wanted(terms[0]), f"{name}()")
-        degrees = angle.type.degrees
-
-        def kernel(value: Number, xp: Namespace) -> Components:
-            return (pick(*_sincos(value, xp, degrees=degrees)),)
-
-        return made(PLAIN_NUMBER, kernel, angle)
-
-    return rule
-
-
-def _arc(kernel: Callable[..., Number], bound: float | None) -> Callable[[str, Sequence[Term], Trees], Term]:
-    def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
-        def check(value: float) -> str:
-            return f"{name}() takes -1 .. 1, found {value:g}" if bound is not None and abs(value) > bound else ""
-
-        number = plain_number(wanted(terms[0]), f"{name}()")
-        return made(Type(NUMBER, unit=RADIAN), lambda value, xp: (kernel(value, xp),), number, check=check)
-
-    return rule
-
-
-def _asin(value: Number, xp: Namespace) -> Number:
-    return trig.bearing(value, xp.sqrt((1.0 - value) * (1.0 + value)), 1.0, xp)
-
-
-def _acos(value: Number, xp: Namespace) -> Number:
-    return trig.bearing(xp.sqrt((1.0 - value) * (1.0 + value)), value, 1.0, xp)
-
-
-def _atan(value: Number, xp: Namespace) -> Number:
-    steep = abs(value) > 1.0
-    small = xp.where(steep, 1.0 / xp.where(steep, value, 1.0), value)
-    angle = xp.doubled_arctan(small / (1.0 + xp.sqrt(1.0 + small * small)))
-    return xp.where(steep, xp.copysign(trig.RIGHT_ANGLE, value) - angle, angle)
-
-
-def _sqrt(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    def check(value: float) -> str:
-        return f"{name}() takes what is not negative, found {value:g}" if value < 0.0 else ""
-
-    number = in_radians(need(wanted(terms[0]), (NUMBER,), name))
-    unit = number.type.unit
-    type_ = Type(NUMBER, unit=(unit[0] / 2.0, unit[1] / 2.0, unit[2] / 2.0)) if unit != PLAIN else PLAIN_NUMBER
-    return made(type_, lambda value, xp: (xp.sqrt(value),), number, check=check)
-
-
 FUNCTIONS = {
     "inv": Builtin(1, 1, "pose", "b<-a of a<-b", _inv),
     "trans": Builtin(1, 1, "pose", "its source's origin, a point in its target", _trans),
@@ -327,11 +254,11 @@ FUNCTIONS = {
     "norm": Builtin(1, 1, "v", "length of a point or vector", _norm),
     "dot": Builtin(2, 2, "v, w", "scalar product", _dot),
     "cross": Builtin(2, 2, "v, w", "vector product", _cross),
-    "sin": Builtin(1, 1, "angle", "sine", _trigonometric(lambda sine, _: sine)),
-    "cos": Builtin(1, 1, "angle", "cosine", _trigonometric(lambda _, cosine: cosine)),
-    "tan": Builtin(1, 1, "angle", "tangent", _trigonometric(lambda sine, cosine: sine / cosine)),
-    "asin": Builtin(1, 1, "number", "angle of a sine", _arc(_asin, 1.0)),
-    "acos": Builtin(1, 1, "number", "angle of a cosine", _arc(_acos, 1.0)),
-    "atan": Builtin(1, 1, "number", "angle of a tangent", _arc(_atan, None)),
-    "sqrt": Builtin(1, 1, "number", "square root; that of m^2 is m", _sqrt),
+    "sin": Builtin(1, 1, "angle", "sine", trigonometric(lambda sine, _: sine)),
+    "cos": Builtin(1, 1, "angle", "cosine", trigonometric(lambda _, cosine: cosine)),
+    "tan": Builtin(1, 1, "angle", "tangent", trigonometric(lambda sine, cosine: sine / cosine)),
+    "asin": Builtin(1, 1, "number", "angle of a sine", arc(arcsine, 1.0)),
+    "acos": Builtin(1, 1, "number", "angle of a cosine", arc(arccosine, 1.0)),
+    "atan": Builtin(1, 1, "number", "angle of a tangent", arc(arctangent, None)),
+    "sqrt": Builtin(1, 1, "number", "square root; that of m^2 is m", sqrt),
 }

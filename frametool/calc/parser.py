@@ -84,6 +84,31 @@ def walk(tree: Branch) -> Iterator[Branch]:
         waiting += branch.parts
 
 
+def columns_of(tree: Branch) -> list[str]:
+    """Name the columns that an expression asks for, each once."""
+    return list(dict.fromkeys(column_name(branch.value) for branch in walk(tree) if branch.kind == "column"))
+
+
+def needs_time(tree: Branch) -> bool:
+    """Tell whether an expression looks up at the time of the row."""
+    return any(branch.kind == "lookup" and branch.value[2] == "row" for branch in walk(tree))
+
+
+def column_name(text: str) -> str:
+    """Return the column of `row.COLUMN`."""
+    return text.partition(".")[2].strip().strip('"')
+
+
+def mentions_row(tree: Branch) -> bool:
+    """Tell whether an expression needs rows: `row`, `row.COLUMN`, `@ row`."""
+    return any(
+        branch.kind == "column"
+        or (branch.kind == "name" and branch.value == "row")
+        or (branch.kind == "lookup" and branch.value[2] == "row")
+        for branch in walk(tree)
+    )
+
+
 class _Parser:
     """Reads the words of one expression; levels within one another are counted."""
 

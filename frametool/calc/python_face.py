@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, Self
 
-from frametool.calc.evaluate import Scope, evaluate_line, read_line
-from frametool.calc.frame_rules import in_radians
+from frametool.calc.demands import in_radians
+from frametool.calc.evaluate import evaluate_line, read_line
+from frametool.calc.scope import Scope
 from frametool.calc.tokens import frame_text
 from frametool.calc.values import (
     LIST,

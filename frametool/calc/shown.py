@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.calc.frame_rules import in_radians
+from frametool.calc.demands import in_radians
 from frametool.calc.tokens import CalcError
 from frametool.calc.values import ANGLES, LIST, NUMBER, POSE, RADIAN, TREE, TWIST, unit_text
 from frametool.errors import printable

@@ -18,12 +18,11 @@ if TYPE_CHECKING:
 LONGEST = 1 << 16
 """Most characters of an expression."""
 
-_FRAME = re.compile(r'"[^"\n]*"|/?[^\W\d][\w/:.]*+(?:-++(?![<>])[\w/:.]*+)*+')
 _NUMBER = re.compile(r"((?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+)(\w*+)")
-_NAME = re.compile(r"[^\W\d]\w*+")
 _COLUMN = r'\s*+\.\s*+(?:"[^"\n]*"|\w++(?:\.\w++)*+)'
 ARROW = "<-"
 _OPERATORS = "-+*/^@()[],="
+_IN_FRAMES = "_/:.-"
 _BEFORE_QUOTE = "{[,: \t\r\n"
 
 
@@ -92,36 +91,63 @@ def _word(text: str, at: int, before: str) -> Token:
     if first == "{":
         close = closing_brace(text, at)
         return Token("pose", text[at:close], at, close)
-    if (frame := _FRAME.match(text, at)) is not None:
+    if (frame := _behind_frame(text, at)) > at:
         if before == "in":
-            return Token("frame", frame[0], at, frame.end())
-        if (lookup := _lookup(text, frame)) is not None:
+            return Token("frame", text[at:frame], at, frame)
+        if (lookup := _lookup(text, at, frame)) is not None:
             return lookup
         if first == '"':
-            return Token("text", frame[0], at, frame.end())
+            return Token("text", text[at:frame], at, frame)
     if (number := _NUMBER.match(text, at)) is not None:
         return Token("number", number[1], at, number.end(), number[2])
-    if (name := _NAME.match(text, at)) is not None:
-        column = re.compile(_COLUMN).match(text, name.end()) if name[0] == "row" else None
+    if (end := _behind_name(text, at)) > at:
+        column = re.compile(_COLUMN).match(text, end) if text[at:end] == "row" else None
         if column is not None:
             return Token("column", text[at : column.end()], at, column.end())
-        return Token("name", name[0], at, name.end())
+        return Token("name", text[at:end], at, end)
     if first in _OPERATORS:
         return Token("op", first, at, at + 1)
     raise CalcError(_unexpected(text, at), at)
 
 
-def _lookup(text: str, target: re.Match[str]) -> Token | None:
+def _behind_name(text: str, at: int) -> int:
+    """Return the end of the name at a place; the place itself where there is none."""
+    end = at
+    while end < len(text) and (text[end].isalnum() or text[end] == "_"):
+        end += 1
+    return at if text[at].isdecimal() else end
+
+
+def _behind_frame(text: str, at: int) -> int:
+    """Return the end of the frame's name at a place; the place itself where there is none.
+
+    Within quotes anything; else letters, digits and _ / : . -, but a dash before an arrow is none of the name.
+    """
+    if text[at] == '"':
+        close = text.find('"', at + 1)
+        return at if close < 0 or "\n" in text[at:close] else close + 1
+    begin = at + (text[at] == "/")
+    if begin == len(text) or not (text[begin].isalpha() or text[begin] == "_"):
+        return at
+    end = begin
+    while end < len(text) and (text[end].isalnum() or text[end] in _IN_FRAMES):
+        end += 1
+    if end < len(text) and text[end] in "<>":
+        end = begin + len(text[begin:end].rstrip("-"))
+    return end
+
+
+def _lookup(text: str, begin: int, end: int) -> Token | None:
     """Read a look-up whose target was found."""
-    arrow = _behind_blanks(text, target.end())
+    arrow = _behind_blanks(text, end)
     if not text.startswith(ARROW, arrow):
         return None
-    begin = _behind_blanks(text, arrow + len(ARROW))
-    source = _FRAME.match(text, begin)
-    if source is None:
-        raise CalcError("a frame is missing behind <-: TARGET<-SOURCE", begin)
-    frames = tuple(each[0][1:-1] if each[0].startswith('"') else each[0] for each in (target, source))
-    return Token("lookup", text[target.start() : source.end()], target.start(), source.end(), frames=frames)
+    second = _behind_blanks(text, arrow + len(ARROW))
+    last = second if second == len(text) else _behind_frame(text, second)
+    if last == second:
+        raise CalcError("a frame is missing behind <-: TARGET<-SOURCE", second)
+    frames = tuple(each[1:-1] if each.startswith('"') else each for each in (text[begin:end], text[second:last]))
+    return Token("lookup", text[begin:last], begin, last, frames=frames)
 
 
 def _unexpected(text: str, at: int) -> str:
@@ -165,4 +191,5 @@ def frame_text(name: str | None) -> str:
     """Write a frame's name as an expression has it; a name that is not known is `?`."""
     if name is None:
         return "?"
-    return name if not name.startswith(('"', "/")) and _FRAME.fullmatch(name) else f'"{name}"'
+    plain = name and not name.startswith(('"', "/", "-")) and not name.endswith("-")
+    return name if plain and _behind_frame(name, 0) == len(name) else f'"{name}"'

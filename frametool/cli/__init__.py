@@ -21,6 +21,8 @@ COMMANDS = {
     "compose": ("frametool.cli.commands.compose", "product of poses, left to right: a_from_b, b_from_c -> a_from_c"),
     "invert": ("frametool.cli.commands.invert", "the inverse of a pose: a_from_b -> b_from_a"),
     "relative": ("frametool.cli.commands.relative", "the pose of B seen from A, with distance and angle"),
+    "mean": ("frametool.cli.commands.mean", "the mean of poses or rows, and how far they lie from it"),
+    "between": ("frametool.cli.commands.between", "the shortest rotation from one direction to another"),
     "interpolate": ("frametool.cli.commands.interpolate", "poses between A and B at fractions of the way"),
     "lookup": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),

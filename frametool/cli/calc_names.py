@@ -15,8 +15,8 @@ from frametool.errors import FormatError
 from frametool.formats import FORMATS
 
 if TYPE_CHECKING:
-    from frametool.calc.evaluate import Scope
     from frametool.calc.literals import Literals
+    from frametool.calc.scope import Scope
     from frametool.documents.source import Source
 
 OF_TREES = frozenset(("frames", "transforms", "static_transforms"))

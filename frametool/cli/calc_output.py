@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from frametool.calc.frame_rules import wanted
+from frametool.calc.demands import wanted
 from frametool.calc.shown import line_of_value, plain_results
 from frametool.calc.values import LIST, POINT, POSE, VECTOR
 from frametool.errors import ValueInvalid

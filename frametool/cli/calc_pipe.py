@@ -15,7 +15,7 @@ from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.calc.evaluate import Scope
+    from frametool.calc.scope import Scope
     from frametool.calc.values import Term
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream

@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from frametool.calc.evaluate import evaluate_line, read_line
-from frametool.calc.functions import FUNCTIONS
-from frametool.calc.tokens import frame_text
+from frametool.cli.calc_completion import BETWEEN_WORDS, Completer
 from frametool.cli.calc_names import file_named_in
 from frametool.cli.calc_output import value_texts
 from frametool.cli.commands.help import topic
@@ -20,15 +19,13 @@ from frametool.cli.stderr import say_error, tell
 from frametool.errors import FrametoolError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
-    from frametool.calc.evaluate import Scope
+    from frametool.calc.scope import Scope
     from frametool.cli.output import Output
 
 PROMPT = "> "
 LONGEST_HISTORY = 1000  # lines
-BETWEEN_WORDS = " \t()[]{},*^@+="
-WORDS = ("row", "pi", "ans", "as ", "in ")
 ENDS = ("exit", "quit")
 
 
@@ -100,43 +97,3 @@ def history_path() -> str:
     """Return the file of the history, as the XDG base directories have it."""
     state = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
     return os.path.join(state, "frametool_history")
-
-
-class Completer:
-    """Completes frames on both sides of an arrow, names, and functions with their bracket."""
-
-    def __init__(self, scope: Scope, line: Any) -> None:
-        """Take what there is to name, and readline, which knows the line."""
-        self.scope = scope
-        self.line = line
-        self.found: list[str] = []
-
-    def __call__(self, text: str, state: int) -> str | None:
-        """Return one completion after the other."""
-        if state == 0:
-            self.found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
-        return self.found[state] if state < len(self.found) else None
-
-    def completions(self, text: str, before: str) -> list[str]:
-        """Return all completions of a word behind the rest of a line."""
-        frames = sorted(frame_text(frame) for frame in self._frames(before))
-        head, arrow, tail = text.partition("<-")
-        if arrow:
-            return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
-        if self._tree_before(before) is not None:
-            words: Iterable[str] = ()
-        else:
-            words = (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
-        known = [*words, *(f"{frame}<-" for frame in frames)]
-        return [word for word in known if word.startswith(text)]
-
-    def _tree_before(self, before: str) -> Any:
-        """Return the tree whose bracket is open right before a word."""
-        name = before[:-1].rstrip().rpartition(" ")[2] if before.endswith("[") else ""
-        bare = name.lstrip("()[]{},*^@+=-/")
-        term = self.scope.names.get(bare)
-        return None if term is None else term.tree
-
-    def _frames(self, before: str) -> Iterable[str]:
-        tree = self._tree_before(before) or self.scope.tree
-        return () if tree is None else tree.frames

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import TypeVar
 
-    from frametool.calc.explain.agreement import Plan
+    from frametool.calc.explain.agreement import DerivationStyle
     from frametool.calc.explain.given import Given
     from frametool.calc.explain.render import Explanation
     from frametool.cli.output import Output
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 FORMS = ("text", "markdown", "latex")
 ONE_RECORD = "--explain derives one record; write it as an argument"
 EXPLAIN = click.option(
-    "--explain", type=click.Choice(FORMS), metavar="[=FORM]",
-    help="derive it step by step: text, markdown, latex",
+    "--explain", type=click.Choice(FORMS), metavar="[=FORM]", help="derive the result step by step (help explain)",
 )  # fmt: skip
 
 
@@ -50,15 +49,15 @@ class Explaining:
         """Return whether a derivation is wanted."""
         return bool(self.form)
 
-    def plan(self, output: Output, stream: Stream | None = None) -> Plan:
+    def plan(self, output: Output, stream: Stream | None = None) -> DerivationStyle:
         """Return how to derive; refuse what a derivation cannot be: a machine format, a stream."""
-        from frametool.calc.explain.agreement import Plan
+        from frametool.calc.explain.agreement import DerivationStyle
 
         if output.told not in (None, "text"):
             raise click.UsageError(f"--explain writes {', '.join(FORMS)}, not {output.told}; leave one of them out")
         if stream is not None and stream.path is not None:
             raise click.UsageError(f"-i FILE is a stream; {ONE_RECORD}")
-        return Plan(output.style, significant(self._precision), self.every)
+        return DerivationStyle(output.style, significant(self._precision), self.every)
 
     def write(self, explanation: Explanation, output: Output) -> int:
         """Write a derivation where the result would go."""

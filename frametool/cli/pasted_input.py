@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 INLINE = "argument"
-# the grammar's own, or a header
-_PLAIN = re.compile(r"""\s*(?![ijk]\s*$)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))""")
+# the grammar's own, or a header; compiled when first needed
+_PLAIN = r"""\s*(?![ijk]\s*$)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
 
 _ROW = r"\[(?:[^\[\],]*,){%s}[^\[\],]*\]\s*,?\s*"
-_LISTED_ROWS = re.compile(rf"\s*(?:\[\s*(?:{_ROW % 3}){{3}}\]|(?:{_ROW % '2,3'}){{3,4}}\Z)")
+_LISTED_ROWS = rf"\s*(?:\[\s*(?:{_ROW % 3}){{3}}\]|(?:{_ROW % '2,3'}){{3,4}}\Z)"
 
 
 def is_inline(text: str) -> bool:
@@ -40,14 +40,15 @@ def is_pasted(text: str, given: Notation | None = None) -> bool:
         return is_inline(text)
     if os.path.exists(text):
         return False
-    return "\n" in text or rewritten(Source(INLINE, text), given) is not None
+    has_key = "\n" in text or re.match(r"\w+: *[\[{]", text) is not None
+    return has_key or rewritten(Source(INLINE, text), given) is not None
 
 
 def rewritten(
     source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
     """Return a text that was pasted as one of the grammar; None for one that is."""
-    if _PLAIN.match(source.text) and "\n" not in source.text.strip():
+    if re.match(_PLAIN, source.text) and "\n" not in source.text.strip():
         return None
     from frametool.ros.pasted_blocks import in_grammar
 
@@ -76,7 +77,7 @@ def pasted_stream(stream: BufferedReader, name: str, request: Request) -> tuple[
     Only a beginning with which no stream of rows or records has a result is read to its end.
     """
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
-    if _PLAIN.match(head) and not re.match(r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=", head):
+    if re.match(_PLAIN, head) and not re.match(r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=", head):
         return None, stream
     from frametool.ros.pasted_blocks import MOST_PASTED, in_grammar
 
@@ -117,7 +118,7 @@ def _is_free(head: str, given: Notation | None, request: Request) -> bool:
 def _is_long(head: str) -> bool:
     """Tell a list of 9, 12 or 16 numbers, three rows of four, and rows one below the other from other lists."""
     found = re.match(r"\s*\[([^\[\]]*)\]", head)
-    return (found is not None and found[1].count(",") in (8, 11, 15)) or _LISTED_ROWS.match(head) is not None
+    return (found is not None and found[1].count(",") in (8, 11, 15)) or re.match(_LISTED_ROWS, head) is not None
 
 
 def _only_a_matrix(lines: list[str], request: Request) -> bool:

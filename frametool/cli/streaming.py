@@ -154,10 +154,12 @@ class Stream:
             request = self._completed(request, output, form)
             if "trajectory" in FORMATS[form].reads and not output.notations:
                 request = request._replace(notations=())  # its rows stay what they are
-            if form in RECORDS and (output.told or form) != form:
+            if form in RECORDS and (output.told or form) != form and request.gathered is None:
                 return self._run_as_values(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
+            if request.gathered is not None and not listed:
+                return self._gather(stream, form, request._replace(notations=()), name)
             from frametool.stream.row_layout import POSE
 
             # a trajectory has no room for more columns, or for other ones
@@ -173,6 +175,8 @@ class Stream:
 
         keeps = "poses" in FORMATS[form].writes and not output.notations
         target = output.told or (form if keeps else "csv")
+        if target not in FORMATS:
+            raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         name = self.path or "stdin"
         converted = OtherForm(form, request, output.style.in_form(target), name, answers())
         status = self._write(converted.outcomes(stream, header=self.options["header"]), output, name)
@@ -196,8 +200,11 @@ class Stream:
     @staticmethod
     def _run_pasted(source: Source, request: Request, output: Output) -> int:
         """Write the results of a text that was pasted."""
-        from frametool.stream.record_values import results
+        from frametool.stream.record_values import read_poses, results
 
+        if request.gathered is not None:
+            request.gathered.add(read_poses(source, degrees=request.degrees, normalize=request.normalize))
+            return 0
         request = request._replace(notations=request.notations or output.notations)
         output.values(results(source, request, output.style))
         return 0
@@ -220,6 +227,8 @@ class Stream:
         prefix = options["prefix"] and not request.operation.only_adds
         if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or prefix)):
             raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
+        if form in RECORDS and len(options["columns"]) > 1:
+            raise click.UsageError("--columns are those of a table; a record names its own numbers")
         return request._replace(
             given=request.given or self.given,
             notations=request.notations or output.notations,
@@ -249,6 +258,19 @@ class Stream:
             closing(outcomes),  # ends the processes of --jobs
         ):
             return run(outcomes, write, self.policy(name), progress.advance)
+
+    def _gather(self, stream: Any, form: str, request: Request, name: str) -> int:
+        """Let the request take all poses; nothing is written."""
+        from contextlib import closing
+
+        from frametool.stream.run import run
+        from frametool.view.progress import ProgressBar
+
+        with (
+            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
+            closing(self._outcomes(stream, form, request, name)) as outcomes,
+        ):
+            return run(outcomes, lambda _: None, self.policy(name), progress.advance)
 
     def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
         if form in RECORDS:

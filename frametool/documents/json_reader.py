@@ -38,8 +38,12 @@ class _NoJson(FormatError):
 
 
 def looks_like_json(text: str) -> bool:
-    """Say whether the first character that is not blank opens an object or array."""
-    return text.startswith(("{", "["), _BLANKS.match(text).end())  # type: ignore[union-attr]
+    """Say whether the first character that is not blank opens an array, or an object with a quoted key or none."""
+    first = _BLANKS.match(text).end()  # type: ignore[union-attr]
+    if not text.startswith("{", first):
+        return text.startswith("[", first)
+    second = _BLANKS.match(text, first + 1).end()  # type: ignore[union-attr]
+    return second == len(text) or text[second] in '"}'
 
 
 def parse_json(source: Source) -> list[Any] | None:

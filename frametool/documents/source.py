@@ -12,7 +12,7 @@ from bisect import bisect_right
 from io import BufferedReader
 from typing import NamedTuple
 
-from frametool.errors import FileProblem, FormatError, shown
+from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -77,7 +77,8 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
     try:
         return open(path, "rb", buffering=HEAD)
     except OSError as error:
-        raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
+        told = name if len(name) <= LONGEST_NAME else bare(name)
+        raise FileProblem(f"{told}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 

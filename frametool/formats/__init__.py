@@ -269,12 +269,15 @@ FORMATS = {
         states="parent<-child, metres, radians, roll pitch yaw about fixed axes",
     ),
     "camchain": Format(
-        "camera chain of Kalibr, OpenVINS or okvis",
+        "camera chain of Kalibr, OpenVINS or okvis; matrices by name",
         reads=("tree",),
         reader="frametool.formats.camchain",
         writes=("tree",),
         writer="frametool.formats.camchain",
-        signs=(("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),),
+        signs=(
+            ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),
+            ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
+        ),
         states="target<-source as each key says; metres",
         asks=("direction", "frames"),
     ),
@@ -287,7 +290,8 @@ FORMATS = {
         signs=(
             ("xml", "opencv_storage"),
             ("json path", "*/type_id"),
-            ("text", r"\A\s*%YAML:1\.0|: *!!opencv-"),
+            ("magic", rb"(?:\xef\xbb\xbf)?\s*%YAML:1\.0(?!.*\bT_(?:cam_imu|imu_cam|cn_cnm1|i_b|SC|BS) *:)"),
+            ("text", ": *!!opencv-"),
         ),
         states="target<-source as each key says, camera<-object by rvec and tvec; metres",
         asks=("direction", "frames"),

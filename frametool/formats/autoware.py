@@ -68,15 +68,15 @@ def _edge(parent: str, child: str, pose: Any, reading: Reading) -> Edge:
 def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     """Return a map a parent; raises ValueInvalid for frames that move."""
     precision = Precision(NAME, "x y z roll pitch yaw")
-    texts: dict[str, str] = {}
+    texts: dict[str, list[str]] = {}
     for parent, child, pose in standing_edges(tree, NAME):
         angles, back = angles_of(pose[3:])
         precision.add(pose, (*pose[:3], *back))
         numbers = zip((*XYZ, *RPY), (*pose[:3], *angles), strict=True)
         lines = "".join(f"    {key}: {flow(number, style.number)}\n" for key, number in numbers)
-        texts[parent] = texts.get(parent, "") + f"  {quoted(child)}:\n{lines}"
+        texts.setdefault(parent, []).append(f"  {quoted(child)}:\n{lines}")
     if len(texts) > 1:
         warn(f"Autoware has a file for each frame that holds others; here in one: {listing(texts)}")
     tell_lonely_roots(tree, NAME)
     precision.tell(style)
-    return "".join(f"{quoted(parent)}:\n{text}" for parent, text in texts.items())
+    return "".join(f"{quoted(parent)}:\n{''.join(children)}" for parent, children in texts.items())

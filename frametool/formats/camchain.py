@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.document_edges import document_edges
-from frametool.formats.keyed_matrices import Matrices, Naming
+from frametool.formats.keyed_matrices import FrameNames, Matrices
 from frametool.formats.opencv_text import TAGS, made_ordinary
 from frametool.formats.written_poses import Precision, rows_of, standing_edges
 from frametool.geometry import rigid
@@ -44,7 +44,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
         told = options.answers.frames
-        naming = Naming(base=told[0] if told else "", alone="cam", told=told, blocks=told[1:])
+        naming = FrameNames(base=told[0] if told else "", alone="cam", told=told, blocks=told[1:])
         matrices = Matrices(as_mapping(value, "blocks of cameras"), naming, options.answers, reading)
         if not matrices.poses:
             raise Misfit("no pose in it: a camera has T_cam_imu, T_imu_cam, T_cn_cnm1 or T_SC")
@@ -61,7 +61,7 @@ def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of cameras alone,
     cam0, cam1 .., gets T_cn_cnm1.
     """
-    edges = list(standing_edges(tree, NAME))
+    edges = standing_edges(tree, NAME)
     if len(tree.roots) != 1:
         raise ValueInvalid(f"{NAME} holds one tree of cameras; the roots here: {listing(tree.roots)}")
     precision = Precision(NAME, "matrices")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.errors import FormatError, Unanswered
+from frametool.errors import FormatError, Unanswered, bare
 from frametool.formats.tree_reader import without_slashes
 from frametool.grammar.readers import Misfit, Reading
 
@@ -67,7 +67,7 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
 def remember(notes: Iterable[Note], lines: Iterable[int], tally: Tally) -> None:
     """Keep what was odd, each with its line and behind the keys that lead to it."""
     for note, line in zip(notes, lines, strict=True):
-        tally.note_each(f"{dotted(note.path)}: {note.message}" if note.path else note.message, line, note.rule)
+        tally.note_each(f"{bare(dotted(note.path))}: {note.message}" if note.path else note.message, line, note.rule)
 
 
 def dotted(path: Path) -> str:

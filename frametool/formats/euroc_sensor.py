@@ -14,7 +14,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from frametool.formats.document_edges import document_edges
-from frametool.formats.keyed_matrices import Matrices, Naming
+from frametool.formats.keyed_matrices import FrameNames, Matrices
 from frametool.formats.opencv_text import TAGS, made_ordinary
 from frametool.grammar.readers import Misfit, as_mapping
 
@@ -31,7 +31,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     body, sensor = options.answers.names("body", sensor_name(file.path))
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
-        naming = Naming(base=body, alone=sensor, told=(body, sensor))
+        naming = FrameNames(base=body, alone=sensor, told=(body, sensor))
         matrices = Matrices(as_mapping(value, "T_BS of a sensor"), naming, options.answers, reading)
         if not matrices.poses:
             raise Misfit("no pose in it: the pose of a sensor is T_BS")

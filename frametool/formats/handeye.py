@@ -106,7 +106,7 @@ def _pose(pose: dict[str, Any], reading: Reading) -> tuple[Vector, Quaternion]:
 
 def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
     """Return the one edge of a tree as easy_handeye has it, as if on the hand; raises ValueInvalid for other trees."""
-    edges = list(standing_edges(tree, NAME))
+    edges = standing_edges(tree, NAME)
     if len(edges) != 1:
         children = listing(child for _, child, _ in edges)
         raise ValueInvalid(f"{NAME} holds one pose, and here are {len(edges)}: {children}")

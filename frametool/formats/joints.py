@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing import Any, TypeAlias
 
     from frametool.documents.source import Source
-    from frametool.geometry.types import Namespace, Number, Rigid
+    from frametool.geometry.types import Number, Rigid
     from frametool.grammar.readers import Vector
 
     Value: TypeAlias = "JointValue | Rigid"
@@ -69,7 +69,7 @@ class Joint(NamedTuple):
     @property
     def start(self) -> Value:
         """Return the value it has unless told."""
-        return _IDENTITY if self.posed else JointValue(self.rest)
+        return IDENTITY if self.posed else JointValue(self.rest)
 
 
 class JointValue(NamedTuple):
@@ -87,19 +87,21 @@ class JointValue(NamedTuple):
         return self.number * DEGREE if self.degrees else self.number
 
 
-_IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
-    """Return what a joint does to the frame behind it: floats, or columns where the value is an array."""
+def motion(joint: Joint, value: Value) -> Rigid:
+    """Return what a joint does to the frame behind it, for a value that is no array."""
     if not isinstance(value, JointValue):
         return value
     number, degrees = value
+    if not degrees and number == joint.rest:
+        return IDENTITY
     if joint.rest:
         number = number - (joint.rest * RADIAN if degrees else joint.rest)
     if joint.kind == "prismatic":
         return slid(*joint.axis, number)
-    return turned(*joint.axis, number, xp, degrees=degrees)
+    return turned(*joint.axis, number, floats, degrees=degrees)
 
 
 def followed(joint: Joint, leader: Value) -> Value:

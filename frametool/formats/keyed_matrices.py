@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import shown
+from frametool.errors import bare, shown
 from frametool.formats.document_edges import Unclear, dotted
 from frametool.formats.matrix_keys import Ambiguous, Meaning, meaning_of, no_pose, partner_of
 from frametool.formats.matrix_values import grid_of, is_tagged, read_shift, read_turn, read_whole, whole_pose
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 MOST_TOLD = 3  # matrices that are no poses
 
 
-class Block(NamedTuple):
+class MatrixBlock(NamedTuple):
     """A map of a document that may hold matrices: what it is called, and the way to it."""
 
     name: str
@@ -33,7 +33,7 @@ class Block(NamedTuple):
     path: Path
 
 
-class Naming(NamedTuple):
+class FrameNames(NamedTuple):
     """How frames are called that no key names.
 
     base: what all is seen from; alone: what a matrix outermost in the file belongs to; told: all names of `--frames`
@@ -49,15 +49,14 @@ class Naming(NamedTuple):
 class Matrices:
     """The poses of one document, and which of its matrices are none."""
 
-    def __init__(self, document: dict[str, Any], naming: Naming, answers: Answers, reading: Reading) -> None:
+    def __init__(self, document: dict[str, Any], naming: FrameNames, answers: Answers, reading: Reading) -> None:
         """Read all of it; raises Misfit."""
         self.naming = naming
         self.answers = answers
         self.reading = reading
         self.left: list[str] = []
         self.asked = 0
-        self.blocks = list(_renamed(_blocks(document, "", ()), naming))
-        self.names = [block.name for block in self.blocks]
+        self.blocks = _renamed(_blocks(document, "", ()), naming)
         self.poses = [pose for block in self.blocks for pose in self._of_block(block)]
 
     def edges(self) -> list[Edge]:
@@ -71,7 +70,7 @@ class Matrices:
         verb = "is no pose" if len(self.left) == 1 else "are no poses"
         return f"{count}; {', '.join(self.left[:MOST_TOLD])}{more} {verb}" if self.left else count
 
-    def _of_block(self, block: Block) -> Iterator[Stated]:
+    def _of_block(self, block: MatrixBlock) -> Iterator[Stated]:
         """Yield the poses of one map."""
         paired: set[str] = set()
         for key, value in block.entries.items():
@@ -86,7 +85,7 @@ class Matrices:
             elif (pose := self._single(block, key, value, grid)) is not None:
                 yield pose
 
-    def _single(self, block: Block, key: str, value: Any, grid: Grid | None) -> Stated | None:
+    def _single(self, block: MatrixBlock, key: str, value: Any, grid: Grid | None) -> Stated | None:
         """Return the pose under one key, if it is one."""
         path = (*block.path, key)
         whole = whole_pose(grid)
@@ -97,21 +96,21 @@ class Matrices:
             whole = whole_pose(grid._replace(rows=3, columns=4))
         if says and whole is None and (grid is not None or type(value) is not str):
             found = grid.size if grid else kind(value)
-            raise Misfit(f"{key}: expected a 4 x 4 or 3 x 4 matrix, found {found}", path)
+            raise Misfit(f"{bare(key)}: expected a 4 x 4 or 3 x 4 matrix, found {found}", path)
         if whole is None or (not says and no_pose(key)):
             self._leave(path, value, grid)
             return None
         if meaning is None or not says:
             meaning = self._directed(block, key, path, meaning)
         if isinstance(meaning, Ambiguous):
-            ways = " or ".join(f"{a},{b}" for a, b in meaning.names)
-            raise Unclear(f"{key} may name its two frames in several ways; give --frames {ways}", path, key=True)
+            ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
+            raise Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {ways}", path, key=True)
         if "" in (meaning.target, meaning.source):
-            raise Misfit(f"{key}: there is no camera before {block.name}", path, key=True)
+            raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
         components = within(path, read_whole, whole, self.reading)
         return Stated(*meaning[:3], components, path, chained=key == "T_cn_cnm1")
 
-    def _known(self, block: Block) -> dict[str, str]:
+    def _known(self, block: MatrixBlock) -> dict[str, str]:
         """Return the names that the templates of the table stand for."""
         base = self.naming.base or "imu"
         body = self.naming.base or "body"
@@ -119,15 +118,18 @@ class Matrices:
         me = block.name or self.naming.alone
         return {"me": me, "before": self._before(block), "imu": base, "body": body, "sensor": inertial}
 
-    def _before(self, block: Block) -> str:
+    def _before(self, block: MatrixBlock) -> str:
         """Return the camera before this one: cam0 of cam1; else the block before it; "" if there is none."""
-        at = self.names.index(block.name)
-        if not self.naming.blocks and (match := re.fullmatch(r"(.*?)([0-9]+)", block.name)):
-            lower = f"{match[1]}{int(match[2]) - 1}"
-            return lower if lower in self.names else ""
-        return self.names[at - 1] if at > 0 else ""
+        around, own = block.path[:-1], block.path[-1] if block.path else ""
+        beside = {each.path[-1]: each.name for each in self.blocks if each.path and each.path[:-1] == around}
+        if match := re.fullmatch(r"(.*?)([0-9]+)", str(own)):
+            return beside.get(f"{match[1]}{int(match[2]) - 1}", "")
+        earlier = [*beside.values()][: [*beside].index(own)] if own in beside else []
+        return earlier[-1] if earlier else ""
 
-    def _directed(self, block: Block, key: str, path: Path, named: Meaning | Ambiguous | None) -> Meaning | Ambiguous:
+    def _directed(
+        self, block: MatrixBlock, key: str, path: Path, named: Meaning | Ambiguous | None
+    ) -> Meaning | Ambiguous:
         """Return what a key means that does not say its direction, as it was told; raises Unclear if it was not."""
         if isinstance(named, Ambiguous):
             return named
@@ -144,12 +146,13 @@ class Matrices:
         """Return the direction that was told for two frames; raises Unclear if none was."""
         if not self.answers.direction:
             one, other = DIRECTIONS
-            ways = f"--direction {one} (takes points of {child} to {parent}) or {other} (of {parent} to {child})"
+            a, b = bare(parent), bare(child)
+            ways = f"--direction {one} (takes points of {b} to {a}) or {other} (of {a} to {b})"
             raise Unclear(f"{shown(what)}: the key does not say its direction: give {ways}", path, key=True)
         ends = (parent, child) if self.answers.direction == DIRECTIONS[0] else (child, parent)
         return Meaning(*ends, child)
 
-    def _pair(self, block: Block, key: str, turn: Grid, pair: Pair) -> Stated:
+    def _pair(self, block: MatrixBlock, key: str, turn: Grid, pair: Pair) -> Stated:
         """Read a rotation and the translation beside it."""
         path, place = (*block.path, key), (*block.path, pair.translation)
         shift = within(place, grid_of, block.entries[pair.translation])
@@ -178,24 +181,26 @@ class Matrices:
         is_matrix = grid is not None and (grid.rows > 1 or type(value) is dict)
         if is_matrix or any(is_tagged(value, tag) for tag in TAGS):
             what = no_pose(str(path[-1]))
-            self.left.append(f"{dotted(path)} ({what})" if what else dotted(path))
+            self.left.append(f"{bare(dotted(path))} ({what})" if what else bare(dotted(path)))
 
 
-def _renamed(blocks: Iterator[Block], naming: Naming) -> Iterator[Block]:
-    """Yield the blocks, those that hold cameras under the names that were told."""
-    names = iter(naming.blocks)
-    for block in blocks:
-        is_camera = block.name and not block.name.startswith("imu") and any(map(_is_pose, block.entries))
-        yield block._replace(name=next(names, block.name)) if is_camera else block
+def _renamed(blocks: Iterator[MatrixBlock], naming: FrameNames) -> list[MatrixBlock]:
+    """Return the blocks, those of cameras under the names that were told: cam0 has the first of them."""
+    found = list(blocks)
+    cameras = [block for block in found if block.name and not block.name.startswith("imu") and _looks_posed(block)]
+    numbered = sorted(cameras, key=lambda block: [int(number) for number in re.findall(r"[0-9]{1,9}", block.name)])
+    told = {block.path: name for block, name in zip(numbered, naming.blocks, strict=False)}
+    return [block._replace(name=told.get(block.path, block.name)) for block in found]
 
 
-def _is_pose(key: str) -> bool:
-    return key.startswith("T_")
+def _looks_posed(block: MatrixBlock) -> bool:
+    """Tell whether a block has a pose or is that of a camera, whose first in a chain has none."""
+    return any(key.startswith("T_") for key in block.entries) or block.name.startswith("cam")
 
 
-def _blocks(entries: dict[str, Any], name: str, path: Path, depth: int = 0) -> Iterator[Block]:
+def _blocks(entries: dict[str, Any], name: str, path: Path, depth: int = 0) -> Iterator[MatrixBlock]:
     """Yield a map and the maps in it; those of a list by its name and their number."""
-    yield Block(name, entries, path)
+    yield MatrixBlock(name, entries, path)
     for key, value in entries.items():
         here = (*path, key)
         if depth > 8:

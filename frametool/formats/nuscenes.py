@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
 from frametool.documents.input_file import InputFile
-from frametool.errors import FormatError, shown
+from frametool.errors import FormatError, bare, shown
 from frametool.formats.document_edges import document_edges
 from frametool.formats.matrix_values import grid_of, read_turn
 from frametool.geometry.representations import notation
@@ -90,7 +90,7 @@ def _about(count: int, several: list[str], *, named: bool) -> str:
     if not named:
         told += f" called by their tokens ({NAMES} has the names: --with it)"
     if several:
-        told += f", those of several poses as {several[0]}/TOKEN"
+        told += f", those of several poses as {bare(several[0])}/TOKEN"
     return told
 
 

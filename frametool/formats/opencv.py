@@ -21,7 +21,7 @@ from frametool.documents.xml_events import XmlFile
 from frametool.documents.yaml_writer import flow
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.document_edges import Unclear, answerable, document_edges, remember
-from frametool.formats.keyed_matrices import Matrices, Naming
+from frametool.formats.keyed_matrices import FrameNames, Matrices
 from frametool.formats.matrix_keys import Meaning, meaning_of
 from frametool.formats.opencv_text import HEAD, TAGS, StoredXml, made_ordinary
 from frametool.formats.written_poses import Precision, rows_of, standing_edges, tell_lonely_roots
@@ -46,7 +46,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
         told = options.answers.frames
-        naming = Naming(base=told[0] if told else "", alone="cam", told=told)
+        naming = FrameNames(base=told[0] if told else "", alone="cam", told=told)
         matrices = Matrices(as_mapping(value, "matrices by name"), naming, options.answers, reading)
         if not matrices.poses:
             found = f"; {', '.join(matrices.left[:3])}" if matrices.left else ""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 HEAD = "%YAML:1.0"
 TAGS = frozenset(("!!opencv-matrix", "!!opencv-nd-matrix", "!!opencv-sparse-matrix"))
 DEEPEST = 100  # elements
+_HEAD = r"\s*%(?=YAML:1\.[0-9])"
 _TIGHT_KEY = r"(?m)^( *(?:- +)*[\w.-]+):(?=[^\s:/])"
 
 
@@ -23,8 +24,9 @@ def made_ordinary(file: InputFile) -> InputFile:
 
     Places in the text stay where they are, but one to the right behind a colon without a blank.
     """
-    if file.text.startswith(HEAD):
-        file.text = "#" + re.sub(_TIGHT_KEY, r"\1: ", file.text[1:])
+    if match := re.match(_HEAD, file.text):
+        at = match.end() - 1
+        file.text = f"{file.text[:at]}#" + re.sub(_TIGHT_KEY, r"\1: ", file.text[at + 1 :])
     return file
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import Source
 from frametool.errors import BadAnswer, FormatError, ValueInvalid, shown
-from frametool.formats.joints import TURNING, JointValue, followed, motion, read_value
+from frametool.formats.joints import IDENTITY, TURNING, JointValue, followed, motion, read_value
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge
@@ -66,7 +66,8 @@ class Posture:
     def edges(self, parent: str, child: str, origin: Rigid, joint: str, line: int = 0) -> Iterator[Edge]:
         """Yield the edge across one joint: for good, or a sample at each time; `origin` is the pose at rest."""
         for stamp_ns, (moved,) in self.motions(joint):
-            yield Edge(parent, child, rigid.compose(*origin, *moved), stamp_ns, line)
+            pose = origin if moved is IDENTITY else rigid.compose(*origin, *moved)
+            yield Edge(parent, child, pose, stamp_ns, line)
 
     def motions(self, *names: str) -> Iterator[tuple[int | None, tuple[Rigid, ...]]]:
         """Yield what joints do together to the frames behind them: once without a stamp, or at each of their times.
@@ -158,7 +159,11 @@ class Posture:
 
     def _follow(self, fail: Fail) -> None:
         """Give each joint that nobody told of its leader's value, along chains of any length, or that at rest."""
-        for name in self.joints:
+        for name, joint in self.joints.items():
+            if joint.mimic is None:
+                if name not in self.given:
+                    self.still[name] = joint.start
+                continue
             chain = {name: None}
             last = name
             while (leader := self._leader(last, fail)) is not None:
@@ -202,8 +207,9 @@ class Posture:
 
     def _tell_limits(self) -> None:
         """Note the values told that lie beyond limits, and steps that a pose cannot follow."""
-        for name, joint in self.joints.items():
-            series = self.moving.get(name) or ({0: self.still[name]} if name in self.still else {})
+        for name in (*self.still, *self.moving):
+            joint = self.joints[name]
+            series = self.moving.get(name) or {0: self.still[name]}
             values = [value.plain for value in series.values() if isinstance(value, JointValue)]
             if joint.lower is not None and joint.upper is not None and joint.lower <= joint.upper:
                 beyond = [value for value in values if not joint.lower - SLACK <= value <= joint.upper + SLACK]

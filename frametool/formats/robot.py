@@ -74,6 +74,11 @@ class Robot:
         down, up = edges_between(base, tip, self._parent)
         return Chain([self.links[child] for child in down], [self.links[child] for child in reversed(up)], self.joints)
 
+    def __repr__(self) -> str:
+        """Return how many frames and joints there are, and the roots."""
+        counts = f"{len(self.frames)} frames, {len(self.joints)} joints"
+        return f"Robot({counts}, roots: {', '.join(self.roots) or 'none'})"
+
     def _parent(self, frame: str) -> str | None:
         link = self.links.get(frame)
         return link.parent if link else None

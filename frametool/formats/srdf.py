@@ -16,7 +16,7 @@ from frametool.documents.source import Source
 from frametool.documents.xml_events import XmlFile
 from frametool.errors import FormatError, Unanswered, alternatives, bare, shown
 from frametool.formats.joint_files import Setting
-from frametool.formats.joints import Joint
+from frametool.formats.joints import IDENTITY, Joint
 from frametool.formats.posture import Posture
 from frametool.grammar.edges import Edge
 
@@ -25,11 +25,9 @@ if TYPE_CHECKING:
 
     from frametool.documents.input_file import InputFile
     from frametool.documents.xml_events import Element
-    from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path
 
-IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 KINDS = ("fixed", "planar", "floating")
 PARTED = "/"  # between group and state, where a state's name alone is not enough
 

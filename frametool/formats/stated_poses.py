@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import degrees
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import shown
+from frametool.errors import bare, shown
 from frametool.formats.document_edges import dotted
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge
@@ -109,9 +109,9 @@ def _compare(known: Rigid, each: Stated, first: Stated | None, reading: Reading)
     metres, radians = rigid.distance(*known, *each.components, floats)
     if metres <= AGREEMENT and radians <= AGREEMENT:
         return
-    other = f"{dotted(first.path)}" if first else "the others"
+    other = bare(dotted(first.path)) if first else "the others"
     message = f"differs from {other} by {metres * 1000.0:.6g} mm and {degrees(radians):.6g} degrees"
     if first and (metres > TOLERATED or radians > TOLERATED):
-        raise Misfit(f"{dotted(each.path)} {message}; keep one", each.path, key=True)
+        raise Misfit(f"{bare(dotted(each.path))} {message}; keep one", each.path, key=True)
     reading.here = ()
     reading.note(f"{message}; {other} {'is' if first else 'are'} used", *each.path)

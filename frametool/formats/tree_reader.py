@@ -10,6 +10,7 @@ Metres, radians unless said; every pose is that of the frame in its parent: pare
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
@@ -61,13 +62,19 @@ def without_slashes(edge: Edge, reading: Reading) -> Edge:
 
 
 def tell(source: Source, notes: list[Note], most: int = 10) -> None:
-    """Warn of what was noted while reading, each with its place; only count what exceeds `most`."""
-    places = locate_many(source.text, [note.path for note in notes[:most]])
-    for (line, column), note in zip(places, notes[:most], strict=True):
+    """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
+    firsts: dict[str, Note] = {}
+    for note in notes:
+        firsts.setdefault(note.message, note)
+    counts = Counter(note.message for note in notes)
+    told = list(firsts.values())[:most]
+    places = locate_many(source.text, [note.path for note in told])
+    for (line, column), note in zip(places, told, strict=True):
         place = source.name if isinstance(source, Pasted) else f"{source.name}:{line}:{column}"
-        warn(f"{place}: {note.message}")
-    if len(notes) > most:
-        warn(f"{source.name}: {len(notes) - most} more like these")
+        again = counts.pop(note.message) - 1
+        warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}")
+    if counts:
+        warn(f"{source.name}: {counts.total()} more like these")
 
 
 def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:

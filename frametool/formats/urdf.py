@@ -16,7 +16,7 @@ from frametool.documents.source import UTF16, Source
 from frametool.documents.xml_events import XmlFile
 from frametool.errors import FormatError, ValueInvalid, alternatives, bare, shown
 from frametool.formats import FORMATS
-from frametool.formats.joints import Joint, Mimic
+from frametool.formats.joints import IDENTITY, Joint, Mimic
 from frametool.formats.posture import Posture
 from frametool.geometry import euler, floats
 from frametool.geometry.quaternion import unit_vector
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Options
     from frametool.grammar.readers import Quaternion, Vector
 
-IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 PARTS = ("origin", "parent", "child", "axis", "limit", "mimic")
@@ -202,7 +201,9 @@ class _Reader:
         numbers = self.xml.numbers
         x, y, z = numbers(element, "xyz", 3, "0 0 0")
         roll, pitch, yaw = numbers(element, "rpy", 3, "0 0 0")
-        rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
+        rotation = IDENTITY[3:]
+        if roll or pitch or yaw:
+            rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
         if "quat_xyzw" in element.attributes:
             rotation = self._quaternion(element, rotation if "rpy" in element.attributes else None)
         return x, y, z, *rotation
@@ -233,13 +234,13 @@ class _Reader:
         x, y, z = self.xml.numbers(element, "xyz", 3, "1 0 0")
         if not (x or y or z):
             raise self.xml.error(element, f"joint {shown(name)} has the axis 0 0 0, which is no direction", "xyz")
-        return unit_vector(x, y, z, floats)
+        return (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
 
     def _limits(self, name: str, element: Element) -> tuple[float | None, float | None]:
         """Read lower and upper; one that is missing is 0, and no limits are none."""
-        if not {"lower", "upper"} & element.attributes.keys():
+        if not ("lower" in element.attributes or "upper" in element.attributes):
             return None, None
-        (lower,), (upper,) = (self.xml.numbers(element, end, 1, "0") for end in ("lower", "upper"))
+        (lower,), (upper,) = self.xml.numbers(element, "lower", 1, "0"), self.xml.numbers(element, "upper", 1, "0")
         if lower > upper:
             message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
             self.options.tally.note(Note("limit", message, ()), element.line)

@@ -9,12 +9,10 @@ from itertools import product
 from math import copysign, pi
 from typing import TYPE_CHECKING
 
-from frametool.errors import ValueInvalid, shown, warn
+from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.geometry import euler, floats, matrix, quaternion, rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
     from frametool.geometry.types import Rigid, Three
@@ -24,12 +22,14 @@ if TYPE_CHECKING:
 MOST_DECIMALS = 17
 
 
-def standing_edges(tree: FrameTree | TransformBuffer, form: str) -> Iterator[tuple[str, str, Rigid]]:
-    """Yield parent, child and pose of the edges of a tree that stands still; raises ValueInvalid if it moves."""
-    for track in tree.tracks():
-        if not track.standing:
-            raise ValueInvalid(f"{form} holds no frames that move, and {shown(track.child)} does; give --at TIME")
-        yield track.parent, track.child, track.components
+def standing_edges(tree: FrameTree | TransformBuffer, form: str) -> list[tuple[str, str, Rigid]]:
+    """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
+    tracks = list(tree.tracks())
+    if moving := next((track.child for track in tracks if not track.standing), None):
+        raise ValueInvalid(f"{form} holds no frames that move, and {shown(moving)} does; give --at TIME")
+    if not tracks:
+        raise ValueInvalid(f"{form} holds poses, and there is none: {listing(tree.frames)}")
+    return [(track.parent, track.child, track.components) for track in tracks]
 
 
 def tell_lonely_roots(tree: FrameTree | TransformBuffer, form: str) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf, isfinite
 
-from frametool.errors import ValueInvalid, alternatives, did_you_mean, shown
+from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown
 from frametool.geometry import axis_angle, euler, matrix, mrp, quaternion, rotvec, six_d
 
 TYPE_CHECKING = False
@@ -386,13 +386,21 @@ def notation(spec: str) -> Notation:
         bare, degrees = name[:-4], name.endswith("_deg")
     row = REPRESENTATIONS.get(bare)
     if row is None:
-        known = alternatives(bare, REPRESENTATIONS, "representations")
-        raise ValueInvalid(f"unknown representation {shown(bare)}{known}")
+        raise ValueInvalid(
+            f"unknown representation {shown(bare)}{_near_names(bare)} representations: {listing(REPRESENTATIONS)}"
+        )
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
     if colon and row.axes != NAMED_AXES:
         raise ValueInvalid(f"{bare} has no axes to name; only euler has: euler:{axes or 'rzyx'}")
     return Notation(spec, row, checked_axes(axes) if colon else None, degrees=degrees)
+
+
+def _near_names(name: str) -> str:
+    """Name the nearest representation, and those nearly as near that have the same numbers in another order."""
+    near = nearest(name, REPRESENTATIONS)
+    rivals = [each for each in near if {*REPRESENTATIONS[each].columns} == {*REPRESENTATIONS[near[0]].columns}]
+    return f"; did you mean {' or '.join(map(shown, rivals))}?" if near else ";"
 
 
 def notations(spec: str) -> tuple[Notation, ...]:
@@ -405,15 +413,21 @@ def checked_axes(axes: str) -> str:
     """Return the name of an Euler convention back if it is one; else raise ValueInvalid with those there are."""
     if axes in euler.AXES:
         return axes
-    near = _both_readings(axes.lower()) or did_you_mean(axes.lower(), euler.AXES) or ";"
+    near = _both_readings(axes.lower()) or _near_axes(axes.lower()) or ";"
     raise ValueInvalid(
         f"unknown Euler axes {shown(axes)}{near} s (static axes) or r (rotating axes) and three letters: "
         f"{', '.join(sorted(euler.AXES))}"
     )
 
 
+def _near_axes(axes: str) -> str:
+    """Name the nearest convention with the same first letter: static axes are never offered for rotating ones."""
+    return did_you_mean(axes, [each for each in euler.AXES if each[0] == axes[:1]])
+
+
 def _both_readings(letters: str) -> str:
-    """Name the two conventions that three bare letters may mean; nothing for other texts."""
+    """Name the two conventions that three letters may mean, bare or behind another than s and r; else nothing."""
+    letters = letters[1:] if letters[:1] not in ("s", "r") and f"r{letters[1:]}" in euler.AXES else letters
     if f"r{letters}" not in euler.AXES:
         return ""
     return f"; did you mean r{letters} (rotating axes, intrinsic) or s{letters} (static axes, extrinsic)?"

@@ -63,6 +63,11 @@ def relative(
     return tx, ty, tz, qx, qy, qz, qw
 
 
+def mirrored(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> Seven[N]:
+    """Return a pose as a mirror across y shows it: both its frames have left-handed axes then."""
+    return tx, -ty, tz, -x, y, -z, w
+
+
 def interpolate(
     atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
     btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N,

@@ -244,7 +244,8 @@ def _spelled_rows(rows: Rows, form: Notation) -> list[Any] | None:
         lengths = [len(rows[0])]
     if lengths == [3, size]:
         if size == 3:
-            raise ValueInvalid(f"two rows of 3 may be a pose or two rotations; write {{xyz: [..], {form.spec}: [..]}}")
+            hint = f"write {{xyz: [..], {form.representation.name}: ..}}"
+            raise ValueInvalid(f"two rows of 3 may be a pose or two rotations; {hint}")
         rows, lengths = [[*rows[0], *rows[1]]], [3 + size]
     if not set(lengths) <= {size, size + 3}:
         return None

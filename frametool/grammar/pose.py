@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001}
 TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
-DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg"))
+SPREAD = ("count", "distance_rms", "distance_max", "angle_rms", "angle_rms_deg", "angle_max", "angle_max_deg")
+VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angular_z")  # m/s, rad/s
+DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
 NAMES = frozenset(("name", "parent"))
+MOST_NAMED = 5  # unknown keys in one message
 POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", AXES_KEY))
 
 
@@ -116,14 +119,14 @@ def read_name(mapping: dict[str, Any], key: str) -> str | None:
 def read_angle_unit(value: Any) -> bool:
     """Read `angles: deg` or `angles: rad`; True for degrees."""
     if value not in ("deg", "rad"):
-        found = repr(value) if type(value) is str else kind(value)
+        found = kind(value)
         raise Misfit(f"angles must be deg or rad, found {found}", ("angles",))
     return bool(value == "deg")
 
 
 def _read_flag(value: Any) -> bool:
     if value not in ("true", "false"):
-        found = repr(value) if type(value) is str else kind(value)
+        found = kind(value)
         raise Misfit(f"inverse must be true or false, found {found}", ("inverse",))
     return bool(value == "true")
 
@@ -150,11 +153,17 @@ def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
     return first
 
 
+def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
+    """Name unknown keys, each with its hint, and count those beyond the first few."""
+    named = "; ".join(f"unknown key {shown(key)}{hint.replace('; ', ', ')}" for key, hint in hints[:MOST_NAMED])
+    return named if count <= MOST_NAMED else f"{named}; and {count - MOST_NAMED} more"
+
+
 def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:
     """Name every unknown key of an entry, each with its nearest known one."""
     known = POSE_KEYS.union(also)
     unknown = [key for key in mapping if key not in known]
     if unknown:
-        named = "; ".join(f"unknown key {shown(key)}{did_you_mean(key, known).replace('; ', ', ')}" for key in unknown)
+        named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[:MOST_NAMED]], len(unknown))
         choices = ", ".join(REPRESENTATIONS)
         raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)

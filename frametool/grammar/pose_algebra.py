@@ -8,9 +8,13 @@ from __future__ import annotations
 import math
 
 from frametool.errors import ValueInvalid, shown
-from frametool.geometry import floats, rigid
+from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from frametool.grammar.readers import Vector
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 
@@ -60,6 +64,17 @@ def relative_names(a: Pose, b: Pose) -> tuple[str | None, str | None]:
     """Return parent and name of B seen from A; raise ValueInvalid if they are given in different frames."""
     _refuse_two_parents(a, b)
     return a.name, b.name
+
+
+def turn_between(start: Vector, end: Vector) -> Result:
+    """Return the shortest rotation from one direction to another, with its angle in radians and degrees.
+
+    Raises ValueInvalid for a vector of length 0.
+    """
+    quaternion.check_directions(*start, *end)
+    turned = quaternion.between(*start, *end, floats)
+    angle = quaternion.angle(*turned, floats)
+    return Result(Pose(rotation=turned), {"angle": angle, "angle_deg": math.degrees(angle)})
 
 
 def interpolated(a: Pose, b: Pose, fraction: float) -> Pose:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, overheard, shown
+from frametool.errors import ValueInvalid, bare, overheard, shown
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import LIST, MAP, NAMED, NAMED_AXES, REPRESENTATIONS, ROWS, Notation, axes_name
 from frametool.geometry.representations import notation as parse_notation
@@ -208,7 +208,7 @@ def _take_named(notation: Notation, value: Any) -> Spelled:
     """Take a mapping by short names; a list would not say its order."""
     names = notation.names
     if type(value) is list:
-        numbers = ", ".join(map(str, value))
+        numbers = bare(", ".join(map(str, value)))
         others = [
             f"{name}: [..]" for name, row in REPRESENTATIONS.items()
             if row.shape == LIST and set(row.columns) == set(notation.representation.columns)
@@ -269,7 +269,7 @@ def _take_rows(notation: Notation, value: Any) -> Spelled:
     size = len(value)
     if size not in counts.values() or any(type(each) is not list or len(each) != size for each in value):
         lengths = ", ".join(str(len(each)) if type(each) is list else "no list" for each in value)
-        raise Misfit(f"expected {expected}, found {size} rows of lengths {lengths}")
+        raise Misfit(f"expected {expected}, found {size} rows of lengths {bare(lengths)}")
     places = [(at, column) for at in range(size) for column in range(size)]
     return notation, [text for each in value for text in each], places
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.documents.json_writer import dump
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 # rule -> (level, what it is about); an error fails, a warning fails under --strict, a note never
 RULES = {
@@ -47,6 +47,9 @@ RULES = {
 }
 
 
+MOST_LINES = 5  # of the further places of a finding
+
+
 class Finding(NamedTuple):
     """Something wrong or odd: the rule that says so, in words, and where."""
 
@@ -63,8 +66,23 @@ class Finding(NamedTuple):
 
 
 def write_text(findings: Iterable[Finding]) -> str:
-    """Return one line a finding, as compilers do."""
-    return "".join(f"{_place(each)}: {each.level}: {each.message} [{each.rule}]\n" for each in findings)
+    """Return one line a finding, as compilers do; what a file says in the same words stands there once."""
+    alike: dict[tuple[str, str, str], list[Finding]] = {}
+    for each in findings:
+        alike.setdefault((each.source, each.rule, each.message), []).append(each)
+    return "".join(
+        f"{_place(each)}: {each.level}: {each.message} [{each.rule}]{_further(more)}\n"
+        for each, *more in alike.values()
+    )
+
+
+def _further(more: Sequence[Finding]) -> str:
+    """Count the further places of a finding and name the first of them."""
+    if not more:
+        return ""
+    lines = list(dict.fromkeys(each.line for each in more if each.line))
+    named = ", ".join(map(str, lines[:MOST_LINES])) + ", .." * (len(lines) > MOST_LINES)
+    return f" (and {len(more)} more{f': lines {named}' if len(lines) > 1 else f': line {named}' if lines else ''})"
 
 
 def _place(finding: Finding) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError
+from frametool.formats.recordings import refuse_unknown_joints
 from frametool.frames.edge_log import EdgeLog, chain, common_interval
 from frametool.frames.no_data import frames_on
 from frametool.frames.stamps import BILLION
@@ -37,6 +38,7 @@ def monitor(
                 log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)
                 if edge.topic:
                     log.topics[edge.topic] = log.topics.get(edge.topic, 0) + 1
+    refuse_unknown_joints(files)
     if not logs:
         raise FormatError("no transforms in it", source=", ".join(file.name for file in files))
     if not ends:

@@ -70,7 +70,8 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
     places = locate_many(recording.text, [edge.path for edge in in_documents]) if in_documents else []
     for edge, (line, column) in zip(in_documents, places, strict=True):
         if edge.parent is not None:
-            yield _stated(edge, recording.name, line, column)
+            # here matrices and angles are written, and quaternions by names or always w first
+            yield _stated(edge, recording.name, line, column)._replace(looks_w_first=False)
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))

@@ -198,7 +198,7 @@ class _Pair:
         self.tolerance = tolerance
         in_b = frozenset(b.frames)
         self.common = [frame for frame in a.frames if frame in in_b]
-        self.notes: list[str] = []
+        self.notes = [] if self.common else ["no frame is in both A and B"]
         self.seen: dict[str, tuple[str, Apart]] = {}  # frame -> from where, how far it moved
         self.start: str | None = None  # from where all frames are seen, if that was told
 
@@ -341,7 +341,8 @@ def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
     if at_ns is not None or not (a.moves or b.moves):
         return
     told = " and ".join(f"{name} {format_stamp(_newest(tree))}" for name, tree in (("A", a), ("B", b)) if tree.moves)
-    yield f"what moves is compared at its latest ({told}), and sample by sample; --at TIME compares at one time"
+    also = ", and sample by sample" if a.moves and b.moves else ""
+    yield f"what moves is compared at its latest ({told}){also}; --at TIME compares at one time"
 
 
 def _newest(tree: Frames) -> int:

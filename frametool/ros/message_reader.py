@@ -7,7 +7,7 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.chunks import Piece, documents, lines
-from frametool.errors import FormatError
+from frametool.errors import FormatError, shown
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Misfit, Reading, as_mapping
 from frametool.ros import messages
@@ -149,7 +149,7 @@ def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict
         topic = str(mapping.get("topic") or f"op {mapping['op']}")
         tally.others[topic] = tally.others.get(topic, 0) + 1
     else:
-        keys = ", ".join(map(repr, list(mapping)[:8]))
+        keys = ", ".join(map(shown, list(mapping)[:8]))
         raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
 
 

@@ -43,7 +43,7 @@ _BEGIN = re.compile(
     rf"""(?x)\s*(?:
     (?:[A-Za-z_]\w*\s*=\s*)?                                # T =
     (?: [A-Za-z_][\w.]*\(\s*[-+.\d\[(A-Za-z_]               # array([[.., Quaternion(x=..
-      | [\[({{][\[({{\s]*(?:{NUMBER}(?:[\s;]|\s*[,\])}}])|np\.)  # [[1. 0., [1 0; 0 1], [0, 0, 0.7, 0.7]
+      | [\[({{][\[({{\s]*(?:(?:{NUMBER}|nan|-?inf)(?:[\s;]|\s*[,\])}}])|np\.)  # [[1. 0., [1 0; 0 1], [0, 0, 0.7, 0.7]
       | {NUMBER}(?:\s*[,;\n]|[ \t]+[-+.\d*]|\s*\Z)           # bare numbers, MATLAB's factor
       | [-+]?\s*(?:{DECIMAL})?\s*\*?\s*[ijk]\s*(?:[-+]|\Z) | {NUMBER}\s*[-+] )
     | <(?:origin|joint|node)\b | (?:args|x)\s*=

@@ -209,7 +209,7 @@ def _plan(request: Request) -> Plan:
     edge = request.way if request.operation.moves and request.timed is not None else None
     return Plan(
         (shape,), (target,), request.operation, (), ("x", "y", "z", "qx", "qy", "qz", "qw"), edge_of=edge,
-        normalize=request.normalize, on_error=request.on_error,
+        normalize=request.normalize, on_error=request.on_error, gathered=request.gathered,
         timed=request.timed if request.timed is not None and request.timed.name else None,
     )  # fmt: skip
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, floats, rigid
 from frametool.geometry.batch_validation import read_rotations
+from frametool.stream.beside import seconds_before, stamps_of, weights_of
 from frametool.stream.faults import NULL, STOP, Fault
-from frametool.stream.operation import ROW_BY_ROW
+from frametool.stream.operation import START
 from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, POSE, TURN, pose_of
 from frametool.stream.row_transforms import NOWHERE, by_frame, by_time
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Components, Rigid
+    from frametool.stream.gathering import Gathered
     from frametool.stream.operation import Formula, Operation
     from frametool.stream.row_layout import Shape, Target
     from frametool.stream.rows import Block
@@ -40,6 +42,7 @@ class Plan(NamedTuple):
     shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
     pieces: the text of a result; null: what stands for each number of a row without one
     edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
+    beside: the name of what is read beside the numbers, a stamp or a weight; gathered: takes the poses
     timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
     yaml: numbers need a point before the exponent; frame_column: the name of the column that names frames
     """
@@ -60,17 +63,19 @@ class Plan(NamedTuple):
     timed: Timed | None = None
     sources: tuple[str | None, ...] = ()
     frame_column: str = ""
+    beside: str = ""
+    gathered: Gathered | None = None
 
 
 class State:
-    """What one block leaves for the next: the row before, the first one, and how often each angle has turned around."""
+    """What one block leaves for the next: the row before, and how often each angle has turned around."""
 
-    __slots__ = ("angles", "previous", "start", "turns")
+    __slots__ = ("angles", "previous", "stamp_ns", "turns")
 
     def __init__(self) -> None:
         """Begin before the first row."""
         self.previous: list[float] | None = None
-        self.start: list[float] | None = None
+        self.stamp_ns: int | None = None
         self.angles: dict[int, float] = {}
         self.turns: dict[int, float] = {}
 
@@ -94,12 +99,18 @@ class Run:
         self.count = len(block.places)
         numbers = self._read()
         movers = self._movers()
+        self.lone: int | None = None
         with np.errstate(all="ignore"):
             moved = self._compute(list(np.ascontiguousarray(numbers.T)), movers, state)
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
-        if self.reasons:
-            self._keep(np.array([row not in self.reasons for row in range(self.count)], np.bool_))
+        weights = weights_of(self.block, plan.beside, self._blame) if plan.gathered and plan.beside else None
+        if self.reasons or self.lone is not None:
+            gone = {*self.reasons, self.lone}
+            self._keep(np.array([row not in gone for row in range(self.count)], np.bool_))
+        if plan.gathered:
+            kept = np.isin(np.arange(self.count), self.rows)
+            plan.gathered.take(plan.shapes[0], moved[0], kept, weights)
         if plan.unwrap and len(self.rows):
             _unwrap(self.results, plan.targets[0].angle_columns(), state)
 
@@ -139,11 +150,13 @@ class Run:
             frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
             edges = plan.edges or [None] * shapes
             if block.times is not None:
-                return [by_time(plan.timed, block.times, frames[0], self._blame, plan.frame_column)]
-            return [
+                return [by_time(plan.timed, block.times, frames[0], self._blame, plan.frame_column)] * shapes
+            each = slice(None, len(block.stamps))  # the rows of a table have one stamp for all their points
+            movers = [
                 by_time(plan.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
-                for stamps, names, edge in zip(block.stamps, frames, edges, strict=True)
+                for stamps, names, edge in zip(block.stamps, frames, edges[each], strict=True)
             ]
+            return movers * (shapes // len(movers))
         if plan.edge_of is not None and self.count:
             return [by_frame(plan.edge_of, block.frames, self._blame, plan.frame_column)] * shapes
         return list(plan.edges) or [None] * shapes
@@ -168,7 +181,9 @@ class Run:
                 pose = pose_of(shape.position(own), self._rotation(shape, own, first))
                 poses.append(rigid.inverse(*pose) if shape.inverse else pose)
                 if len(self.plan.targets) > 1 or operation.of != "pair":
-                    done = operation.pose(self._with_previous(poses.pop(), state), mover, arrays)
+                    done = operation.pose(self._with_before(poses.pop(), state), mover, arrays)
+                    if operation.velocity:
+                        done = operation.with_velocity(done, self._seconds(state), arrays)
                     moved.append((*done, *operation.covariance(shape, beside, mover)))
             first += shape.size
         if poses or not shapes:
@@ -212,13 +227,25 @@ class Run:
                 return error
         return "the result is not finite: the numbers are too large"
 
-    def _with_previous(self, pose: Rigid, state: State) -> list[Rigid]:
-        if self.plan.operation.of not in ROW_BY_ROW:
+    def _good(self) -> list[int]:
+        return [row for row in range(self.count) if row not in self.reasons]
+
+    def _with_before(self, pose: Rigid, state: State) -> list[Rigid]:
+        if not self.plan.operation.looks_back:
             return [pose]
-        good = [row for row in range(self.count) if row not in self.reasons]
-        if self.plan.operation.of == "start":
-            return _with_first(pose, good, state, self.count)
-        return _with_previous(pose, good, state, self.count)
+        with_before = _with_first if self.plan.operation.of == START else _with_previous
+        return with_before(pose, self._good(), state, self.count)
+
+    def _seconds(self, state: State) -> Floats:
+        """Return the time since the good row before each; the very first row has no velocity and no result."""
+        name = self.plan.beside
+        stamps = stamps_of(self.block, name, self._blame)
+        good = self._good()
+        seconds = seconds_before(stamps, good, state.stamp_ns, name, self._blame)
+        if good:
+            self.lone = good[0] if state.stamp_ns is None else None
+            state.stamp_ns = int(stamps[good[-1]])
+        return seconds
 
     def _rotation(self, shape: Shape, numbers: list[Floats], first: int) -> Components:
         if shape.notation is None:
@@ -290,7 +317,7 @@ class Run:
 
     def _written(self) -> list[tuple[Ints, list[Spans]]]:
         plan, rows = self.plan, self.rows
-        if not len(rows):
+        if not len(rows) or plan.gathered:
             return []
         values = None
         if self.results.shape[1]:
@@ -334,20 +361,6 @@ def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]
     return []
 
 
-def rigid_of(parts: Sequence[Any]) -> Rigid:
-    """Return seven parts as the tuple they are."""
-    tx, ty, tz, x, y, z, w = parts
-    return tx, ty, tz, x, y, z, w
-
-
-def _with_first(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
-    """Return the very first good row, for each row, and the row."""
-    full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
-    if state.start is None and good:
-        state.start = [float(part[good[0]]) for part in full]
-    return [pose if state.start is None else rigid_of(state.start), rigid_of(full)]
-
-
 def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
     """Return the good row before each row, and the row; the very first row's is itself."""
     full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
@@ -361,6 +374,17 @@ def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -
             part[: kept[0] + 1] = value
     state.previous = [float(part[kept[-1]]) for part in full]
     return [tuple(earlier), tuple(full)]
+
+
+def _with_first(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
+    """Return the first good row of the stream for each row, and the row."""
+    full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
+    if state.previous is None and good:
+        state.previous = [float(part[good[0]]) for part in full]
+    if state.previous is None:
+        return [pose, pose]
+    first = [np.full(count, value) for value in state.previous]
+    return [tuple(first), tuple(full)]  # type: ignore[list-item]
 
 
 def _unwrap(results: Floats, angles: Sequence[tuple[int, float]], state: State) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from frametool.geometry import quaternion, rigid, spatial
+from frametool.geometry import quaternion, rigid, rotvec, spatial
 from frametool.geometry.trig import RADIAN
+from frametool.grammar.pose import VELOCITY
 from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH
 
 if TYPE_CHECKING:
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.row_layout import Shape
 
-ROW_BY_ROW = ("previous", "start")  # what a row is compared with is another row
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
+START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
 
 
 def _turn(_x: Number, _y: Number, _z: Number, *numbers: Number) -> Components:
@@ -73,11 +74,12 @@ class Operation(NamedTuple):
     left, right: applied as left @ row @ right[0] @ right[1] ..
     inverse: the row itself is inverted first
     of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
-        "pair" the two poses of a row, "previous" the row before and this one,
-        "start" the very first row and this one
+        "pair" the two poses of a row, "previous" the row before and this one, "start" the first row and this one
+    velocity: of "previous" also the twist that leads from one row to the next in the time between them
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
-    turns: only the rotation changes; the position, if there is one, stays as it is
+    turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
+    mirrors: the row is seen in a mirror across y, before all that stands on its left
     before: each pose is multiplied with this one from the right before anything else: the axes of a camera
     formula: an expression, instead of all this
     """
@@ -89,6 +91,8 @@ class Operation(NamedTuple):
     fixed: Rigid | None = None
     moves: bool = False
     turns: bool = False
+    mirrors: bool = False
+    velocity: bool = False
     before: Rigid | None = None
     formula: Formula | None = None
 
@@ -96,7 +100,7 @@ class Operation(NamedTuple):
         """Name the numbers that come beside the result of a row of some kind."""
         if self.formula is not None:
             return self.formula.extras(kind)
-        return RELATIVE_EXTRAS if self.of and kind == POSE else ()
+        return RELATIVE_EXTRAS + VELOCITY * self.velocity if self.of and kind == POSE else ()
 
     def result_kind(self, kind: str) -> str:
         """Return what a row of some kind becomes; "" for numbers alone."""
@@ -113,6 +117,11 @@ class Operation(NamedTuple):
         return self.formula is not None and self.formula.adds
 
     @property
+    def looks_back(self) -> bool:
+        """Tell whether a row's result depends on the rows before it."""
+        return self.of in (START, PREVIOUS)
+
+    @property
     def changes_nothing(self) -> bool:
         """Tell whether rows only change their notation."""
         return self._is_bare and not self.inverse
@@ -120,7 +129,7 @@ class Operation(NamedTuple):
     @property
     def keeps_position(self) -> bool:
         """Tell whether positions stay as they are written."""
-        return self.changes_nothing or self.turns
+        return self.changes_nothing or (self.turns and self.left is None and not self.mirrors)
 
     @property
     def only_inverts(self) -> bool:
@@ -129,7 +138,7 @@ class Operation(NamedTuple):
 
     @property
     def _is_bare(self) -> bool:
-        return not (self.left or self.right or self.of or self.moves or self.before)
+        return not (self.left or self.right or self.of or self.moves or self.mirrors or self.before)
 
     def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
         """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
@@ -154,6 +163,8 @@ class Operation(NamedTuple):
         if self.before is not None:
             poses = [rigid.compose(*pose, *self.before) for pose in poses]
         result: Rigid = rigid.inverse(*poses[0]) if self.inverse else poses[0]
+        if self.mirrors:
+            result = rigid.mirrored(*result)
         left = edge or self.left
         if left is not None:
             result = rigid.compose(*left, *result)
@@ -166,6 +177,15 @@ class Operation(NamedTuple):
         result = rigid.relative(*first, *second)
         metres, angle = rigid.extent(*result, xp)
         return *result, metres, angle, angle * RADIAN
+
+    @staticmethod
+    def with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Components:
+        """Add the body twist that makes this step in so many seconds, seen in the first of the two frames.
+
+        Linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt: position and rotation on their own.
+        """
+        turned = rotvec.from_quaternion(parts[3], parts[4], parts[5], parts[6], xp)
+        return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
 
     def _pair(self, poses: Sequence[Rigid]) -> tuple[Rigid, Rigid]:
         if self.of == "first" and self.fixed is not None:

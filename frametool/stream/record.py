@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
-from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position
+from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position, unknown_keys
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
 from frametool.ros import joint_state
@@ -40,6 +40,7 @@ PARENT_KEYS = ("parent", "frame", "frame_id", "parent_frame_id")  # the frame a 
 NAME_KEYS = ("name", "child_frame_id")  # what a pose is the pose of
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
 XYZ = ("x", "y", "z")
+MOST_KEYS = 8  # named in a message
 QUATERNION = (*XYZ, "w")
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 
@@ -120,14 +121,16 @@ def _nothing_in(document: Any) -> Misfit:
     near = [(key, found) for key in document if key not in POSE_KEYS and (found := did_you_mean(key, wanted))]
     if near:
         return _unknown(near)
-    keys = f"the keys {', '.join(map(repr, document))}"
+    keys = f"the keys {', '.join(map(shown, list(document)[:MOST_KEYS]))}"
+    if len(document) > MOST_KEYS:
+        keys += f" and {len(document) - MOST_KEYS} more"
     wanted_here = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
     return Misfit(f"expected {wanted_here}, found {keys}")
 
 
 def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
     """Build the error for keys that are nearly known."""
-    named = "; ".join(f"unknown key {shown(key)}{hint.replace('; ', ', ')}" for key, hint in near)
+    named = unknown_keys(near, len(near))
     choices = ", ".join(REPRESENTATIONS)
     return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (near[0][0],), key=True)
 

@@ -248,6 +248,8 @@ class RecordBlocks:
             unwrap=request.unwrap,
             yaml=self.form == "yaml",
             timed=template.timed(request),
+            beside=template.beside if request.beside is not None else "",
+            gathered=request.gathered,
             sources=tuple(entry.record.parent.text for entry in template.entries),
         )
 

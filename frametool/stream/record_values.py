@@ -6,6 +6,7 @@ The records, the operation and what is said of them are those of streams; only t
 from __future__ import annotations
 
 import re
+from collections import Counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import parse_documents
@@ -20,11 +21,12 @@ from frametool.geometry import floats
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, Reading
 from frametool.grammar.result import Result
+from frametool.stream.memory import Memory
 from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, placed, value_at
 from frametool.stream.request import Request
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
-from frametool.stream.stamp_source import key_path, read_stamp, stamp_keys
+from frametool.stream.stamp_source import in_nanoseconds, key_path, read_header_stamp, read_stamp, stamp_keys
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     Value = Result | dict[str, Any]
 
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
+MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
 
@@ -78,30 +81,44 @@ def pose_of(record: Record, request: Request) -> Pose:
 
 
 def documents(source: Source, request: Request) -> Iterator[tuple[Document, list[Record]]]:
-    """Yield the documents of a text with their records, and warn of what is odd in them, each with its place."""
+    """Yield the documents of a text with their records, and warn of what is odd in them, with its place.
+
+    What is odd in many poses, by one rule, is told of the first few and then counted.
+    """
+    told: Counter[str] = Counter()
     for document in parse_documents(source.text, source.name):
         reading = Reading(source, degrees=request.degrees, normalize=request.normalize)
         try:
             records = list(find_records(document.value, request, reading, (document.index,)))
         except Misfit as misfit:
             raise placed(misfit, source) from misfit
-        tell(source, reading.notes)
+        new = []
+        for note in reading.notes:
+            told[note.rule] += 1
+            if told[note.rule] <= MOST_TOLD:
+                new.append(note)
+        tell(source, new)
         yield document, records
+    if more := sum(max(count - MOST_TOLD, 0) for count in told.values()):
+        warn(f"{source.name}: {more} more like these")
 
 
-def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
+def results(source: Source, request: Request, style: Style, memory: Memory | None = None) -> Iterator[Value]:
     """Yield the results of every record of a text in a form: poses with what else their records say, or messages.
 
+    memory: of the records before this text.
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
     from frametool.documents.nodes import parse_nodes
 
     nodes: list[Node] = []
     found = False
+    memory = memory or Memory()
     for document, records in documents(source, request):
         found = True
         nodes = nodes or parse_nodes(source.text)
-        answers = [_answer(record, request, source) for record in records]
+        read = [_answer(document, record, request, source, memory) for record in records]
+        answers = [answer for answer in read if answer is not None]
         for unit in dict.fromkeys(_unit(answer.record, document.value) for answer in answers):
             ours = [answer for answer in answers if answer.record.path[: len(unit)] == unit]
             yield from _values(_at(nodes, unit), unit, ours, request, style, source)
@@ -114,8 +131,10 @@ def _unit(record: Record, document: Any) -> Path:
     return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
 
 
-def _answer(record: Record, request: Request, source: Source) -> Answer:
-    """Apply the operation to one record."""
+def _answer(
+    document: Document, record: Record, request: Request, source: Source, memory: Memory
+) -> Answer | None:
+    """Apply the operation to one record; the first of all has no velocity and so no result."""
     request = request.for_kind(record.shape.kind)
     try:
         parent, name = record.parent.text, record.name.text
@@ -127,10 +146,26 @@ def _answer(record: Record, request: Request, source: Source) -> Answer:
             at_ns = _asked_time(record, request, source)
             parts, _ = moved(record, None, record.values, request, at_ns)
         else:
-            parts, _ = moved(record, _edge(record, request, source), record.values, request)
+            parts, _ = moved(record, _edge(record, request, source), record.values, request, memory=memory)
+        if request.operation.velocity:
+            seconds = memory.step(_beside_ns(document, record, request))
+            if seconds is None:
+                return None
+            parts = request.operation.with_velocity(parts, seconds, floats)
+    except Misfit as misfit:
+        raise placed(misfit, source) from misfit
     except ValueInvalid as error:
         raise placed(Misfit(str(error), record.path), source) from error
     return Answer(record, parts, parent, name)
+
+
+def _beside_ns(document: Document, record: Record, request: Request) -> int:
+    """Return the stamp that stands beside a record."""
+    from frametool.stream.template import beside_path
+
+    paths = beside_path(document, record, request.beside or "")
+    texts = [str(value_at(document.value, path[1:])) for path in paths]
+    return read_header_stamp(*texts) if len(texts) > 1 else read_stamp(*texts, in_ns=in_nanoseconds(str(paths[0][-1])))
 
 
 def _edge(record: Record, request: Request, source: Source) -> Rigid | None:
@@ -231,7 +266,7 @@ def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Re
     shape = answer.record.shape
     operation = request.operation
     pose = Pose.of(answer.parts[:7], answer.name, answer.parent)
-    if operation.keeps_position or operation.only_inverts:
+    if operation.keeps_position or operation.only_inverts or operation.turns:
         has_position = shape.whole or shape.unit is not None
         has_rotation = shape.notation is not None or operation.turns or request.notations
         pose = pose._replace(
@@ -346,6 +381,7 @@ def stream_results(
 
     splitter = Splitter(form)
     line, rows = 1, 0
+    memory = Memory()
     for block in read_blocks(stream, whole=splitter.whole):
         for part in splitter.parts(block).parts:
             rows += 1
@@ -355,7 +391,7 @@ def stream_results(
                 continue
             try:
                 text = decode(block[part.start : part.end], bad.source)
-                yield from results(Source(bad.source, text), request, style)
+                yield from results(Source(bad.source, text), request, style, memory)
             except FormatError as error:
                 bad.take([Fault(at + max(error.line, 1) - 1, str(error.column or ""), error.message)])
             except FrametoolError as error:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.stream.faults import STOP
-from frametool.stream.operation import ROW_BY_ROW, Operation
+from frametool.stream.operation import Operation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
+    from frametool.stream.gathering import Gathered
     from frametool.stream.stamp_source import Timed
 
 
@@ -19,7 +20,7 @@ class Request(NamedTuple):
     """What one run does with its rows and how it writes the results.
 
     poses: how many poses each row holds; 0 where rows only name frames
-    kind: what rows are taken for; "" as they look
+    kind: what rows are taken for; "" as they look; kinds: of each of several points or poses in a row
     given: the notation of their rotations
     degrees: whether bare angles are in degrees
     notations: those of the result; none means as read
@@ -33,12 +34,15 @@ class Request(NamedTuple):
     rename: turns a record's (parent, name) into those of its result
     counters: a decimal `frame` is a counter, because no frame is called so
     unwrap: angles go on beyond half a turn
+    beside: the column or key of a number that is read beside the pose: its stamp or weight; "" is the usual stamp
+    gathered: takes the poses, nothing is written then
     whole: all numbers of a result are wanted, also those that do not change
     """
 
     operation: Operation = Operation()
     poses: int = 1
     kind: str = ""
+    kinds: tuple[str, ...] = ()
     given: Notation | None = None
     degrees: bool = False
     normalize: bool = False
@@ -56,13 +60,15 @@ class Request(NamedTuple):
     told: str | None = None
     counters: bool = True
     unwrap: bool = False
+    beside: str | None = None
+    gathered: Gathered | None = None
     on_error: str = STOP
     whole: bool = False
 
     @property
     def in_order(self) -> bool:
         """Tell whether a row's result depends on the rows before it."""
-        return self.unwrap or self.operation.of in ROW_BY_ROW
+        return self.unwrap or self.operation.looks_back or self.gathered is not None
 
     def for_kind(self, kind: str) -> Request:
         """Return what is asked of rows of one kind: how an expression names its result depends on it."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Components, Quaternion, Rigid
+    from frametool.stream.memory import Memory
     from frametool.stream.operation import Formula
     from frametool.stream.record import Record
     from frametool.stream.request import Request
@@ -76,9 +77,13 @@ def _movers(template: Template, request: Request) -> tuple[list[Rigid | None], l
 
 
 def moved(
-    record: Record, edge: Rigid | None, values: Sequence[float], request: Request, at_ns: int | None = None
+    record: Record, edge: Rigid | None, values: Sequence[float], request: Request, at_ns: int | None = None,
+    memory: Memory | None = None,
 ) -> tuple[Components, bool]:
-    """Apply the operation to one record; return also whether its rotation had to be normalised."""
+    """Apply the operation to one record; return also whether its rotation had to be normalised.
+
+    memory: of the records before, where it is compared with one of them
+    """
     shape = record.shape
     own = values[: shape.own_size]
     if request.operation.formula is not None:
@@ -88,7 +93,9 @@ def moved(
         return request.operation.move(shape, (*start, *values[shape.own_size :]), edge), False
     rotation, odd = checked_rotation(shape, own, normalize=request.normalize)
     pose: Rigid = pose_of(shape.position(own), rotation)
-    result = request.operation.pose([rigid.inverse(*pose) if record.inverse else pose], edge, floats)
+    pose = rigid.inverse(*pose) if record.inverse else pose
+    poses = memory.pair(request.operation.of, pose) if memory and request.operation.looks_back else [pose]
+    result = request.operation.pose(poses, edge, floats)
     beside = request.operation.covariance(shape, tuple(values[shape.own_size :]), edge)
     return (*result, *beside), bool(odd)
 

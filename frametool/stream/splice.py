@@ -132,7 +132,7 @@ class Splicer:
     def _stays_a_list(self) -> bool:
         """Tell whether a result has the numbers of the bare list it comes from and no others."""
         has_place = self.target.unit is None or self.record.shape.unit is not None
-        told = self.request.operation.extras if self.record.shape.kind == POSE else ()
+        told = self.request.operation.extras(self.record.shape.kind)
         return self._same_rotation() and has_place and not told
 
     def _same_rotation(self) -> bool:

@@ -45,7 +45,7 @@ class Timed(NamedTuple):
     @property
     def in_ns(self) -> bool:
         """Tell whether the name says that stamps are integer nanoseconds."""
-        return self.name.endswith("_ns") or self.name in NANOSECONDS
+        return in_nanoseconds(self.name)
 
     @property
     def column(self) -> str:
@@ -61,6 +61,11 @@ class Timed(NamedTuple):
 def _by_expression(_frame: str | None, _at: Any) -> Any:
     """Move nothing: what an expression looks up it looks up itself."""
     raise ValueInvalid("an expression does its own look-ups")
+
+
+def in_nanoseconds(name: str) -> bool:
+    """Tell whether the name of stamps says that they are integer nanoseconds."""
+    return name.endswith("_ns") or name in NANOSECONDS
 
 
 def read_header_stamp(seconds: str, nanoseconds: str) -> int:

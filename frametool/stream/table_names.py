@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import FrametoolError
-from frametool.stream.operation import ROW_BY_ROW
 from frametool.stream.output_columns import NAME, PARENT, quoted
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -59,7 +58,7 @@ class Naming:
         may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.frames
         self.counts = request.counts if may_count else None
         self.rename = rename_of(request)
-        self.consecutive = request.operation.of in ROW_BY_ROW
+        self.consecutive = request.operation.looks_back
         self.before: str | None = None
 
     def of_block(self, cells: Cells) -> BlockNames:
@@ -149,7 +148,7 @@ def rename_of(request: Request) -> Rename | None:
         return request.rename
     if request.operation.moves:
         return lambda _parent, name: (request.told, name)
-    if request.operation.of in ROW_BY_ROW:
+    if request.operation.looks_back:
         return lambda _parent, name: (name, name)
     return (lambda _parent, _name: (None, None)) if request.operation.of == "pair" else None
 

@@ -30,7 +30,7 @@ NAMES = ("child_frame_id", "name")
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find_if_read(table, request, source)
-    only_turned = not request.operation.moves and request.operation.keeps_position
+    only_turned = not request.operation.moves and request.operation.keeps_position and request.gathered is None
     if request.poses == 1 and only_turned and not request.whole:
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
@@ -38,7 +38,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
     request = request.for_kind(shapes[0].kind) if shapes else request
-    target = _target(shapes, request)
+    several = request.operation.moves and len(shapes) > 1
+    targets = tuple(_target([shape], request) for shape in shapes) if several else (_target(shapes, request),)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *asked)
     frames = _frame_columns(table, request, source)
     stays = not request.poses or (request.operation.moves and request.rename is None)
@@ -47,15 +48,17 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     if frames and edge_of is None and request.operation.moves:
         edge_of = request.way
     named = {frames[0]: PARENT} if frames and request.poses else {}
-    columns = _columns(table, poses, shapes, target, request, named if name is None else {**named, name: NAME})
+    named = named if name is None else {**named, name: NAME}
+    columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
     if table.header:
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
     layout = layout._replace(time=_time_column(table, request, source), name=name)
     return Plan(
-        shapes, (target,), request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
+        shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
-        timed=request.timed, frame_column=table.name(frames[0]) if len(frames) == 1 else "",
+        timed=request.timed, beside=request.beside or "", gathered=request.gathered,
+        frame_column=table.name(frames[0]) if len(frames) == 1 else "",
     ), layout  # fmt: skip
 
 
@@ -93,7 +96,8 @@ def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColum
 
 def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple[Shape, ...]:
     """Say what the numbers of a row mean; those an expression asks for come last."""
-    shapes = tuple(row_shape(pose, request) for pose in poses)
+    kinds = request.kinds or (request.kind,) * len(poses)
+    shapes = tuple(row_shape(pose, request._replace(kind=kind)) for pose, kind in zip(poses, kinds, strict=True))
     if request.operation.formula is None:
         return shapes
     return ((shapes[0] if shapes else Shape("", None))._replace(beside=asked),)
@@ -213,9 +217,10 @@ def _place(name: str, names: Sequence[str], source: str) -> int:
 
 def _time_column(table: Table, request: Request, source: str) -> int | None:
     """Find the column of the stamps, by its name or, where there are none, by its number from 1."""
-    if request.timed is None:
+    name = request.timed.name if request.timed else request.beside
+    if name is None:
         return None
-    return _place(request.timed.name, _names_or_numbers(table), source)
+    return _place(name, _names_or_numbers(table), source)
 
 
 def _names_or_numbers(table: Table) -> Sequence[str]:
@@ -227,11 +232,12 @@ def _columns(
     table: Table,
     poses: Sequence[PoseColumns],
     shapes: Sequence[Shape],
-    target: Target,
+    targets: Sequence[Target],
     request: Request,
     named: Mapping[int, int],
 ) -> list[Column]:
     """Put the results where they belong; `named` are the columns of names and their roles."""
+    (target,) = targets
     position, rotation, extras = _new_columns(poses, target, request, shapes[0].kind if shapes else POSE)
     ours = [columns for pose in poses for columns in pose if columns is not None]
     columns: list[Column] = [Kept(place) for place in range(table.width)]
@@ -256,6 +262,36 @@ def _columns(
     else:
         at[min(at)] += [*position, *rotation, *extras]
     return [column for place, given in enumerate(columns) for column in at.get(place, [given])]
+
+
+def _several(
+    table: Table,
+    poses: Sequence[PoseColumns],
+    shapes: Sequence[Shape],
+    targets: Sequence[Target],
+    request: Request,
+    named: Mapping[int, int],
+) -> list[Column]:
+    """Put each of several results where it comes from; raises Misused where it has other numbers."""
+    columns: list[Column] = [Kept(place) for place in range(table.width)]
+    for place, role in named.items() if rename_of(request) is not None else ():
+        columns[place] = Named(place, role)
+    ours = [place for pose in poses for each in pose if each for place in each.places]
+    if twice := sorted({table.name(place) for place in ours if ours.count(place) > 1}):
+        raise Misused(f"--columns: {', '.join(twice)} stands twice")
+    first = 0
+    for pose, shape, target in zip(poses, shapes, targets, strict=True):
+        if request.notations or not _in_place(pose, shape, target, request._replace(poses=1)):
+            raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
+        places = [place for each in pose if each for place in each.places]
+        for at, place in enumerate(places, first):
+            new = New(at, request.prefix + table.name(place))
+            if request.keep:
+                columns.append(new)
+            else:
+                columns[place] = new
+        first += target.size
+    return columns
 
 
 def _in_place(pose: PoseColumns, shape: Shape, target: Target, request: Request) -> bool:

@@ -98,10 +98,12 @@ def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
 def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request, Timed | None]:
     """Find the column of stamps that a request needs; or, where no option names one, the one nobody asked for."""
     timed = request.timed
+    if request.beside == "":
+        request = request._replace(beside=_stamp_column(table, source, "a velocity"))
     if timed is None:
         return request, None
     if request.operation.formula is not None:
-        name = timed.name or _stamp_column(table, source)
+        name = timed.name or _stamp_column(table, source, "@ row")
         return request._replace(timed=timed._replace(name=name)), None
     if timed.name:
         return request, None
@@ -109,12 +111,12 @@ def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request,
     return request._replace(timed=None), timed._replace(name=name) if name else None
 
 
-def _stamp_column(table: Table, source: str) -> str:
-    """Name the column of stamps that an expression asks for; raises Misused where none looks so."""
+def _stamp_column(table: Table, source: str, who: str) -> str:
+    """Name the column of stamps that somebody asks for; raises Misused where none looks so."""
     name = next(filter(STAMPS.fullmatch, table.names or ()), None)
     if name is None:
         known = f"; columns: {listing(table.names)}" if table.names else ""
-        raise Misused(f"@ row: no column looks like stamps; name it with --time-column{known}", source=source, line=1)
+        raise Misused(f"{who}: no column looks like stamps; name it with --time-column{known}", source=source, line=1)
     return name
 
 

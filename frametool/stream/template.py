@@ -23,7 +23,7 @@ from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_rec
 from frametool.stream.row_layout import COVARIANCE
 from frametool.stream.run import RowNote
 from frametool.stream.splice import OURS, Splicer, target_of
-from frametool.stream.stamp_source import key_path, stamp_keys
+from frametool.stream.stamp_source import STAMP_KEYS, key_path, stamp_keys
 from frametool.stream.text_parts import In, Out
 
 if TYPE_CHECKING:
@@ -125,6 +125,11 @@ class Template:
         return tuple(
             ".".join(map(str, path[1:])) if path else "" for entry in self.entries for path in entry.record.numbers
         )
+
+    @property
+    def beside(self) -> str:
+        """Return the last key that leads to what is read beside the numbers."""
+        return next((str(entry.stamp[0][-1]) for entry in self.entries if entry.stamp), "")
 
     def timed(self, request: Request) -> Timed | None:
         """Return where stamps stand; a key that nobody named but was found says by its own name what they are."""
@@ -322,12 +327,31 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
         stamp = record.stamp
     elif timed is not None and request.operation.formula is not None:
         stamp = ((document.index, *within((document.index,), stamp_keys, document.value, record.path[1:])),)
+    elif request.beside is not None:
+        stamp = beside_path(document, record, request.beside)
     elif request.way is not None:
         edge = request.way(record.parent.text)
     request = request.for_kind(record.shape.kind)
     if request.rename is not None:
         request.rename(record.parent.text, record.name.text)
     return Entry(record, target_of(record, request), edge, stamp)
+
+
+def beside_path(document: Document, record: Record, name: str) -> tuple[Path, ...]:
+    """Find what stands beside a record under a key; "" is the stamp of its header, or else under a usual key.
+
+    Raises Misfit.
+    """
+    if not name and record.stamp:
+        return record.stamp
+    holder = record.path[1:]
+    if name:
+        return ((document.index, *within((document.index,), key_path, document.value, holder, name)),)
+    try:
+        return ((document.index, *stamp_keys(document.value, holder)),)
+    except Misfit:
+        usual = ", ".join(STAMP_KEYS)
+        raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path) from None
 
 
 def _edits(text: str, entries: Sequence[Entry], root: Node, request: Request, *, json: bool) -> list[Edit]:

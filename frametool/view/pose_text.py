@@ -94,10 +94,11 @@ def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Nu
 
 def _extra_lines(result: Result) -> Iterator[tuple[str, Sequence[tuple[str, float]], str]]:
     """Yield the lines of what is only said about a pose."""
-    units = {"distance": "m", "angle": "rad", "angle_deg": "deg"}
+    units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s"}
     for key, value in result.extras.items():
         if isinstance(value, float):
-            yield key.removesuffix("_deg"), [("", value)], units.get(key, "")
+            unit = "deg" if key.endswith("_deg") else units.get(key.partition("_")[0], "")
+            yield key.removesuffix("_deg"), [("", value)], unit
 
 
 def _layout(lines: Sequence[NumberLine], style: Style) -> str:

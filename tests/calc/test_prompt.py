@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.calc.evaluate import Scope
+from frametool.calc.scope import Scope
 from frametool.calc.values import TREE, Term, Type
-from frametool.cli.calc_prompt import Completer
+from frametool.cli.calc_completion import Completer
 from frametool.formats.load import load
 
 if TYPE_CHECKING:
@@ -140,6 +140,14 @@ def test_words_are_completed_where_they_fit() -> None:
     assert completer.completions("map<-gri", "1 + d[") == ["map<-gripper"]
     assert completer.completions("di", "") == ["dist("]
     assert completer.completions("a", "x") == ["angle(", "asin(", "acos(", "atan(", "ans", "as ", "arm_base_link<-"]
+
+
+def test_the_shell_completes_frames_of_the_trees_that_were_named(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    for words, expected in [("frametool calc --tree robot.yaml inv(map<-cam", "inv(map<-camera_optical"), ("frametool calc d=drive.yaml d[map<-gri", "d[map<-gripper")]:
+        for key, value in {"_FRAMETOOL_COMPLETE": "zsh_complete", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}.items():
+            monkeypatch.setenv(key, value)
+        done = run(files={name: (EXAMPLES / name).read_text() for name in ("robot.yaml", "drive.yaml")})
+        assert expected in done.out.splitlines()
 
 
 def test_a_pipe_is_one_expression_a_line(run: Callable[..., Any]) -> None:

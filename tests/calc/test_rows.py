@@ -130,6 +130,23 @@ def test_a_row_in_another_frame_is_a_bad_row_that_says_what_to_write(run: Callab
     assert empty.out.splitlines()[2] == "imu_link,,,"
 
 
+@pytest.mark.parametrize(("text", "named"), [
+    ("inv(row)", ["map,tool", "map,map", "a,a", "b,lidar"]),
+    ("row * row", ["", "map,map", "a,a", ""]),
+    ("(map<-lidar) * row", ["", "", "", ""]),
+    ("row * (lidar<-map)", ["", "", "", "map,b"]),
+    ("row * {xyz: [1, 0, 0]} as b<-new", ["", "", "", ""]),
+    ("{xyz: [1, 0, 0]} as new<-a * row", ["", "", "a,new", ""]),
+    ("row ^ 1", ["tool,map", "map,map", "a,a", "lidar,b"]),
+])  # fmt: skip
+def test_frames_of_rows_are_checked_whatever_they_are_called(text: str, named: list[str], run: Callable[..., Any]) -> None:
+    rows = ["tool,map", "map,map", "a,a", "lidar,b"]
+    table = "".join(f"{names},1,2,3,0,0,0,1\n" for names in rows)
+    done = run("calc", "--tree", ROBOT, text, "--on-error", "null", stdin=f"name,parent,x,y,z,qx,qy,qz,qw\n{table}")
+    found = done.out.splitlines()[1:]
+    assert [",".join(line.split(",")[:2]) if line.split(",")[2] else "" for line in found] == named
+
+
 def test_a_row_without_a_value_says_why(run: Callable[..., Any]) -> None:
     done = run("calc", "-e", "q=1 / row.k", "-e", "w=acos(row.x)", "--on-error", "skip", stdin="x,y,z,k\n1,0,0,1\n0.5,0,0,0\n3,0,0,2\n")
     assert done.out == "x,y,z,k,q,w\n1,0,0,1,1.0,0.0\n"

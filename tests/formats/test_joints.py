@@ -160,6 +160,12 @@ def test_a_wrong_option_is_misuse(arguments: tuple[str, ...], said: str, run: Ru
     assert said in done.err
 
 
+@pytest.mark.parametrize("command", [["tree"], ["check"], ["monitor"], ["view", "-f", "svg"]])
+def test_every_command_that_reads_a_robot_refuses_a_joint_it_does_not_have(command: list[str], run: Run) -> None:
+    done = run(*command, "arm.urdf", "-j", "nose=1", files={"arm.urdf": URDF})
+    assert (done.status, done.out, "no joint 'nose'" in done.err) == (2, "", True)
+
+
 def test_joints_need_a_robot(run: Run) -> None:
     done = run("lookup", "-j", "pan=1", "a.yaml", "a", "b", files={"a.yaml": "frames: {a: {b: {}}}"})
     assert (done.status, "--joint: there are no joints in a.yaml" in done.err) == (2, True)
@@ -287,7 +293,7 @@ def test_a_missing_file_is_trouble_with_files_and_states_need_a_form_that_has_th
     files = {"arm.urdf": URDF, "a.yaml": "pan: 1"}
     assert run("lookup", "arm.urdf", "base", "tip", "--joints", "none.yaml", files=files).status == 5
     done = run("lookup", "arm.urdf", "base", "tip", "--joints", "a.yaml:home")
-    assert (done.status, "a.yaml: has no states with names; srdf" in done.err) == (1, True)
+    assert (done.status, "a.yaml: has no states with names; " in done.err) == (1, True)
 
 
 def test_what_tools_print_between_messages_is_passed_over_and_told(arm: Callable[..., Any]) -> None:

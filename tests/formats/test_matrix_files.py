@@ -101,6 +101,14 @@ def test_the_camera_before_is_that_of_the_number_before_in_any_order(tmp_path: P
     assert matrix(tree, "cam1", "cam0") == pytest.approx(CAM1_IMU @ inverse(CAM0_IMU), abs=1e-15)
 
 
+def test_names_told_for_a_chain_are_those_of_cam0_and_on_in_any_order(tmp_path: Path) -> None:
+    first, second = CAMERAS_ALONE.split("cam1:")
+    for text in (CAMERAS_ALONE, f"cam1:{second}{first}"):
+        tree = read(tmp_path, text, frames=("unused", "left", "right"))
+        assert tree.roots == ("left",)
+        assert matrix(tree, "right", "left") == pytest.approx(CAM1_IMU @ inverse(CAM0_IMU), abs=1e-15)
+
+
 def test_the_sensor_of_okvis_is_the_imu_where_its_pose_is_told(tmp_path: Path) -> None:
     body_imu = rigid(5)
     tree = read(tmp_path, f"{OKVIS}imu_params:\n    a_max: 176.0\n    T_BS:\n        [{line(body_imu)}]\n")
@@ -336,6 +344,7 @@ def test_positions_are_written_to_the_same_bits_for_an_imu(run: Callable[..., An
 @pytest.mark.parametrize(
     ("tree", "form", "said"),
     [
+        *(("{frames: {alone: {}}}", form, f"{form} holds poses, and there is none: alone") for form in ("autoware", "camchain", "opencv", "handeye")),
         ("{frames: {a: {b: {xyz: [1, 0, 0]}}, c: {d: {xyz: [1, 0, 0]}}}}", "camchain", "camchain holds one tree of cameras; the roots here: a, c"),
         ("{frames: {a/x: {b: {xyz: [1, 0, 0]}}}}", "opencv", "opencv cannot name the pose of 'b' in 'a/x'"),
         ("{frames: {a_T_b: {c: {xyz: [1, 0, 0]}}}}", "opencv", "opencv cannot name the pose of 'c' in 'a_T_b'"),

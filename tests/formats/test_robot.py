@@ -121,6 +121,7 @@ def test_what_is_no_robot_is_refused(tmp_path: Path) -> None:
 
 def test_a_robot_tells_its_frames_roots_and_joints(arm: Robot) -> None:
     assert arm.roots == ("arm_base",)
+    assert repr(arm) == "Robot(8 frames, 6 joints, roots: arm_base)"
     assert arm.frames[:2] == ("arm_base", "shoulder")
     assert [*arm.joints] == ["shoulder_pan", "shoulder_lift", "elbow", "wrist_roll", "gripper", "gripper_right"]
     assert (arm.joints["elbow"].kind, arm.joints["elbow"].lower) == ("revolute", -2.4)

@@ -148,6 +148,10 @@ def test_a_frame_that_hangs_in_another_part_in_b_is_seen_from_nowhere() -> None:
     assert (told["c"].kind, told["c"].parent_b, told["c"].seen) == ("parent", "x", None)
 
 
+def test_trees_without_a_frame_in_common_say_so() -> None:
+    assert diff(tree_of(("a", "b", turned(1))), tree_of(("c", "d", turned(1)))).notes == ["no frame is in both A and B"]
+
+
 def test_the_farthest_comes_first_and_what_went_along_comes_behind() -> None:
     a = tree_of(*(("base", name, turned(0)) for name in "xyz"), ("y", "tip", turned(0, "z", (1, 0, 0))))
     b = tree_of(
@@ -244,6 +248,7 @@ def test_a_frame_that_stands_in_one_and_moves_in_the_other_is_told() -> None:
     (only,) = diff(standing, drive(1.0)).differences
     assert (only.kind, only.frame, only.note) == ("motion", "base", "stands still in A, moves in B")
     assert diff(drive(1.0), standing).differences[0].note == "moves in A, stands still in B"
+    assert diff(drive(1.0), standing).notes == ["what moves is compared at its latest (A 2.000000000); --at TIME compares at one time"]
 
 
 def test_frames_without_data_at_a_time_are_told_and_not_taken_for_roots() -> None:

@@ -30,7 +30,7 @@ class DerivationWrong(FrametoolError):
     """Report a derivation that does not lead to the result: a mistake in this program, never to be printed."""
 
 
-class Plan(NamedTuple):
+class DerivationStyle(NamedTuple):
     """How a derivation is written.
 
     style: notations, unit and sign of the result
@@ -48,7 +48,7 @@ class Plan(NamedTuple):
         return self.style.notations or (notation("quaternion"),)
 
 
-def explained(title: str, write: Callable[[Sheet], None], plan: Plan) -> Explanation:
+def explained(title: str, write: Callable[[Sheet], None], plan: DerivationStyle) -> Explanation:
     """Write a derivation; where setting noise to 0 leads too far away, as beside singular numbers, without that."""
     for clean in dict.fromkeys((plan.digits is not None, False)):
         sheet = Sheet(plan.digits, clean=clean, every=plan.every)
@@ -61,7 +61,7 @@ def explained(title: str, write: Callable[[Sheet], None], plan: Plan) -> Explana
     return Explanation(title, sheet.items)
 
 
-def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: Plan) -> None:
+def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationStyle) -> None:
     """Go on from the quaternion to the notations asked for, check both, and end with the command's own result."""
     if own.pose.position is not None:
         check_vector(sheet, derived[:3], own.pose.position)
@@ -71,7 +71,7 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: Plan) -> None
     end(sheet, own, plan)
 
 
-def written(sheet: Sheet, q: Quaternion, form: Notation, plan: Plan) -> Sequence[float]:
+def written(sheet: Sheet, q: Quaternion, form: Notation, plan: DerivationStyle) -> Sequence[float]:
     """Add the way from the quaternion to a notation; return its numbers."""
     block = FROM_QUATERNION[form.representation.name]
     return block(sheet, q, form.bound_axes(), plan.style.in_degrees(form), plan.style.keep_sign)
@@ -83,7 +83,7 @@ def matrix_of_pose(sheet: Sheet, form: Notation, own: Result) -> None:
         sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
 
 
-def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: Result, plan: Plan) -> None:
+def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle) -> None:
     """Compare numbers of a notation with the result's, as rotations: so also beside lock.
 
     Raises DerivationWrong.
@@ -108,7 +108,7 @@ def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -
         raise DerivationWrong(f"the derivation is off by {off:.3g} from the result; {REPORT}")
 
 
-def end(sheet: Sheet, own: Result, plan: Plan) -> None:
+def end(sheet: Sheet, own: Result, plan: DerivationStyle) -> None:
     """End with the command's own result."""
     pose = own.pose
     named = f"{printable(pose.parent)}_from_{printable(pose.name)}" if pose.parent and pose.name else ""

@@ -6,7 +6,7 @@ import sys
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
-from frametool.calc.explain.agreement import Plan
+from frametool.calc.explain.agreement import DerivationStyle
 from frametool.calc.explain.derive import (
     derive_compose,
     derive_convert,
@@ -51,7 +51,7 @@ def explain(
     if precision is not None and precision < 1:
         raise ValueInvalid(f"precision counts significant digits, 1 or more; found {precision}")
     chosen = tuple(form for spec in to.split(",") for form in notations(spec.strip()))
-    plan = Plan(Style("text", chosen, degrees=degrees, keep_sign=keep_sign), precision, full)
+    plan = DerivationStyle(Style("text", chosen, degrees=degrees, keep_sign=keep_sign), precision, full)
     try:
         signature(OPERATIONS[operation]).bind(plan, *operands, **options)
     except TypeError as error:
@@ -61,35 +61,35 @@ def explain(
     return OPERATIONS[operation](plan, *given, *operands[poses:], **options)
 
 
-def _convert(plan: Plan, pose: Any) -> Explanation:
+def _convert(plan: DerivationStyle, pose: Any) -> Explanation:
     return derive_convert(pose, plan)
 
 
-def _compose(plan: Plan, *poses: Any) -> Explanation:
+def _compose(plan: DerivationStyle, *poses: Any) -> Explanation:
     if not poses:
         raise ValueInvalid("compose takes at least one pose")
     return derive_compose(poses, plan)
 
 
-def _invert(plan: Plan, pose: Any) -> Explanation:
+def _invert(plan: DerivationStyle, pose: Any) -> Explanation:
     return derive_invert(pose, plan)
 
 
-def _relative(plan: Plan, a: Any, b: Any) -> Explanation:
+def _relative(plan: DerivationStyle, a: Any, b: Any) -> Explanation:
     return derive_relative(a, b, plan)
 
 
-def _interpolate(plan: Plan, a: Any, b: Any, fraction: float) -> Explanation:
+def _interpolate(plan: DerivationStyle, a: Any, b: Any, fraction: float) -> Explanation:
     return derive_interpolate(a, b, float(fraction), plan)
 
 
-def _lookup(plan: Plan, tree: Frames, target: str, source: str, **options: Any) -> Explanation:
+def _lookup(plan: DerivationStyle, tree: Frames, target: str, source: str, **options: Any) -> Explanation:
     if not isinstance(tree, Frames):
         raise ValueInvalid(f"expected a tree as frametool.load returns it, found {shown(tree)}")
     return derive_lookup(tree, target, source, plan, **options)
 
 
-def _apply(plan: Plan, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:
+def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:
     by_tree = bool(operands) and isinstance(operands[0], Frames)
     if len(operands) not in ((3, 4) if by_tree else (2,)):
         raise ValueInvalid("apply takes TREE TARGET [SOURCE] RECORD, or POSE RECORD")
@@ -103,7 +103,7 @@ def _apply(plan: Plan, *operands: Any, at_ns: int | None = None, kind: str = "")
     return derive_apply(way, record_source(record, kind), plan, kind=kind, degrees=degrees)
 
 
-def _follow(plan: Plan, steps: Any) -> Explanation:
+def _follow(plan: DerivationStyle, steps: Any) -> Explanation:
     found = [steps] if isinstance(steps, FollowStep) else list(steps) if isinstance(steps, (list, tuple)) else []
     if not found or not all(isinstance(each, FollowStep) for each in found):
         raise ValueInvalid(f"expected the steps of follow_steps, found {shown(steps)}")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from frametool.calc.explain.agreement import (
     CLOSE,
     REPORT,
+    DerivationStyle,
     DerivationWrong,
-    Plan,
     check_rotation,
     end,
     end_with_pose,
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 def derive_convert(
-    given: Given, plan: Plan, *, own: Pose | None = None, turn: tuple[str, Quaternion] | None = None
+    given: Given, plan: DerivationStyle, *, own: Pose | None = None, turn: tuple[str, Quaternion] | None = None
 ) -> Explanation:
     """Derive one pose or rotation in the notations asked for.
 
@@ -83,7 +83,7 @@ def _hub(sheet: Sheet, given: Given, turn: tuple[str, Quaternion] | None) -> Rig
     return *pose[:3], *product(sheet, pose[3:], change)
 
 
-def _short_way(sheet: Sheet, given: Given, form: Notation, plan: Plan) -> Sequence[float] | None:
+def _short_way(sheet: Sheet, given: Given, form: Notation, plan: DerivationStyle) -> Sequence[float] | None:
     """Add the way that passes the quaternion by, where there is one."""
     if given.notation is None:
         return None
@@ -100,7 +100,7 @@ def _say_given(sheet: Sheet, given: Sequence[Given], labels: Sequence[tuple[str,
         each.say(sheet, target, source)
 
 
-def derive_compose(given: Sequence[Given], plan: Plan) -> Explanation:
+def derive_compose(given: Sequence[Given], plan: DerivationStyle) -> Explanation:
     """Derive the product of poses."""
     poses = [each.pose for each in given]
     own = Result(reduce(pose_algebra.product, poses))
@@ -123,7 +123,7 @@ def derive_compose(given: Sequence[Given], plan: Plan) -> Explanation:
     return explained(f"{names[0]}_from_{names[-1]}", write, plan)
 
 
-def derive_invert(given: Given, plan: Plan) -> Explanation:
+def derive_invert(given: Given, plan: DerivationStyle) -> Explanation:
     """Derive the inverse of a pose."""
     own = Result(pose_algebra.inverse(given.pose))
     target, source = frames_of(2, [given.pose])
@@ -136,7 +136,7 @@ def derive_invert(given: Given, plan: Plan) -> Explanation:
     return explained(f"{source}_from_{target}", write, plan)
 
 
-def derive_relative(a: Given, b: Given, plan: Plan) -> Explanation:
+def derive_relative(a: Given, b: Given, plan: DerivationStyle) -> Explanation:
     """Derive B seen from A, with distance and angle."""
     own = pose_algebra.relative(a.pose, b.pose)
     world = printable(a.pose.parent or b.pose.parent or "world")
@@ -155,7 +155,7 @@ def derive_relative(a: Given, b: Given, plan: Plan) -> Explanation:
     return explained(f"{first}_from_{second}", write, plan)
 
 
-def derive_interpolate(a: Given, b: Given, fraction: float, plan: Plan) -> Explanation:
+def derive_interpolate(a: Given, b: Given, fraction: float, plan: DerivationStyle) -> Explanation:
     """Derive the pose at a fraction of the way from A to B."""
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
     world = printable(a.pose.parent or b.pose.parent or "world")
@@ -170,7 +170,7 @@ def derive_interpolate(a: Given, b: Given, fraction: float, plan: Plan) -> Expla
 
 
 def derive_lookup(
-    frames: Frames, target: str, source: str, plan: Plan, *, at_ns: int | None = None,
+    frames: Frames, target: str, source: str, plan: DerivationStyle, *, at_ns: int | None = None,
     source_at_ns: int | None = None, fixed: str | None = None,
 ) -> Explanation:  # fmt: skip
     """Derive the pose of one frame of a tree in another; with `fixed` across two times."""

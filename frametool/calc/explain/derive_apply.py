@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.calc.explain.agreement import Plan, check_vector, covariance_rows, end_with_pose, explained, row
+from frametool.calc.explain.agreement import (
+    DerivationStyle,
+    check_vector,
+    covariance_rows,
+    end_with_pose,
+    explained,
+    row,
+)
 from frametool.calc.explain.chain import chain
 from frametool.calc.explain.given import Given, given_of
 from frametool.calc.explain.movers import MOVERS, pose_covariance, twist_covariance
@@ -88,8 +95,8 @@ class ByPose(NamedTuple):
 
 
 def derive_apply(
-    way: ByTree | ByPose, source: Source, plan: Plan, *, kind: str = "", degrees: bool = False, normalize: bool = False,
-    counters: bool = True, timeless: bool = False,
+    way: ByTree | ByPose, source: Source, plan: DerivationStyle, *, kind: str = "", degrees: bool = False,
+    normalize: bool = False, counters: bool = True, timeless: bool = False,
 ) -> Explanation:  # fmt: skip
     """Derive where a record is in the target's frame.
 
@@ -150,7 +157,7 @@ def _move_vectors(
 
 
 def _move_pose(
-    sheet: Sheet, pose: Rigid, given: Given, record: Record, mover: Rigid, names: tuple[str, str], plan: Plan
+    sheet: Sheet, pose: Rigid, given: Given, record: Record, mover: Rigid, names: tuple[str, str], plan: DerivationStyle
 ) -> None:
     """Move a pose, and end with the result."""
     target, origin = map(printable, names)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.calc.explain.agreement import CLOSE, REPORT, DerivationWrong, Plan, explained, row
+from frametool.calc.explain.agreement import CLOSE, REPORT, DerivationStyle, DerivationWrong, explained, row
 from frametool.calc.explain.chain import fraction
 from frametool.calc.explain.sheet import METRES, RADIANS
 from frametool.errors import printable
@@ -67,7 +67,7 @@ class FollowStep(NamedTuple):
     angular: float
 
 
-def derive_follow(steps: Sequence[FollowStep], plan: Plan) -> Explanation:
+def derive_follow(steps: Sequence[FollowStep], plan: DerivationStyle) -> Explanation:
     """Derive the commands of followers at one step."""
 
     def write(sheet: Sheet) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.calc.explain.formula import Value
+from frametool.calc.explain.formula_tree import Value
 from frametool.geometry import floats
 from frametool.geometry import matrix as kernel
 from frametool.geometry.quaternion import to_matrix

@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from frametool.calc.explain.formula import latex_number
+from frametool.calc.explain.formula_tree import latex_number
 from frametool.calc.explain.render_text import result_lines, text_of
-from frametool.calc.explain.sheet import Caveat, Grid, Heading, Outcome, Sentence, Step
+from frametool.calc.explain.sheet import Caveat, MatrixLine, Sentence, SheetHeading, SheetResult, SheetStep
 from frametool.errors import ValueInvalid, alternatives, shown
 
 if TYPE_CHECKING:
@@ -82,23 +82,23 @@ def _parts(
 ) -> Iterator[str]:
     """Yield the parts of a derivation; successive formulas stand in one."""
     count = 0
-    for is_formula, group in groupby(items, lambda item: isinstance(item, (Step, Grid))):
+    for is_formula, group in groupby(items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
         if is_formula:
             yield formulas([line for item in group for line in _aligned(item)])
             continue
         for item in group:
-            count += isinstance(item, Heading)
+            count += isinstance(item, SheetHeading)
             yield write(item, count)
 
 
 def _aligned(item: Item) -> Iterator[str]:
     """Yield the lines of a formula, aligned at the first sign of equality of each."""
     unit = ""
-    if isinstance(item, Grid):
+    if isinstance(item, MatrixLine):
         name = item.name.replace("'", r"^{\prime}")
         matrices = " ".join(_matrix(part) for part in item.parts)
         parts, unit = [*([item.latex] if item.latex else []), matrices], item.unit
-    elif isinstance(item, Step):
+    elif isinstance(item, SheetStep):
         name, parts, unit = item.latex_name, list(item.latex), item.unit
     else:
         return
@@ -134,13 +134,13 @@ def _latex_formulas(lines: list[str]) -> str:
 
 def _markdown_item(item: Item, count: int) -> str:
     """Write what is no formula."""
-    if isinstance(item, Heading):
+    if isinstance(item, SheetHeading):
         return f"### {count}. {_markdown_text(item.text)}"
     if isinstance(item, Sentence):
         return _markdown_text(item.text)
     if isinstance(item, Caveat):
         return f"> **Note.** {_markdown_text(item.text)}"
-    if isinstance(item, Outcome):
+    if isinstance(item, SheetResult):
         lines = "\n".join(line.removeprefix("   ") for line in result_lines(item.rows))
         head = f"**Result**: {_markdown_text(item.text)}" if item.text else "**Result**"
         return f"{head}\n\n```text\n{lines}\n```"
@@ -149,13 +149,13 @@ def _markdown_item(item: Item, count: int) -> str:
 
 def _latex_item(item: Item, count: int) -> str:
     """Write what is no formula."""
-    if isinstance(item, Heading):
+    if isinstance(item, SheetHeading):
         return rf"\subsection*{{{count}. {_latex_text(item.text)}}}"
     if isinstance(item, Sentence):
         return _latex_text(item.text)
     if isinstance(item, Caveat):
         return rf"\emph{{Note.}} {_latex_text(item.text)}"
-    if isinstance(item, Outcome):
+    if isinstance(item, SheetResult):
         lines = [_latex_text(line.removeprefix("   ")).replace(" ", "~") for line in result_lines(item.rows)]
         head = rf"\textbf{{Result}}: {_latex_text(item.text)}" if item.text else r"\textbf{Result}"
         return f"{head}\n\n{{\\ttfamily\n" + "\\\\\n".join(lines) + "\n\\par}"

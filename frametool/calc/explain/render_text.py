@@ -6,7 +6,7 @@ from itertools import groupby
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from frametool.calc.explain.sheet import Caveat, Grid, Heading, Outcome, Sentence, Step
+from frametool.calc.explain.sheet import Caveat, MatrixLine, Sentence, SheetHeading, SheetResult, SheetStep
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -21,27 +21,27 @@ def text_of(items: Sequence[Item]) -> str:
     """Return a derivation as text."""
     lines: list[str] = []
     count = 0
-    for is_step, group in groupby(items, lambda item: isinstance(item, Step)):
+    for is_step, group in groupby(items, lambda item: isinstance(item, SheetStep)):
         if is_step:
-            lines += _steps([item for item in group if isinstance(item, Step)])
+            lines += _steps([item for item in group if isinstance(item, SheetStep)])
             continue
         for item in group:
-            count += isinstance(item, Heading)
+            count += isinstance(item, SheetHeading)
             lines += _lines(item, count)
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
 def _lines(item: Item, count: int) -> list[str]:
     """Return the lines of what is no step."""
-    if isinstance(item, Heading):
+    if isinstance(item, SheetHeading):
         return ["", *_wrapped(item.text, f"{count}. ", INDENT)]
     if isinstance(item, Sentence):
         return _wrapped(item.text, INDENT, INDENT)
     if isinstance(item, Caveat):
         return _wrapped(item.text, f"{INDENT}! ", f"{INDENT}  ")
-    if isinstance(item, Grid):
+    if isinstance(item, MatrixLine):
         return _grid(item)
-    if isinstance(item, Outcome):
+    if isinstance(item, SheetResult):
         return ["", *_wrapped(f"Result: {item.text}" if item.text else "Result", "", INDENT), *result_lines(item.rows)]
     return []
 
@@ -52,7 +52,7 @@ def _wrapped(text: str, first: str, further: str) -> list[str]:
     )
 
 
-def _steps(steps: Sequence[Step]) -> Iterator[str]:
+def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
     """Write successive steps with their signs of equality below one another."""
     width = max(len(step.name) for step in steps)
     for step in steps:
@@ -102,7 +102,7 @@ def _places(formula: str, level: int, signs: tuple[str, ...]) -> list[int]:
     return places
 
 
-def _grid(grid: Grid) -> list[str]:
+def _grid(grid: MatrixLine) -> list[str]:
     """Write matrices side by side, as many as the width holds."""
     lines = [f"{INDENT}{grid.name} = {grid.text}"] if grid.text else []
     head = f"{INDENT}{' ' * len(grid.name) if grid.text else grid.name} = "
@@ -151,6 +151,9 @@ def result_lines(rows: Sequence[Row]) -> list[str]:
         line = head + "  ".join(cells) + unit
         if len(line) <= WIDTH:
             lines.append(line)
-        else:
+        elif any(name for name, _ in row.cells):
             lines += [(head if at == 0 else " " * len(head)) + cell + unit for at, cell in enumerate(cells)]
+        else:
+            filled = wrap("  ".join(cells), WIDTH - len(head), break_on_hyphens=False, break_long_words=False)
+            lines += [(head if at == 0 else " " * len(head)) + part for at, part in enumerate(filled)]
     return lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from frametool.calc.explain.formula import Value, as_latex, as_text, evaluated, latex_number, parsed
+from frametool.calc.explain.formula_tree import Value, as_latex, as_text, evaluated, latex_number, parsed
 from frametool.calc.explain.symbols import symbol
 from frametool.errors import ValueInvalid
 
@@ -22,7 +22,7 @@ DIGITS = 6  # significant ones, unless told
 TOO_LARGE = "the numbers are too large or too small for a derivation: a step is not finite"
 
 
-class Heading(NamedTuple):
+class SheetHeading(NamedTuple):
     """What the next steps are about; they are counted."""
 
     text: str
@@ -40,7 +40,7 @@ class Caveat(NamedTuple):
     text: str
 
 
-class Step(NamedTuple):
+class SheetStep(NamedTuple):
     """A name and what it equals: formula, formula with numbers, value; each as text and as LaTeX."""
 
     name: str
@@ -50,7 +50,7 @@ class Step(NamedTuple):
     unit: str = ""
 
 
-class Grid(NamedTuple):
+class MatrixLine(NamedTuple):
     """A name, a formula, and matrices with signs between them; the last is the value."""
 
     name: str
@@ -68,14 +68,14 @@ class Row(NamedTuple):
     unit: str = ""
 
 
-class Outcome(NamedTuple):
+class SheetResult(NamedTuple):
     """The result as the command prints it, all digits."""
 
     text: str
     rows: Sequence[Row]
 
 
-Item: TypeAlias = Heading | Sentence | Caveat | Step | Grid | Outcome
+Item: TypeAlias = SheetHeading | Sentence | Caveat | SheetStep | MatrixLine | SheetResult
 
 
 class Sheet:
@@ -126,7 +126,7 @@ class Sheet:
 
     def heading(self, text: str) -> None:
         """Begin a part."""
-        self.items.append(Heading(f"{self._about}: {text}" if self._about else text))
+        self.items.append(SheetHeading(f"{self._about}: {text}" if self._about else text))
 
     @contextmanager
     def about(self, what: str) -> Iterator[None]:
@@ -169,21 +169,21 @@ class Sheet:
         if texts[1] in (texts[0], digits[name]):
             del texts[1], latex[1]
         self.items.append(
-            Step(name, [*texts, digits[name]], symbol(name), [*latex, latex_number(digits[name])], unit)
+            SheetStep(name, [*texts, digits[name]], symbol(name), [*latex, latex_number(digits[name])], unit)
         )
         return value
 
     def grid(self, name: str, text: str, latex: str, parts: Sequence[str | Matrix], unit: str = "") -> None:
         """Add matrices side by side; the last one is the value."""
         shown = [part if isinstance(part, str) else [[self.number(v) for v in row] for row in part] for part in parts]
-        self.items.append(Grid(name, text, latex, shown, unit))
+        self.items.append(MatrixLine(name, text, latex, shown, unit))
 
     def quaternions(self, name: str, text: str, factors: Sequence[Quaternion], value: Quaternion) -> None:
         """Add a product of quaternions on one line, each as (x, y, z, w)."""
         tuples = [f"({', '.join(map(self.number, each))})" for each in (*factors, value)]
         latex = [latex_tuple(each) for each in tuples]
         shown = ["·".join(tuples[:-1]), tuples[-1]]
-        self.items.append(Step(name, [text, *shown], symbol(name), [
+        self.items.append(SheetStep(name, [text, *shown], symbol(name), [
             text.replace(" ", r"\,"), r" \cdot ".join(latex[:-1]), latex[-1],
         ]))  # fmt: skip
 
@@ -194,13 +194,13 @@ class Sheet:
         a_latex, b_latex, value_latex = map(latex_tuple, texts)
         name = r"\operatorname{slerp}"
         latex = [f"{name}(a, b, f)", rf"{name}\left({a_latex}, {b_latex}, {latex_number(self.number(fraction))}\right)"]
-        self.items.append(Step("q", ["slerp(a, b, f)", shown, texts[2]], "q", [*latex, value_latex]))
+        self.items.append(SheetStep("q", ["slerp(a, b, f)", shown, texts[2]], "q", [*latex, value_latex]))
 
     def chosen(self, values: Values, name: str, value: float, unit: str) -> None:
         """Add a value that is chosen, not derived."""
         values[name] = value
         text = self.number(value)
-        self.items.append(Step(name, [text], symbol(name), [text], f"{unit} (chosen)"))
+        self.items.append(SheetStep(name, [text], symbol(name), [text], f"{unit} (chosen)"))
 
     def inner(self, row: Sequence[float], column: Sequence[float], *more: float) -> float:
         """Return the sum of products in their order, and of further terms: an entry of a product of matrices."""
@@ -217,7 +217,7 @@ class Sheet:
 
     def result(self, text: str, rows: Sequence[Row]) -> None:
         """End with the result."""
-        self.items.append(Outcome(text, rows))
+        self.items.append(SheetResult(text, rows))
 
 
 def latex_tuple(text: str) -> str:

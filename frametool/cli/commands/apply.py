@@ -34,7 +34,13 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.command(cls=Command, name="apply")
 @click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
 @click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose, not by a lookup")
-@click.option("--as", "kind", type=click.Choice(CHOICES), help="what the records are  [default: as they look]")
+@click.option(
+    "--as",
+    "kinds",
+    type=click.Choice(CHOICES),
+    multiple=True,
+    help="what the records are, once for each --columns",
+)
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @rotation_options
 @pose_options
@@ -64,7 +70,7 @@ def command(
     more: Sequence[str],
     deg: bool,
     normalize: bool,
-    kind: str | None,
+    kinds: tuple[str, ...],
     frame_column: str | None,
     time_column: str | None,
     at: int | str | None,
@@ -96,6 +102,7 @@ def command(
         way, rest = _way_by_pose(pose, stream.given, degrees=deg, normalize=normalize), arguments
     if time_column is not None:
         _check_timed(rest, at)
+    kind = _kind(kinds, stream)
     if plan is not None:
         records = list(_sources(rest, kind))
         if rest in ((), ("-",)) or len(records) != 1 or frame_column is not None:
@@ -110,12 +117,22 @@ def command(
             raise usage_if_inline(error) from None
         return explaining.write(made, output)
     request = way.request(frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
+    if (count := len(stream.options["columns"])) > 1:
+        request = request._replace(poses=count, kinds=(kinds if len(kinds) == count else (kind or "",) * count))
     if rest in ((), ("-",)):
         return stream.run(request, output)
     if stream.path:
         raise click.UsageError("-i FILE and records are two inputs; give one")
     output.values(values_of(list(_sources(rest, kind)), request, output))
     return 0
+
+
+def _kind(kinds: tuple[str, ...], stream: Stream) -> str | None:
+    """Return what all records are; None where --as does not say, or says it for each --columns."""
+    count = len(stream.options["columns"])
+    if len(kinds) > 1 and len(kinds) != count:
+        raise click.UsageError(f"--as is given {len(kinds)} times, --columns {count} times; each --columns has its own")
+    return kinds[0] if len(kinds) == 1 else None
 
 
 def _check_timed(records: tuple[str, ...], at: int | str | None) -> None:

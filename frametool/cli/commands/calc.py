@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.calc.evaluate import Scope, evaluate_line, mentions_row, read_line
+from frametool.calc.evaluate import evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.literals import Literals
-from frametool.calc.parser import walk
+from frametool.calc.parser import mentions_row, walk
+from frametool.calc.scope import Scope
+from frametool.cli.calc_completion import Expression
 from frametool.cli.calc_names import file_named_in
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
@@ -46,14 +48,14 @@ def _begins_with_minus(argument: str) -> bool:
 
 
 @click.command(cls=CalcCommand, name="calc")
-@click.argument("arguments", nargs=-1, type=TEXT, metavar="[NAME=FILE ..] [EXPR ..]")
+@click.argument("arguments", nargs=-1, type=Expression(), metavar="[NAME=FILE ..] [EXPR ..]")
 @click.option("--tree", "trees", multiple=True, type=FILE, metavar="FILE",
-              help="tree of look-ups; may be repeated")
-@click.option("-e", "expressions", multiple=True, type=TEXT, metavar="[NAME=]EXPR|@FILE",
-              help="result in columns NAME or NAME_x ..; may be repeated")
+              help="the tree of look-ups; may be repeated  [default: FRAMETOOL_TREE]")
+@click.option("-e", "expressions", multiple=True, type=Expression(), metavar="NAME=EXPR",
+              help="a row's result in columns of its own: NAME, NAME_x ..; may be repeated; also EXPR, @FILE")
 @click.option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
 @click.option("--time-column", "time_column", type=TEXT, metavar="NAME",
-              help="column or key of a row's time, for @ row")
+              help="of the time of @ row  [default: the one that looks so]")
 @rotation_options
 @pose_options
 @result_options("points")
@@ -72,13 +74,9 @@ def command(
       frametool calc --tree robot.yaml '(map<-lidar) * row' -i cloud.csv
       frametool calc -e 'd=norm(trans(row))' -e 'heading=rpy(row)' -i walk.tum
 
-    TARGET<-SOURCE is the pose of SOURCE in TARGET; {..} a pose as in files, [x, y, z] a point. Poses are composed
-    with *, and frames must touch. `frametool help calc` is the language on one screen.
-
-    NAME=FILE gives a name to a file: a tree if it holds frames, its pose, or the list of its poses; NAME=EXPR to a
-    value. An expression with row is computed for each row of -i FILE or of standard input: the result replaces what
-    the row was, --keep adds it, -e NAME=EXPR puts it in columns of its own. row.COLUMN is a number of the row, @ row
-    its time. Without an expression a terminal gets a prompt; from a pipe one expression a line is read.
+    `frametool help calc` is the language on one screen. NAME=FILE gives a name to a tree, a pose, or a list of poses;
+    NAME=EXPR to a value. An expression with row is computed for each row of -i FILE or standard input and replaces
+    what the row was. Without an expression a terminal gets a prompt; from a pipe one expression a line is read.
     """
     stream = Stream(options)
     output = Output("points", deg=deg, **options)

@@ -13,10 +13,11 @@ from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
 from frametool.cli.poses import pose_from_numbers, pose_source, source_from_numbers, values_of
+from frametool.cli.stderr import say
 from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
-from frametool.geometry import quaternion
+from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -27,11 +28,11 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.geometry.representations import Notation
-    from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Quaternion
+    from frametool.stream.operation import Operation
 
 
 AXES = 3
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 class ConvertCommand(Command):
@@ -53,6 +54,9 @@ class ConvertCommand(Command):
     help="the pose at the same place in these axes (help axes)",
 )
 @click.option(
+    "--world-axes", "world", type=TEXT, metavar="A_from_B", help="other axes of the frame it is seen from (help axes)"
+)
+@click.option(
     "--find",
     type=TEXT,
     metavar="A,B,C",
@@ -72,6 +76,7 @@ def command(
     values: tuple[str, ...],
     given: tuple[Notation, ...] | None,
     axes: str | None,
+    world: str | None,
     find: str | None,
     tolerance: float,
     deg: bool,
@@ -91,45 +96,52 @@ def command(
       frametool convert --from rpy_deg 10 20 30 --to matrix --explain
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
-    its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, a file, or - for standard input, also with several
-    poses; without any argument standard input is read.
+    its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, what another tool printed (help pose), a file, or - for
+    standard input, also with several poses; without any argument standard input is read.
     """
     values = rejoined(values)
     stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
     if explaining:
+        if world is not None:
+            raise click.UsageError("--explain derives a change of axes on one side; leave --world-axes out")
         explaining.plan(output, stream)
         one_argument(values[0] if values else axes)
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
-    turn: tuple[Rigid, ...] = () if axes is None else ((0.0, 0.0, 0.0, *_axes(axes)),)
+    operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
     forms = output.notations or (notation("quaternion"),)
     request = Request(
-        Operation(right=turn, turns=bool(turn)),
+        operation,
         given=one_notation(given),
         degrees=deg,
         normalize=normalize,
         notations=forms,
         unwrap=unwrap,
     )
+    if values or stream.path or not operation.turns or stream.has_input():
+        _say_other_side(axes, world)
     is_numbers = _are_numbers(values, told=bool(given))
     if len(values) == 1 and not (is_numbers or stream.path) and _is_table(values[0], stream):
         if explaining:
             raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
         values = ()
-    if stream.path or values == ("-",) or not (values or (turn and (explaining or not stream.has_input()))):
+    is_alone = operation.turns and (explaining or not stream.has_input())
+    if stream.path or values == ("-",) or not (values or is_alone):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
         return stream.run(request, output)
     sources: list[Source] = []
     if not values:
-        sources = [source_from_numbers(list(map(repr, turn[0][3:])), (notation("xyzw"),))] if explaining else []
-        results: list[Any] = [Result(Pose.of((0.0, 0.0, 0.0, *turn[0][3:]))._replace(position=None))]
+        alone = _changed(Pose(rotation=IDENTITY), operation)
+        if explaining and alone.rotation:
+            sources = [source_from_numbers(list(map(repr, alone.rotation)), (notation("xyzw"),))]
+        results: list[Any] = [Result(alone)]
     elif is_numbers:
         pose = pose_from_numbers(values, given, degrees=deg, normalize=normalize)
         sources = [source_from_numbers(values, given)] if explaining else []
-        results = [Result(_turned(pose, turn))]
+        results = [Result(_changed(pose, operation))]
     else:
         sources = [pose_source(each, request.given, normalize=normalize) for each in values] if explaining else []
         results = list(values_of(sources or values, request, output))
@@ -142,7 +154,7 @@ def command(
         from frametool.calc.explain.derive import derive_convert
 
         written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
-        change = (axes or "", turn[0][3:]) if turn and values else None
+        change = (axes or "", operation.right[0][3:]) if operation.right and values else None
         return explaining.write(derive_convert(written, explaining.plan(output), own=poses[0], turn=change), output)
     output.values(results)
     output.tell_of_lock(poses)
@@ -183,19 +195,36 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool)
     return tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes)
 
 
-def _turned(pose: Pose, turn: tuple[Rigid, ...]) -> Pose:
-    """Return a pose with other axes; without a turn its bits stay as they are."""
-    if not turn or pose.rotation is None:
+def _changed(pose: Pose, operation: Operation) -> Pose:
+    """Return a pose with other axes; without a change its bits stay as they are."""
+    if not operation.turns:
         return pose
-    return pose._replace(rotation=quaternion.compose(*pose.rotation, *turn[0][3:]))
+    components = operation.pose([pose.components], None, floats)
+    position = None if pose.position is None else pose.position if operation.keeps_position else components[:3]
+    return Pose(position, components[3:7], pose.name, pose.parent)
 
 
-def _axes(name: str) -> Quaternion:
-    """Return the rotation that --axes names."""
-    from frametool.geometry.conventions import named_rotation
+def _change_of_axes(axes: str | None, world: str | None) -> Operation:
+    """Return the operation that --axes and --world-axes name."""
+    from frametool.geometry.conventions import both_sides
+    from frametool.stream.operation import Operation
 
     try:
-        rotation: Quaternion = named_rotation(name).components
+        left, mirrors, right = both_sides(world, axes)
     except ValueInvalid as error:
         raise click.UsageError(str(error)) from None
-    return rotation
+    before = (0.0, 0.0, 0.0, *left.components) if left is not None else None
+    behind = ((0.0, 0.0, 0.0, *right.components),) if right is not None else ()
+    return Operation(before, behind, turns=True, mirrors=mirrors)
+
+
+def _say_other_side(axes: str | None, world: str | None) -> None:
+    """Tell what changes the axes of the other frame of a pose where such conventions come in pairs."""
+    from frametool.geometry.conventions import other_side
+
+    if (axes is None) == (world is None):
+        return
+    if axes and (other := other_side(axes, of_world=False)):
+        say(f"note: the frame that poses are seen from keeps its axes; --world-axes {other} changes them")
+    if world and (other := other_side(world, of_world=True)):
+        say(f"note: the frames that these are the poses of keep their axes; --axes {other} changes them")

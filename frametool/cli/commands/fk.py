@@ -31,14 +31,15 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
     """Add the pose of TIP in BASE to rows of joint values.
 
     \b
-      frametool fk arm.urdf base tool -i joints.csv
-      frametool fk arm.urdf base tool -i joints.csv -j gripper=2cm --to rpy_deg
-      ros2 topic echo /joint_states | frametool fk arm.urdf base tool -f csv
+      frametool fk arm.urdf arm_base tool -i joints.csv
+      frametool fk arm.urdf tool right_finger -i joints.csv --to rpy_deg --prefix finger_
+      printf 't,gripper_mm\\n0,12.5\\n' | frametool fk arm.urdf tool left_finger
+      ros2 topic echo /joint_states | frametool fk arm.urdf arm_base tool -f csv
 
     Rows are a table with a column for each joint, JSON lines or YAML documents with a key for each, or JointState
     messages. Columns are called as the joints: radians and metres, or elbow_deg, elbow [deg], finger_mm. All other
     columns pass.  A joint on the way that has no column needs --joint or --joints; one that mimics another follows
-    it. For one posture there is `frametool lookup URDF BASE TIP -j elbow=30deg`.
+    it. For one posture there is `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
     """
     stream = Stream(options)
     output = Output("poses", deg=deg, **options)

@@ -9,7 +9,7 @@ import click
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.explaining import Explaining, all_given, explain_options, one_argument
 from frametool.cli.output import Output
-from frametool.cli.poses import combinations, one_pose
+from frametool.cli.poses import combinations, one_pose, write_results
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
@@ -26,15 +26,35 @@ if TYPE_CHECKING:
 @pose_options
 @result_options("poses")
 @click.option(
-    "--consecutive", is_flag=True, help="of a stream, each row seen from the row before; the first is the identity"
+    "--consecutive", is_flag=True, help="of a stream, each row seen from the row before it"
+)
+@click.option("--first", is_flag=True, help="of a stream, each row seen from the first")
+@click.option(
+    "--velocity",
+    is_flag=True,
+    help="with --consecutive, also the twist from row to row, m/s and rad/s",
+)
+@click.option(
+    "--time-column",
+    "time_column",
+    type=TEXT,
+    metavar="NAME",
+    help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
 )
 @explain_options
-@click.option("--first", is_flag=True, help="of a stream, each row seen from the first, which is then the identity")
 @stream_options
 @pose_reading_options
 def command(
-    a: str | None, b: str | None, deg: bool, normalize: bool, consecutive: bool, first: bool, **options: Any
-) -> int:  # fmt: skip
+    a: str | None,
+    b: str | None,
+    deg: bool,
+    normalize: bool,
+    consecutive: bool,
+    first: bool,
+    velocity: bool,
+    time_column: str | None,
+    **options: Any,
+) -> int:
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
     \b
@@ -43,31 +63,41 @@ def command(
 
     A and B are poses in one frame: mappings, files, or - for standard input. distance in metres; angle in radians,
     angle_deg in degrees.
+
+    \b
+      frametool relative --first -i walk.tum
+      frametool relative --consecutive --velocity -i walk.tum
+
+    The twist in dt seconds is the body's, seen in A: linear R_A' (p_B - p_A) / dt, angular rotvec(A^-1 B) / dt.
     """
     stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
     if explaining:
         plan = explaining.plan(output, stream)
         if consecutive or first:
-            option = "--first" if first else "--consecutive"
-            raise click.UsageError(f"{option} is about the rows of a stream; leave it or --explain out")
+            raise click.UsageError("--consecutive and --first are about the rows of a stream; leave --explain out")
         from frametool.calc.explain.derive import derive_relative
 
         arguments = [str(one_argument(each)) for each in (a, b)]
-        one, other = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
-        return explaining.write(derive_relative(one, other, plan), output)
+        given_a, given_b = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
+        return explaining.write(derive_relative(given_a, given_b, plan), output)
     from frametool.stream.request import Request
 
+    if velocity and not consecutive:
+        raise click.UsageError("--velocity is that from one row to the next; give --consecutive too")
+    if time_column is not None and not velocity:
+        raise click.UsageError("--time-column is for --velocity")
     given = [each for each in (a, b) if each is not None]
-    if consecutive and first:
-        raise click.UsageError("--consecutive and --first are two answers; give one")
-    if (consecutive or first) and given not in ([], ["-"]):
-        option = "--first" if first else "--consecutive"
-        raise click.UsageError(f"{option} is about the rows of a stream; leave A and B out")
+    if consecutive or first:
+        if (consecutive and first) or len(given) > 1:
+            one = "--consecutive and --first are two questions" if consecutive and first else "leave A and B out"
+            raise click.UsageError(f"rows are compared with one of themselves; {one}")
+        request = _along(consecutive=consecutive, velocity=velocity, beside=time_column or "")
+        request = request._replace(given=stream.given, degrees=deg, normalize=normalize)
+        return write_results(a or "-", stream, request, output)
     if len(given) < 2 or "-" in given:
         request = Request(given=stream.given, degrees=deg, normalize=normalize)
-        other_row = "start" if first else "previous" if consecutive else ""
-        return stream.run(_asked(a, b, request, other_row), output)
+        return stream.run(_asked(a, b, request), output)
     if stream.path:
         raise click.UsageError("-i FILE is read where - stands for A or B")
     pairs = combinations(given, stream.given, degrees=deg, normalize=normalize)
@@ -75,17 +105,24 @@ def command(
     return 0
 
 
-def _asked(a: str | None, b: str | None, plain: Request, other_row: str) -> Request:
-    """Compare a stream's rows with a fixed A or B, with another row, or with the row's own second pose."""
+def _along(*, consecutive: bool, velocity: bool, beside: str) -> Request:
+    """Compare a stream's rows with the row before, or with the first."""
+    from frametool.stream.operation import PREVIOUS, START, Operation
+    from frametool.stream.request import Request
+
+    # a row is seen from another one of the same stream, which is the same thing at another moment
+    operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
+    return Request(operation, beside=beside if velocity else None, rename=lambda _parent, name: (name, name))
+
+
+def _asked(a: str | None, b: str | None, plain: Request) -> Request:
+    """Compare a stream's rows with a fixed A or B, or with the row's own second pose."""
     from frametool.stream.operation import Operation
 
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
-        if not other_row:
-            return plain._replace(operation=Operation(of="pair"), poses=2)
-        # a row is seen from one before it, which is the same thing at an earlier time
-        return plain._replace(operation=Operation(of=other_row), rename=lambda _parent, name: (name, name))
+        return plain._replace(operation=Operation(of="pair"), poses=2)
     if a == b == "-":
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     first = a != "-"

@@ -69,11 +69,11 @@ def _explain(output: SimOutput, scene: Scene, step: int, form: str, precision: i
     """Write the derivation of one control step of the followers."""
     if told:
         raise click.UsageError(f"--explain-step derives one step in words; leave {' and '.join(told)} out")
-    from frametool.calc.explain.agreement import Plan
+    from frametool.calc.explain.agreement import DerivationStyle
     from frametool.calc.explain.follow import derive_follow
     from frametool.sim.followed import follow_steps
 
-    plan = Plan(output.style, significant(precision))
+    plan = DerivationStyle(output.style, significant(precision))
     text = derive_follow(follow_steps(scene, step), plan).render(form)
     with writing(output.output, force=output.force) as write:
         write(text)

@@ -12,7 +12,7 @@ from written import HOSTILE, ROTATIONS, SPECS, pose, rotation, seeded
 
 import frametool
 from frametool import explain
-from frametool.calc.explain.formula import as_latex, as_text, evaluated, parsed
+from frametool.calc.explain.formula_tree import as_latex, as_text, evaluated, parsed
 from frametool.calc.explain.render import FORMS
 from frametool.cli import explaining
 

@@ -1,0 +1,69 @@
+"""`frametool between`: the shortest rotation from one direction to another."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import TEXT, Command, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.poses import pose_source, usage_if_inline
+from frametool.cli.stderr import say
+from frametool.errors import FormatError
+from frametool.grammar.pose_algebra import turn_between
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.grammar.readers import Vector
+
+OPPOSITE = 1e-8  # radians from half a turn at which no digit of the axis is left
+
+
+@click.command(cls=Command, name="between")
+@click.argument("vectors", nargs=-1, required=True, type=TEXT, metavar="V1 V2")
+@rotation_options
+@result_options("poses")
+def command(vectors: tuple[str, ...], deg: bool, **options: Any) -> None:
+    """Print the shortest rotation that turns the direction V1 into the direction V2, and its angle.
+
+    \b
+      frametool between 1,0,0 0,1,0 --to rpy_deg
+      frametool between 0 0 1 0.1 -0.2 9.7
+      frametool between '{x: 0, y: 0, z: 1}' '[1, 1, 0]'
+
+    A vector is three numbers or a mapping, of any length but 0. Between opposite directions every axis at right
+    angles to them does; one is taken, and stderr says so.
+    """
+    output = Output("poses", deg=deg, **options)
+    start, end = _directions(vectors)
+    result = turn_between(start, end)
+    if result.extras["angle_deg"] > 180.0 - OPPOSITE:
+        say("note: the directions are opposite: half a turn about any axis at right angles to them; one was chosen")
+    output.poses([result])
+
+
+def _directions(texts: Sequence[str]) -> tuple[Vector, Vector]:
+    """Read two vectors: six bare numbers, or each by itself."""
+    if len(texts) == 6:
+        texts = ",".join(texts[:3]), ",".join(texts[3:])
+    found = [vector for text in texts for vector in _vectors(text)]
+    if len(found) != 2:
+        raise click.UsageError(f"two vectors are wanted, V1 and V2, of three numbers each; found {len(found)}")
+    return found[0], found[1]
+
+
+def _vectors(text: str) -> list[Vector]:
+    """Read the vectors of an argument."""
+    from frametool.stream.operation import Operation
+    from frametool.stream.record_values import documents
+    from frametool.stream.request import Request
+    from frametool.stream.row_layout import VECTOR
+
+    request = Request(Operation(moves=True), kind=VECTOR)
+    try:
+        read = documents(pose_source(text, points=True), request)
+        return [record.shape.position(record.values) for _, records in read for record in records]
+    except FormatError as error:
+        raise usage_if_inline(error) from None

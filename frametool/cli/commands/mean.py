@@ -1,0 +1,102 @@
+"""`frametool mean`: the mean of poses, and how far they lie from it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.cli.pasted_input import is_pasted
+from frametool.cli.poses import poses_from
+from frametool.cli.streaming import Stream, stream_options
+from frametool.errors import ValueInvalid
+from frametool.text.numbers import parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.grammar.result import Result
+    from frametool.stream.gathering import Gathered
+    from frametool.stream.request import Request
+
+
+@click.command(cls=Command, name="mean")
+@click.argument("poses", nargs=-1, type=TEXT, metavar="[POSE.. | FILE]")
+@click.option(
+    "--weights",
+    type=TEXT,
+    metavar="NAME | W,W,..",
+    help="column or key of each pose's weight, or the weights of the POSEs",
+)
+@rotation_options
+@pose_options
+@result_options("poses")
+@stream_options
+def command(poses: tuple[str, ...], weights: str | None, deg: bool, normalize: bool, **options: Any) -> int:
+    """Average poses: the mean position, the mean rotation, and how far the poses lie from them.
+
+    \b
+      frametool mean '{rpy_deg: [0, 0, 80]}' '{rpy_deg: [0, 0, 100]}'
+      frametool mean '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0]}' --weights 1,3
+      printf 'x,y,z,weight\\n0,0,0,1\\n4,0,0,3\\n' | frametool mean --weights weight
+
+    Poses are arguments, the rows of a FILE, or of standard input. The mean rotation is the chordal one: the least sum
+    of squared differences of matrices. distance_rms and distance_max are metres, angle_rms and angle_max radians (and
+    _deg degrees) between the poses and the mean.
+    """
+    stream = Stream(options)
+    output = Output("poses", deg=deg, **options)
+    from frametool.stream.gathering import Gathered
+    from frametool.stream.operation import Operation
+    from frametool.stream.request import Request
+
+    gathered = Gathered()
+    request = Request(
+        Operation(), given=stream.given, degrees=deg, normalize=normalize, beside=weights, gathered=gathered
+    )
+    status, given = 0, None
+    if len(poses) == 1 and poses[0] != "-" and not stream.path and not is_pasted(poses[0], stream.given):
+        stream.path, poses = poses[0], ()
+    if poses in ((), ("-",)):
+        status = stream.run(request, output)
+    else:
+        given = _take(poses, weights, request, gathered)
+    output.poses([_mean(gathered, given)])
+    return status
+
+
+def _take(poses: Sequence[str], weights: str | None, request: Request, gathered: Gathered) -> list[float] | None:
+    """Read the poses that are arguments; return their weights."""
+    for each in poses:
+        gathered.add(poses_from(each, request.given, degrees=request.degrees, normalize=request.normalize))
+    if weights is None:
+        return None
+    try:
+        return [parse_number(text.strip()) for text in weights.split(",")]
+    except ValueInvalid as error:
+        raise click.UsageError(f"--weights: {error}; of POSEs they are numbers, of rows the name of a column") from None
+
+
+def _mean(gathered: Gathered, given: list[float] | None) -> Result:
+    """Return the mean of what was gathered, with its spread."""
+    from frametool.geometry.spread import mean_and_spread
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result
+
+    transforms = gathered.transforms
+    mean, spread = mean_and_spread(transforms, gathered.weights if given is None else given)
+    pose = Pose.of(mean.components)
+    extras: dict[str, Any] = {"count": len(transforms)}
+    if gathered.placed:
+        extras |= {"distance_rms": spread.distance_rms, "distance_max": spread.distance_max}
+    else:
+        pose = pose._replace(position=None)
+    if gathered.turned:
+        extras |= {"angle_rms": spread.angle_rms, "angle_rms_deg": math.degrees(spread.angle_rms)}
+        extras |= {"angle_max": spread.angle_max, "angle_max_deg": math.degrees(spread.angle_max)}
+    else:
+        pose = pose._replace(rotation=None)
+    return Result(pose, extras)

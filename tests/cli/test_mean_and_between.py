@@ -1,0 +1,183 @@
+"""The mean of poses with its spread, and the shortest rotation between two directions, against SciPy."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Outcome
+
+    Run = Callable[..., Outcome]
+
+GENERATOR = np.random.default_rng(14)
+COUNT = 40
+TURNS = Rotation.from_rotvec(GENERATOR.normal(0.4, 0.5, (COUNT, 3)))
+PLACES = GENERATOR.normal(0.0, 3.0, (COUNT, 3))
+WEIGHTS = GENERATOR.uniform(0.0, 2.0, COUNT)
+ROWS = np.hstack([PLACES, TURNS.as_quat()])
+TABLE = "id,x,y,z,qx,qy,qz,qw,weight\n" + "".join(
+    f"{index},{','.join(map(repr, row.tolist()))},{weight!r}\n"
+    for index, (row, weight) in enumerate(zip(ROWS, WEIGHTS.tolist(), strict=True))
+)
+LINES = "".join(
+    json.dumps({"xyz": row[:3], "xyzw": row[3:], "weight": weight}) + "\n"
+    for row, weight in zip(ROWS.tolist(), WEIGHTS.tolist(), strict=True)
+)
+SPACES = "".join(f"{index} {' '.join(map(repr, row.tolist()))}\n" for index, row in enumerate(ROWS))
+
+
+def mean_of(outcome: Outcome) -> dict[str, Any]:
+    """Read the one result."""
+    assert outcome.status == 0, outcome.err
+    (line,) = outcome.out.splitlines()
+    found: dict[str, Any] = json.loads(line)
+    return found
+
+
+def check_mean(found: dict[str, Any], weights: Any) -> None:
+    """Compare with SciPy's mean and with the distances written out."""
+    turn = TURNS.mean(weights)
+    place = np.average(PLACES, axis=0, weights=weights)
+    ours = Rotation.from_quat([found["quaternion"][name] for name in "xyzw"])
+    assert (ours.inv() * turn).magnitude() < 1e-12
+    np.testing.assert_allclose(found["xyz"], place, rtol=0, atol=1e-12)
+    far, turned = np.linalg.norm(PLACES - place, axis=1), (turn.inv() * TURNS).magnitude()
+    assert found["count"] == COUNT
+    assert found["distance_rms"] == pytest.approx(np.sqrt(np.average(far**2, weights=weights)), abs=1e-12)
+    assert found["distance_max"] == pytest.approx(far.max(), abs=1e-12)
+    assert found["angle_rms"] == pytest.approx(np.sqrt(np.average(turned**2, weights=weights)), abs=1e-12)
+    assert found["angle_max"] == pytest.approx(turned.max(), abs=1e-12)
+    assert found["angle_max_deg"] == pytest.approx(np.degrees(turned.max()), abs=1e-10)
+
+
+@pytest.mark.parametrize("text", [TABLE, LINES, SPACES], ids=["csv", "jsonl", "tum"])
+def test_the_mean_of_a_stream_is_that_of_scipy(run: Run, text: str) -> None:
+    check_mean(mean_of(run("mean", "-f", "json", stdin=text)), None)
+
+
+@pytest.mark.parametrize("text", [TABLE, LINES], ids=["csv", "jsonl"])
+def test_a_column_weighs_the_poses(run: Run, text: str) -> None:
+    check_mean(mean_of(run("mean", "-f", "json", "--weights", "weight", stdin=text)), WEIGHTS)
+
+
+@pytest.mark.parametrize("arguments", [["poses.csv"], ["-i", "poses.csv"], ["-", "-i", "poses.csv"]])
+def test_a_file_is_read_however_it_is_named(run: Run, arguments: list[str]) -> None:
+    check_mean(mean_of(run("mean", *arguments, "-f", "json", files={"poses.csv": TABLE})), None)
+
+
+def test_poses_are_arguments_with_their_weights(run: Run) -> None:
+    poses = [json.dumps({"xyz": row[:3], "xyzw": row[3:]}) for row in ROWS.tolist()]
+    given = ["--weights", ",".join(map(repr, WEIGHTS.tolist()))]
+    check_mean(mean_of(run("mean", *poses, *given, "-f", "json")), WEIGHTS)
+
+
+def test_what_is_pasted_has_a_mean(run: Run) -> None:
+    assert run("mean", "[0,0,0,1]", "[0,0,1,0]", "--from", "xyzw", "--weights", "3,1").status == 0
+
+
+@pytest.mark.parametrize("text", ["x,y,z\n1,2,3\n3,4,5\n", '{"xyz":[1,2,3]}\n{"xyz":[3,4,5]}\n'])
+def test_points_have_a_mean_position_and_no_rotation(run: Run, text: str) -> None:
+    found = mean_of(run("mean", "-f", "json", stdin=text))
+    assert found == {"xyz": [2.0, 3.0, 4.0], "count": 2, "distance_rms": 3**0.5, "distance_max": 3**0.5}
+
+
+def test_rotations_have_a_mean_rotation_and_no_position(run: Run) -> None:
+    found = mean_of(run("mean", "-f", "json", "--from", "rpy_deg", "--to", "rpy_deg", stdin="0 0 80\n0 0 100\n"))
+    assert found["rpy_deg"] == {"roll": 0.0, "pitch": 0.0, "yaw": pytest.approx(90.0, abs=1e-12)}
+    assert "xyz" not in found
+
+
+def test_millimetres_count_as_they_are_named(run: Run) -> None:
+    assert mean_of(run("mean", "-f", "json", stdin="x_mm,y_mm,z_mm\n1000,0,0\n3000,0,0\n"))["xyz"] == [2.0, 0.0, 0.0]
+
+
+def test_a_result_reads_back(run: Run) -> None:
+    once = run("mean", "-f", "json", stdin=TABLE)
+    again = mean_of(run("mean", "-f", "json", stdin=once.out))
+    assert again["xyz"] == json.loads(once.out)["xyz"]
+
+
+@pytest.mark.parametrize(
+    ("stdin", "arguments", "said"),
+    [
+        ("", [], "nothing in it"),
+        ("x,y,z\n", [], "no poses"),
+        ("x,y,z,weight\n1,2,3,-1\n", ["--weights", "weight"], "negative"),
+        ("x,y,z,weight\n1,2,3,foo\n", ["--weights", "weight"], "'foo' is not a number"),
+        ("x,y,z,weight\n1,2,3,0\n", ["--weights", "weight"], "weight"),
+        ("x,y,z,w\n1,2,3,1\n", ["--weights", "wight"], "no column 'wight'"),
+        ('{"xyz":[1,2,3]}\n', ["--weights", "w"], "no key 'w'"),
+    ],
+)
+def test_what_has_no_mean_is_told(run: Run, stdin: str, arguments: list[str], said: str) -> None:
+    outcome = run("mean", *arguments, stdin=stdin)
+    assert outcome.status in (1, 2)
+    assert outcome.out == ""
+    assert said in outcome.err
+
+
+def test_rotations_without_a_mean_are_refused(run: Run) -> None:
+    outcome = run("mean", "{rpy_deg: [0, 0, 0]}", "{rpy_deg: [0, 0, 180]}")
+    assert outcome.status == 1
+    assert "so far apart that none is their mean" in outcome.err
+
+
+def test_bad_rows_are_skipped_and_counted(run: Run) -> None:
+    outcome = run("mean", "-f", "json", "--on-error", "skip", stdin="x,y,z\n1,2,3\nfoo,2,3\n3,2,3\n")
+    assert outcome.status == 3
+    assert json.loads(outcome.out)["xyz"] == [2.0, 2.0, 3.0]
+
+
+VECTORS = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, -2.0, 5.0], [1e-9, 1.0, 0.0], [-3.0, 0.1, 0.2], [1e200, 1e200, 0.0]]
+
+
+@pytest.mark.parametrize("start", VECTORS)
+@pytest.mark.parametrize("end", VECTORS)
+def test_between_is_the_shortest_rotation(run: Run, start: list[float], end: list[float]) -> None:
+    outcome = run("between", json.dumps(start), json.dumps(end), "-f", "json")
+    found = json.loads(outcome.out)
+    turn = Rotation.from_quat([found["quaternion"][name] for name in "xyzw"])
+    a, b = (np.array(each) / max(map(abs, each)) for each in (start, end))
+    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    np.testing.assert_allclose(turn.apply(a), b, rtol=0, atol=1e-12)
+    assert found["angle"] == pytest.approx(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["1", "0", "0", "0", "-1", "0"],
+        ["1,0,0", "0,-1,0"],
+        ["[1 0 0]", "[0, -1, 0]"],
+        ["{x: 1, y: 0, z: 0}", "{vector: [0, -2, 0]}"],
+    ],
+)
+def test_a_vector_is_written_in_any_way(run: Run, arguments: list[str]) -> None:
+    outcome = run("between", *arguments, "--to", "rpy_deg")
+    right = "rpy_deg: {roll: 0.0, pitch: 0.0, yaw: -90.0}\n"
+    assert outcome == (0, right + "angle: 1.5707963267948966\nangle_deg: 90.0\n", "")
+
+
+@pytest.mark.parametrize("vector", [[1.0, 0.0, 0.0], [0.0, 0.0, -2.0], [1.0, 2.0, 3.0]])
+def test_opposite_directions_are_half_a_turn_and_told(run: Run, vector: list[float]) -> None:
+    outcome = run("between", json.dumps(vector), json.dumps([-2.0 * part for part in vector]), "-f", "json")
+    found = json.loads(outcome.out)
+    assert found["angle_deg"] == pytest.approx(180.0, abs=1e-9)
+    assert "opposite" in outcome.err
+    assert "opposite" not in run("between", json.dumps(vector), "[1, 1, 0.5]").err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status"), [(["1,0,0", "0,0,0"], 1), (["1,0,0"], 2), (["1", "2"], 2), (["1,0,0", "0,1,nan"], 1)]
+)
+def test_what_is_no_direction_is_refused(run: Run, arguments: list[str], status: int) -> None:
+    outcome = run("between", *arguments)
+    assert (outcome.status, outcome.out) == (status, "")
+    assert outcome.err.count("\n") <= 3

@@ -1,0 +1,61 @@
+"""Errors quote little of the input and say the same thing once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Outcome
+
+    Run = Callable[..., Outcome]
+
+PROSE = "hello world " * 20000
+ENDLESS = '{"xyz": "' + "x" * 100000 + '"}'
+MANY_KEYS = "{" + ", ".join(f'"k{index}": {index}' for index in range(3000)) + "}"
+TYPOS = "{xyz: [0, 0, 1], " + ", ".join(f"rpyy{index}: 1" for index in range(67)) + "}"
+FRAMES = "frames:\n" + "".join(f"  - {{name: f{index}, parent: base, rol: 1}}\n" for index in range(67))
+
+
+@pytest.mark.parametrize("text", [PROSE, ENDLESS, MANY_KEYS, TYPOS, "[" + "1, " * 20000 + "1]"])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["convert", "f"], ["convert", "-i", "f"], ["compose", "f", "f"], ["invert", "f"], ["tree", "f"],
+        ["apply", "--transform", "f", "1", "2", "3"], ["apply", "--transform", "{}", "-i", "f"],
+        ["lookup", "f", "a", "b"], ["relative", "f", "{}"],
+    ],
+)  # fmt: skip
+def test_no_file_is_poured_into_an_error(run: Run, text: str, arguments: list[str]) -> None:
+    outcome = run(*arguments, files={"f": text})
+    assert outcome.status != 0
+    assert len(outcome.err) < 1200
+
+
+@pytest.mark.parametrize("text", [PROSE, ENDLESS, MANY_KEYS])
+def test_no_argument_is_poured_into_an_error(run: Run, text: str) -> None:
+    assert len(run("convert", text).err) < 1200
+    assert len(run("apply", "--transform", text, "1", "2", "3").err) < 1200
+
+
+def test_findings_in_the_same_words_are_one_line_with_their_count(run: Run) -> None:
+    outcome = run("check", "f.yaml", files={"f.yaml": FRAMES})
+    assert len(outcome.out.splitlines()) == 1
+    assert "(and 66 more: lines 3, 4, 5, 6, 7, ..)" in outcome.out
+    assert "67 errors" in outcome.err
+
+
+def test_findings_for_machines_stay_one_each(run: Run) -> None:
+    for form in ("json", "github"):
+        assert len(run("check", "f.yaml", "-f", form, files={"f.yaml": FRAMES}).out.splitlines()) == 67
+
+
+def test_warnings_about_many_poses_are_told_of_three_and_counted(run: Run) -> None:
+    poses = "".join(f"{{xyz: [0, 0, {at}], xyzw: [0, 0, 0.7071, 0.7071]}}\n---\n" for at in range(67))
+    outcome = run("convert", "f.yaml", "-f", "json", files={"f.yaml": poses})
+    assert outcome.status == 0
+    assert len(outcome.err.splitlines()) == 4
+    assert "64 more" in outcome.err
