@@ -94,7 +94,8 @@ class Output:
 
     def _blocks(self, results: Iterator[Result]) -> Iterator[str]:
         """Yield the text of the poses of a trajectory, block after block."""
-        from frametool.stream.pose_writer import PoseWriter, block_of
+        from frametool.stream.pose_values import block_of
+        from frametool.stream.pose_writer import PoseWriter
 
         writer = PoseWriter(self.style)
         while batch := list(islice(results, BLOCK)):

@@ -162,7 +162,8 @@ class Stream:
                 return self._gather(stream, form, request._replace(notations=()), name)
             from frametool.stream.row_layout import POSE
 
-            listed |= output.is_trajectory and bool(request.operation.extras(POSE))  # a trajectory has no room for them
+            # a trajectory has no room for more columns, or for other ones
+            listed |= output.is_trajectory and bool(request.operation.extras(POSE) or output.notations)
             if form not in RECORDS and (listed or output.told not in (None, form)) and not kindred:
                 return self._run_as_poses(stream, form, request, output)
             return self._run(stream, form, request, output)
@@ -172,7 +173,8 @@ class Stream:
         from frametool.cli.trees import answers
         from frametool.stream.as_poses import OtherForm
 
-        target = output.told or (form if "poses" in FORMATS[form].writes else "yaml")
+        keeps = "poses" in FORMATS[form].writes and not output.notations
+        target = output.told or (form if keeps else "csv")
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         name = self.path or "stdin"

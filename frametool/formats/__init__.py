@@ -113,6 +113,7 @@ FORMATS = {
         writer="frametool.formats.tum",
         signs=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
         states="world<-body, seconds, metres, quaternion x y z w",
+        asks=("frames",),
     ),
     "echo": Format(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
@@ -183,6 +184,7 @@ FORMATS = {
             ("line", rf"\d{{19}}(?:\s*,\s*{_NUMBER}){{7}}(?:(?:\s*,\s*{_NUMBER}){{9}})?\s*$"),
         ),
         states="world<-body (R<-S), nanoseconds, metres, quaternion w x y z",
+        asks=("frames",),
     ),
     "colmap": Format(
         "COLMAP images.txt",
@@ -196,6 +198,7 @@ FORMATS = {
             ("line", rf"\d+(?:[ \t]+{_NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
         ),
         states="the file holds camera<-world, quaternion w x y z",
+        asks=("frames", "stamps", "camera_axes"),
     ),
     "nerf": Format(
         "NeRF transforms.json",
@@ -206,6 +209,7 @@ FORMATS = {
         names=("transforms.json",),
         signs=(("json path", "frames/transform_matrix"),),
         states="world<-camera; opengl: x right, y up, z backward",
+        asks=("frames", "stamps", "camera_axes"),
     ),
     "kitti": Format(
         "KITTI poses",
@@ -215,6 +219,7 @@ FORMATS = {
         writer="frametool.formats.kitti",
         signs=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),),
         states="world<-cam0, metres",
+        asks=("frames", "stamps", "camera_axes"),
     ),
     "g2o": Format(
         "g2o pose graph",
@@ -225,6 +230,7 @@ FORMATS = {
         writer="frametool.formats.g2o",
         signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
         states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
+        asks=("frames", "stamps"),
     ),
     "open3d": Format(
         "Open3D camera trajectory",
@@ -238,6 +244,7 @@ FORMATS = {
             ("json path", "parameters/extrinsic"),
         ),
         states=".log holds world<-camera, .json camera<-world",
+        asks=("frames", "stamps", "camera_axes"),
     ),
     "bundler": Format(
         "Bundler's bundle.out",
@@ -245,6 +252,7 @@ FORMATS = {
         reader="frametool.formats.bundler",
         signs=(("text", r"\A\ufeff?# *Bundle file v"),),
         states="the file holds camera<-world; opengl: cameras look along -z",
+        asks=("frames", "stamps", "camera_axes"),
     ),
     "colmap-bin": Format(
         "COLMAP images.bin",

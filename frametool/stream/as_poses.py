@@ -22,7 +22,8 @@ from frametool.grammar.edges import Options, Tally, Topics, stop
 from frametool.stream.blocks import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused
 from frametool.stream.point_writer import PointWriter
-from frametool.stream.pose_writer import PoseWriter, kept, spans_of
+from frametool.stream.pose_values import kept, spans_of
+from frametool.stream.pose_writer import PoseWriter
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, RowNote, notes_of

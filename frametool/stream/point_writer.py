@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
 from frametool.formats import FORMATS
-from frametool.stream.pose_writer import plain_cell, texts_of
+from frametool.stream.pose_values import plain_cell, texts_of
 
 if TYPE_CHECKING:
     from frametool.grammar.result import Style

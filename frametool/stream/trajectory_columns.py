@@ -36,7 +36,7 @@ def as_trajectory(table: Table, form: str, request: Request, source: str) -> Tab
     """
     if request.given or request.columns:
         return table
-    if form in ("kitti", "euroc") and table.width not in WIDTHS[form]:
+    if form in ("kitti", "euroc") and not table.names and table.width not in WIDTHS[form]:
         wanted = " or ".join(map(str, WIDTHS[form]))
         line = table.head.count(b"\n") + 1
         raise FormatError(f"expected {wanted} numbers a line, found {table.width}", source=source, line=line)

@@ -330,6 +330,18 @@ def test_other_notations_are_refused_where_a_form_has_its_own(run: Run) -> None:
     assert (done.status, "writes rotations in its own way" in done.err) == (1, True)
 
 
+@pytest.mark.parametrize("form", ["colmap", "nerf", "open3d", "bundler", "g2o"])
+def test_other_notations_of_a_list_of_poses_come_as_a_table(form: str, run: Run) -> None:
+    done = run("convert", "--to", "rpy_deg", stdin=text_of(form, matrices(3)))
+    assert (done.status, done.out.splitlines()[0][:34]) == (0, "x,y,z,roll_deg,pitch_deg,yaw_deg,s")
+
+
+def test_a_trajectory_keeps_its_notation_where_its_form_is_asked_for(run: Run) -> None:
+    text = text_of("tum", matrices(3))
+    assert run("convert", "--in", "tum", "-f", "tum", "--to", "rpy", stdin=text).status == 1
+    assert run("convert", "--in", "tum", "--to", "rpy_deg", stdin=text).out.count("\n") == 3
+
+
 # --- hostile files ---
 
 BAD: dict[str, tuple[str, str]] = {
@@ -452,6 +464,16 @@ def test_in_its_own_form_a_stream_passes_all_that_is_not_ours(form: str, run: Ru
         ours = slice(1, 8) if form != "kitti" else slice(0, 12)
         assert old.split(delimiter)[: ours.start] == new.split(delimiter)[: ours.start]
         assert old.split(delimiter)[ours.stop :] == new.split(delimiter)[ours.stop :]
+
+
+def test_the_header_of_euroc_may_name_other_columns_too(run: Run) -> None:
+    head = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]"
+    text = head + "\n1403636579763555584, 1, 2, 3, 1, 0, 0, 0, 9\n1403636579763555585, 1, 2, 4, 1, 0, 0, 0, 9\n"
+    done = run("convert", "-f", "json", stdin=text)
+    assert json.loads(done.out.splitlines()[1]) == {
+        "xyz": [1.0, 2.0, 4.0], "quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, "stamp_ns": START + 1,
+        "v_RS_R_x [m s^-1]": 9,
+    }  # fmt: skip
 
 
 def test_the_header_of_euroc_stays(run: Run) -> None:

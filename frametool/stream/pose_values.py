@@ -1,0 +1,99 @@
+"""Blocks of poses to single results and back, and columns of texts to spans and back."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from frametool.documents.json_reader import JSON_NUMBER
+from frametool.documents.json_writer import Verbatim
+from frametool.errors import ValueInvalid
+from frametool.formats.pose_rows import IMAGE
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+from frametool.stream.table_poses import RowPoses
+from frametool.text.cells import without_quotes
+from frametool.text.spans import MARGIN, Spans, framed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def first_of(block: RowPoses) -> RowPoses:
+    """Return the first pose of a block."""
+    return kept(block, slice(0, 1))
+
+
+def kept(block: RowPoses, rows: slice) -> RowPoses:
+    """Return some poses of a block."""
+    size = len(block.numbers)
+    return block._replace(
+        numbers=block.numbers[rows],
+        stamps_ns=None if block.stamps_ns is None else block.stamps_ns[rows],
+        lines=block.lines[rows],
+        parents=block.parents[rows] if len(block.parents) == size else block.parents,
+        names=block.names[rows] if len(block.names) == size else block.names,
+        extras={name: Spans(each.data, each.starts[rows], each.ends[rows]) for name, each in block.extras.items()},
+    )
+
+
+def block_of(results: Sequence[Result]) -> RowPoses:
+    """Return results as a block of poses; raises ValueInvalid for one without a rotation."""
+    if any(result.pose.rotation is None for result in results):
+        raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+    stamps = [result.extras.get("stamp_ns") for result in results]
+    others = {name for result in results for name in result.extras} - {"stamp_ns"}
+    images = [str(result.extras.get(IMAGE, "")).encode() for result in results]
+    blank = [b""] * len(results)
+    names = {(result.pose.parent, result.pose.name) for result in results}
+    parent, name = next(iter(names))
+    return RowPoses(
+        np.array([result.pose.components for result in results]),
+        None if None in stamps else np.array(stamps, np.int64),
+        np.arange(len(results)),
+        [parent],
+        [name],
+        {each: spans_of(images if each == IMAGE else blank) for each in sorted(others)},
+    )
+
+
+def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
+    """Return a block as results, one a pose."""
+    size = len(block.numbers)
+    names, parents = (each if len(each) == size else list(each) * size for each in (block.names, block.parents))
+    others = {name: [plain_cell(text) for text in texts_of(spans)] for name, spans in block.extras.items()}
+    stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
+    made = []
+    for at, numbers in enumerate(block.numbers.tolist()):
+        own = 7 if placed else 4
+        pose = Pose.of(tuple(numbers[:7]) if placed else (0.0, 0.0, 0.0, *numbers[:4]), names[at], parents[at])
+        said: dict[str, Any] = dict(zip(extras, numbers[own:], strict=True))
+        if stamps is not None:
+            said["stamp_ns"] = stamps[at]
+        said |= {name: texts[at] for name, texts in others.items()}
+        made.append(Result(pose if placed else pose._replace(position=None), said))
+    return made
+
+
+def spans_of(texts: list[bytes]) -> Spans:
+    """Return texts, one a row, as spans."""
+    lengths = np.fromiter(map(len, texts), np.int64, len(texts))
+    ends = np.cumsum(lengths) + MARGIN
+    return Spans(framed(b"".join(texts)), ends - lengths, ends)
+
+
+def texts_of(cells: Spans) -> list[str]:
+    """Return the text of each cell, without its quotes."""
+    bare = without_quotes(cells)
+    data = bare.data.tobytes()
+    places = zip(bare.starts.tolist(), bare.ends.tolist(), strict=True)
+    return [data[start:end].decode("utf-8", "replace").strip().replace('""', '"') for start, end in places]
+
+
+def plain_cell(text: str) -> str | Verbatim | None:
+    """Return a cell as a plain value: numbers and truth values as they are written."""
+    if not text:
+        return None
+    return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text
