@@ -115,8 +115,12 @@ class Stream:
         return self.path is not None or argument in (None, "-")
 
     def takes_rows(self, path: str) -> bool:
-        """Stream a file that an argument names if it is a table; one of records, or none known, is not touched."""
-        if path == "-" or (self.told_form() or _form_of(path)) in ("", *RECORDS):
+        """Stream a file that an argument names if it is a table; one of records, or none known, is not touched.
+
+        What can be read once only, as `<(command)`, is streamed whatever it holds.
+        """
+        once = os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path))
+        if path == "-" or (not once and (self.told_form() or _form_of(path)) in ("", *RECORDS)):
             return False
         self.path = path
         return True

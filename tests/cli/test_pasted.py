@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
@@ -297,3 +300,10 @@ def test_what_is_wrong_with_a_paste_is_one_line(run: Run) -> None:
     assert "matrix is not a rotation" in outcome.err
 
 
+
+
+@pytest.mark.parametrize(("text", "place"), [("{xyz: [1, 2, 3]}", [1.0, 2.0, 3.0]), ("x,y,z,yaw\n1,2,3,0.5\n", [1.0, 2.0, 3.0])])
+def test_a_pipe_named_as_a_file_is_read_once(text: str, place: list[float]) -> None:
+    command = f"{sys.executable} -m frametool convert <(printf {shlex.quote(text)}) -f json"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL)
+    assert json.loads(done.stdout)["xyz"] == place
