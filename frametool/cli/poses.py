@@ -12,7 +12,6 @@ from frametool.cli.pasted_input import INLINE, is_inline, is_pasted, rewritten
 from frametool.documents.source import Source, read_text
 from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.grammar.pose import Pose
-from frametool.grammar.pose_algebra import inverse
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
 from frametool.grammar.rotation import read_spelled, rotation_of, spelled
 
@@ -107,7 +106,11 @@ class Factor(NamedTuple):
 
     def of(self, pose: Pose) -> Pose:
         """Return a pose of the argument, or its inverse."""
-        return inverse(pose) if self.is_inverse else pose
+        if not self.is_inverse:
+            return pose
+        from frametool.grammar.pose_algebra import inverse
+
+        return inverse(pose)
 
 
 def factors_of(arguments: Iterable[str]) -> list[Factor]:

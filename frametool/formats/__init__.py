@@ -33,6 +33,10 @@ class Format(NamedTuple):
     names: tuple[str, ...] = ()
 
 
+# what options say about files whose form leaves it open
+DIRECTIONS = ("parent-from-child", "child-from-parent")
+CAMERA_AXES = ("optical", "opengl")
+DH = ("standard", "modified")
 _TREE = "frametool.formats.tree_reader"
 _MESSAGES = "frametool.ros.message_reader"
 _TABLE = "frametool.stream.table_samples"

@@ -6,12 +6,12 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import bare, shown
+from frametool.formats import DIRECTIONS
 from frametool.formats.document_edges import Unclear, dotted
 from frametool.formats.matrix_keys import Ambiguous, Meaning, meaning_of, no_pose, partner_of
 from frametool.formats.matrix_values import grid_of, is_tagged, read_shift, read_turn, read_whole, whole_pose
 from frametool.formats.opencv_text import TAGS
 from frametool.formats.stated_poses import Stated, edges_of
-from frametool.grammar.edges import DIRECTIONS
 from frametool.grammar.readers import Misfit, kind, within
 
 if TYPE_CHECKING:

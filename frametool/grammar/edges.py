@@ -231,11 +231,6 @@ class Answers(NamedTuple):
         return (*self.frames[: len(defaults)], *defaults[len(self.frames) :])
 
 
-DIRECTIONS = ("parent-from-child", "child-from-parent")
-CAMERA_AXES = ("optical", "opengl")
-DH = ("standard", "modified")
-
-
 class Options(NamedTuple):
     """How a file of frames is read.
 

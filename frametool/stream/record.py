@@ -17,7 +17,6 @@ from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position, unknown_keys
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
-from frametool.ros import joint_state
 from frametool.ros.message_parts import read_stamp, whole_list
 from frametool.stream.row_layout import COVARIANCE, POINT, POSE, TWIST, VECTOR, WRENCH, Shape
 from frametool.stream.stamp_source import key_path
@@ -248,6 +247,8 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
 
     A JointState gives way to the pose, and the frame in its header becomes that of the pose.
     """
+    from frametool.ros import joint_state
+
     if joint_state.is_joint_state(value):
         members = tuple(key for key in joint_state.LISTS if key in value)
         header, parent = value.get("header"), Name()

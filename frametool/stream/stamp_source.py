@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.frames.stamps import BILLION, parse_stamp
 from frametool.grammar.readers import Misfit, kind
-from frametool.ros import joint_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -95,6 +94,8 @@ def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 
 
     The name of a joint leads to its position in a JointState.
     """
+    from frametool.ros import joint_state
+
     around = [document]
     for step in holder:
         around.append(around[-1][step])

@@ -7,8 +7,7 @@ from importlib import import_module
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from frametool.formats import FORMATS
-from frametool.grammar.edges import CAMERA_AXES, DH, DIRECTIONS
+from frametool.formats import CAMERA_AXES, DH, DIRECTIONS, FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -12,9 +12,10 @@ from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted
 from frametool.cli.poses import one_pose, pose_source, usage_if_inline, values_of
+from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
+from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.text.numbers import NotFinite, parse_number

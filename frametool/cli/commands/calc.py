@@ -17,8 +17,9 @@ from frametool.cli.calc_completion import Expression
 from frametool.cli.calc_names import file_named_in
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
+from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.trees import load_tree, reading_options
+from frametool.cli.trees import load_tree
 from frametool.documents.source import read_text
 
 if TYPE_CHECKING:

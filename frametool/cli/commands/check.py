@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.command import FILE, Command, pose_options, verbose_option
+from frametool.cli.reading_options import reading_options
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import opened, reading_options, state
+from frametool.cli.trees import opened, state
 from frametool.lint.findings import RULES, WRITERS
 from frametool.lint.rules import check
 

@@ -11,8 +11,8 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.explaining import Explaining, all_given, explain_options
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, factors_of, one_pose
+from frametool.cli.reading_options import pose_reading_options
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 from frametool.grammar.result import Result

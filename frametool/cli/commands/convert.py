@@ -13,9 +13,9 @@ from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
 from frametool.cli.poses import pose_from_numbers, pose_source, source_from_numbers, values_of
+from frametool.cli.reading_options import pose_reading_options
 from frametool.cli.stderr import say
 from frametool.cli.streaming import Stream, one_notation, stream_options
-from frametool.cli.trees import pose_reading_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, notation
@@ -163,7 +163,7 @@ def command(
 
 def _are_numbers(values: Sequence[str], *, told: bool) -> bool:
     """Tell bare numbers from mappings and files; one that is alone is a number where --from says of what."""
-    if len(values) != 1:
+    if len(values) != 1 or is_inline(values[0]):
         return bool(values) and not is_inline(values[0])
     try:
         parse_angle(values[0])
@@ -220,10 +220,10 @@ def _change_of_axes(axes: str | None, world: str | None) -> Operation:
 
 def _say_other_side(axes: str | None, world: str | None) -> None:
     """Tell what changes the axes of the other frame of a pose where such conventions come in pairs."""
-    from frametool.geometry.conventions import other_side
-
     if (axes is None) == (world is None):
         return
+    from frametool.geometry.conventions import other_side
+
     if axes and (other := other_side(axes, of_world=False)):
         say(f"note: the frame that poses are seen from keeps its axes; --world-axes {other} changes them")
     if world and (other := other_side(world, of_world=True)):

@@ -9,9 +9,10 @@ import click
 
 from frametool.cli.command import FILE, Command, Text, list_options, pose_options, verbose_option
 from frametool.cli.output import Output
+from frametool.cli.reading_options import reading_options
 from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns
-from frametool.cli.trees import FRAME, frame_name, is_quiet, load_sides, reading_options
+from frametool.cli.trees import FRAME, frame_name, is_quiet, load_sides
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.load import lines_of
 from frametool.lint.findings import github_command

@@ -18,8 +18,9 @@ from frametool.cli.command import (
     verbose_option,
 )
 from frametool.cli.output import Output
+from frametool.cli.reading_options import reading_options
 from frametool.cli.times import Skipped, Time, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
+from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import NoDataAt, ValueInvalid
 from frametool.frames.replay import checked_rate
 from frametool.grammar.looked_up import result_at

@@ -8,8 +8,9 @@ import click
 
 from frametool.cli.command import FILE, STREAMED, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
+from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import RECORDS, Stream, stream_options
-from frametool.cli.trees import FRAME, frame_name, opened, reading_options, state
+from frametool.cli.trees import FRAME, frame_name, opened, state
 from frametool.formats.detect import detect
 from frametool.formats.robot import robot_of
 from frametool.stream.faults import ROWS_SKIPPED

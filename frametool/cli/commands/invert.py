@@ -10,8 +10,8 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.explaining import Explaining, explain_options, given
 from frametool.cli.output import Output
 from frametool.cli.poses import write_results
+from frametool.cli.reading_options import pose_reading_options
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.trees import pose_reading_options
 
 
 @click.command(cls=Command, name="invert")

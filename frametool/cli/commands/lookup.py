@@ -10,9 +10,10 @@ from frametool.cli.command import FILE, Command, pose_options, result_options, r
 from frametool.cli.explaining import Explaining, explain_options
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.output import Output
+from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, Skipped, at_ns, read_times, rules, rules_options, times_option
-from frametool.cli.trees import FRAME, frame_name, load_tree, reading_options
+from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.grammar.edges import stop
 from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
 

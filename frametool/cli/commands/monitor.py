@@ -8,8 +8,9 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, verbose_option
 from frametool.cli.output import Output
+from frametool.cli.reading_options import reading_options
 from frametool.cli.stderr import say, say_error
-from frametool.cli.trees import opened, reading_options, state
+from frametool.cli.trees import opened, state
 from frametool.lint.monitor_report import monitor
 
 if TYPE_CHECKING:

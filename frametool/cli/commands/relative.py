@@ -10,8 +10,8 @@ from frametool.cli.command import TEXT, Command, pose_options, result_options, r
 from frametool.cli.explaining import Explaining, all_given, explain_options, one_argument
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose, write_results
+from frametool.cli.reading_options import pose_reading_options
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.trees import pose_reading_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
 

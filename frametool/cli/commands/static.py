@@ -9,7 +9,8 @@ import click
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import misuse_unless_rotations
-from frametool.cli.trees import load_tree, reading_options
+from frametool.cli.reading_options import reading_options
+from frametool.cli.trees import load_tree
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, shown
 from frametool.frames.tree import FrameTree

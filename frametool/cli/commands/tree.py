@@ -8,8 +8,9 @@ import click
 
 from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options, verbose_option
 from frametool.cli.output import Output
+from frametool.cli.reading_options import reading_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import load_tree, reading_options
+from frametool.cli.trees import load_tree
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,10 +11,11 @@ import click
 
 from frametool.cli.command import FILE, TEXT, Command, Text, decorated, verbose_option
 from frametool.cli.pictures import drawn
+from frametool.cli.reading_options import reading_options
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns, rules, rules_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, opened, reading_options
+from frametool.cli.trees import FRAME, frame_name, load_tree, opened
 from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import parse_angle
 
