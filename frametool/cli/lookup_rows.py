@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT
+from frametool.cli.completions import ColumnNames
 from frametool.cli.trees import frame_name
 from frametool.errors import UnknownFrame
 from frametool.geometry.representations import notation
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 def column_options(function: Function) -> Function:
     """Add to a command the options that name columns of frames; `RowFrames` takes them."""
     function = click.option(
-        "--source-column", type=TEXT, metavar="NAME", help="column of a table with each row's SOURCE"
+        "--source-column", type=ColumnNames(), metavar="NAME", help="column of a table with each row's SOURCE"
     )(function)
     return click.option(
-        "--target-column", type=TEXT, metavar="NAME", help="column of a table with each row's TARGET"
+        "--target-column", type=ColumnNames(), metavar="NAME", help="column of a table with each row's TARGET"
     )(function)
 
 

@@ -13,7 +13,6 @@ import click
 from frametool.cli.command import (
     FILE,
     STREAMED,
-    TEXT,
     TREES_OPENED,
     UTF8,
     Notations,
@@ -23,6 +22,7 @@ from frametool.cli.command import (
     say_if_verbose,
     verbose_option,
 )
+from frametool.cli.completions import ColumnNames
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
@@ -54,7 +54,7 @@ OPTIONS = {
         help="what unnamed numbers are",
     ),
     "columns": click.option(
-        "--columns", type=TEXT, metavar="NAME,..", multiple=True,
+        "--columns", type=ColumnNames(), metavar="NAME,..", multiple=True,
         help="our columns, by name or number; once for each pose",
     ),
     "keep": click.option("--keep", is_flag=True, help="add the result's columns, leave ours"),

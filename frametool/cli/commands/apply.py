@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.completions import ColumnNames
 from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options
 from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
@@ -50,14 +51,14 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option(
     "--frame-column",
     "frame_column",
-    type=TEXT,
+    type=ColumnNames(),
     metavar="NAME",
     help="column with each row's frame, without SOURCE",
 )
 @click.option(
     "--time-column",
     "time_column",
-    type=TEXT,
+    type=ColumnNames(),
     metavar="NAME",
     help="column or key of each row's own time",
 )

@@ -15,7 +15,8 @@ from frametool.calc.parser import mentions_row, walk
 from frametool.calc.scope import Scope
 from frametool.cli.calc_completion import Expression
 from frametool.cli.calc_names import file_named_in
-from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options
+from frametool.cli.completions import ColumnNames
 from frametool.cli.output import Output
 from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import Stream, stream_options
@@ -55,7 +56,7 @@ def _begins_with_minus(argument: str) -> bool:
 @click.option("-e", "expressions", multiple=True, type=Expression(), metavar="NAME=EXPR",
               help="a row's result in columns of its own: NAME, NAME_x ..; may be repeated; also EXPR, @FILE")
 @click.option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
-@click.option("--time-column", "time_column", type=TEXT, metavar="NAME",
+@click.option("--time-column", "time_column", type=ColumnNames(), metavar="NAME",
               help="of the time of @ row  [default: the one that looks so]")
 @rotation_options
 @pose_options

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
+from frametool.cli.completions import AxesName
 from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options, one_argument
 from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
@@ -49,12 +50,12 @@ class ConvertCommand(Command):
 @click.argument("values", nargs=-1, type=TEXT, metavar="[VALUES.. | POSE]")
 @click.option(
     "--axes",
-    type=TEXT,
+    type=AxesName(),
     metavar="NAME",
     help="the pose at the same place in these axes (help axes)",
 )
 @click.option(
-    "--world-axes", "world", type=TEXT, metavar="A_from_B", help="other axes of the frame it is seen from (help axes)"
+    "--world-axes", "world", type=AxesName(), metavar="A_from_B", help="axes of the frame it is seen from (help axes)"
 )
 @click.option(
     "--find",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.completions import ColumnNames
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_pasted
 from frametool.cli.poses import poses_from
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 @click.argument("poses", nargs=-1, type=TEXT, metavar="[POSE.. | FILE]")
 @click.option(
     "--weights",
-    type=TEXT,
+    type=ColumnNames(),
     metavar="NAME | W,W,..",
     help="column or key of each pose's weight, or the weights of the POSEs",
 )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.completions import ColumnNames
 from frametool.cli.explaining import Explaining, all_given, explain_options, one_argument
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose, write_results
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 @click.option(
     "--time-column",
     "time_column",
-    type=TEXT,
+    type=ColumnNames(),
     metavar="NAME",
     help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
 )
