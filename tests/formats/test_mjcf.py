@@ -52,8 +52,9 @@ def test_every_frame_is_where_mujoco_had_it(tmp_path: Path, number: int) -> None
         assert seen(tree, name)[:3].ravel() == pytest.approx(numbers, rel=1e-12, abs=1e-12)
 
 
-def test_every_frame_of_any_model_is_where_mujoco_has_it(tmp_path: Path) -> None:
+def test_every_frame_of_any_model_is_where_mujoco_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mujoco = pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)  # where it writes its log
     for seed in range(200, 260):
         text, kinds = mjcf_models.model(seed // 2)
         drawn = mjcf_models.values(seed, kinds) if seed % 2 else {}
