@@ -73,7 +73,12 @@ class WithHelp(click.Command):
     """A command with -h and --help, its options in groups."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options group by group: those of this command first."""
+        """Write the options group by group, those of this command first; then the commands of a group."""
+        self._format_groups(ctx, formatter)
+        if isinstance(self, click.Group):
+            self.format_commands(ctx, formatter)
+
+    def _format_groups(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         options = [each for each in self.get_params(ctx) if isinstance(each, click.Option) and not each.hidden]
         placed = {name: title for title, names in GROUPS.items() for name in names}
         shown = [each for each in options if placed.get(each.name or "") != NAMES_ONLY]

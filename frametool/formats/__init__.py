@@ -46,7 +46,7 @@ _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
 _SRDF = (
-    "group|group_state|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
+    "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
     "(?:disable|enable|disable_default)_collisions"
 )
 
@@ -282,7 +282,7 @@ FORMATS = {
             ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),
             ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
         ),
-        states="target<-source as each key says; metres",
+        states="target<-source as each key says; metres; intrinsics are not kept",
         asks=("direction", "frames"),
     ),
     "opencv": Format(
@@ -399,6 +399,11 @@ FORMATS = {
             ("xml text", r"(?s)\A(?!<launch\b).*?(?:<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b)"),
         ),
         instead="expand it: xacro FILE > robot.urdf (pip install xacro)",
+    ),
+    "ur": Format(
+        "UR kinematics, a chain that xacro puts into the robot",
+        signs=(("yaml key", "kinematics"),),
+        instead="expand the robot's URDF with it: xacro ur.urdf.xacro kinematics_params:=FILE ..",
     ),
     "camera_info": Format(
         "camera_info, the intrinsics of a camera",

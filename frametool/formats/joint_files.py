@@ -41,13 +41,17 @@ DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
 
 
 class Setting(NamedTuple):
-    """What a file says of one joint: its value as written, and when; `refuse` makes the error for the value's place."""
+    """What a file says of one joint: its value as written, and when; `refuse` makes the error for the value's place.
+
+    loose: it is from a state that speaks of more than the robot has: a fixed joint, or a base that floats, is left out
+    """
 
     joint: str
     value: Any
     stamp_ns: int | None
     refuse: Callable[[str, Path], FormatError]
     source: Source
+    loose: bool = False
 
 
 class JointFile:

@@ -109,6 +109,7 @@ class PoseReader:
             said.update(own_attributes(section.element))
         self.degrees = self.word(said, "angle", "degree", ("degree", "radian")) == "degree"
         self.limits_apply = self.word(said, "autolimits", "true", ("true", "false")) == "true"
+        self.aligns_free = self.word(said, "alignfree", "false", ("true", "false")) == "true"
         self.eulerseq = said["eulerseq"].text if "eulerseq" in said else "xyz"
         if len(self.eulerseq) != len("xyz") or not set(self.eulerseq) <= set("xyzXYZ"):
             message = f"eulerseq {shown(self.eulerseq)}; expected three of xyz (moving axes) and XYZ (fixed axes)"

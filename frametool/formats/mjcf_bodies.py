@@ -162,6 +162,9 @@ class MjcfModel:
         free = node.tag == "freejoint"
         attributes = own_attributes(node.element) if free else self.classes.attributes(node.element, inside.around)
         kind = "free" if free else self.poses.word(attributes, "type", "hinge", tuple(TYPES))
+        if kind == "free" and (node.attribute("align") or str(self.poses.aligns_free).lower()) == "true":
+            message = "alignfree: MuJoCo moves this body's frame onto its inertia, which is not computed here"
+            raise self.xml.error(node.element, f'{message}; write align="false", or {WHOLE}')
         name = node.attribute("name") or f"{body.name}/joint{len(body.joints) + 1}"
         if known := self.joint_names.get(name):
             raise self.xml.error(node.element, f"joint {shown(name)} twice; first in line {known.element.line}", "name")

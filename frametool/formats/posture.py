@@ -116,6 +116,9 @@ class Posture:
             for setting in JointFile(path, self.joints).settings():
                 if setting.joint in self.joints:
                     found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting)))
+                elif setting.loose and (setting.joint in self._fixed or type(setting.value) is dict):
+                    message = f"{path}: joint {shown(setting.joint)} does not move in the robot; its value is left out"
+                    self._options.tally.note(Note("odd", message, ()), 1)
                 else:
                     problem = unknown_joint(setting.joint, self.joints, self._fixed)
                     self._options.tally.unknown_joints.setdefault(setting.joint, setting.refuse(problem, ()))

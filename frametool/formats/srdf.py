@@ -88,7 +88,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
                 message = f"joint {shown(joint)} has another value in line {before.line}; say which: {groups}"
                 raise xml.error(element, message, "value")
             refuse = partial(_refused, xml, element)
-            yield Setting(joint, _value(xml, element, value), None, refuse, Source(xml.name, ""))
+            yield Setting(joint, _value(xml, element, value), None, refuse, Source(xml.name, ""), loose=True)
     if not first:
         raise _not_chosen(file.name, state, states)
 

@@ -23,7 +23,7 @@ from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import INDICES, Note, Reading
-from frametool.grammar.rotation import agreeing_rotation, rotation_of
+from frametool.grammar.rotation import TURN, agreeing_rotation, rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -202,6 +202,9 @@ class _Reader:
         x, y, z = numbers(element, "xyz", 3, "0 0 0")
         roll, pitch, yaw = numbers(element, "rpy", 3, "0 0 0")
         rotation = IDENTITY[3:]
+        if beyond := next((each for each in (roll, pitch, yaw) if abs(each) > TURN), None):
+            message = f"rpy {beyond:g} is more than a full turn in radians; degrees?"
+            self.options.tally.note(Note("degrees", message, ()), element.line)
         if roll or pitch or yaw:
             rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
         if "quat_xyzw" in element.attributes:

@@ -361,8 +361,21 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
     wanted = [*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)]
     known = {*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS}
     unknown = islice((key for key in value if wanted and key not in known), MOST_COMPARED)
-    if near := [(key, hint) for key in unknown if (hint := did_you_mean(key, wanted, cutoff=0.75))]:
+    if near := [(key, hint) for key in unknown if (hint := _meant(key, value[key], wanted))]:
         raise _unknown(near)
+
+
+# what others call a rotation or a position; as a list or mapping it is no further field of a record
+OTHER_WORDS = dict.fromkeys(("q", "quat", "quats", "quaternions", "orient", "rot", "so3"), "quaternion") | {
+    "pos": "xyz", "trans": "xyz", "tvec": "xyz", "loc": "xyz", "location": "xyz", "xzy": "xyz", "xyz_cm": "xyz_mm",
+    "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "rvec": "rotvec", "angle_axis": "axis_angle",
+}  # fmt: skip
+
+
+def _meant(key: str, value: Any, wanted: Sequence[str]) -> str:
+    """Return `; did you mean ..` for a key that is nearly a wanted one, or another word for it; "" for any other."""
+    word = OTHER_WORDS.get(key.lower(), "") if type(value) in (list, dict) else ""
+    return f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=0.75)
 
 
 def _refuse_disagreement(

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENT = b"#"
 NEWLINE = 10
+EIGHT = 8  # numbers without names are a trajectory's: t x y z qx qy qz qw
 UNCLOSED = "a quote is opened here and not closed"
 
 
@@ -88,7 +89,7 @@ def open_table(block: bytes, delimiter: bytes, *, header: bool, source: str) -> 
         head, titles, title, end = named
         return Table(delimiter, _names(titles, source), len(titles), mark + head, titles, title, end), rest
     if not own:
-        if header and delimiter:
+        if header and delimiter and len(cells) != EIGHT:
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
         return Table(delimiter, None, len(cells), mark + comments), rest
     title = line.rstrip(b"\r\n")

@@ -73,7 +73,8 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
-        return find_poses(table.names, request.given, request.poses, source)
+        names = ["" if name == request.beside else name for name in table.names]  # what it is for is known
+        return find_poses(names, request.given, request.poses, source)
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
         return [named_pose(spec, None, table.width, request.given)]
     raise FormatError(

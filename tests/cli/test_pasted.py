@@ -307,3 +307,32 @@ def test_a_pipe_named_as_a_file_is_read_once(text: str, place: list[float]) -> N
     command = f"{sys.executable} -m frametool convert <(printf {shlex.quote(text)}) -f json"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL)
     assert json.loads(done.stdout)["xyz"] == place
+
+
+@pytest.mark.parametrize(("key", "value", "meant"), [("quat", "[0, 0, 1, 0]", "quaternion"), ("rpi", "[0, 0, 1]", "rpy"), ("rvec", "[0, 0, 1]", "rotvec")])
+@pytest.mark.parametrize("command", ["convert", "invert"])
+def test_another_word_for_a_rotation_is_refused_with_ours(run: Run, command: str, key: str, value: str, meant: str) -> None:
+    done = run(command, f"{{xyz: [1, 2, 3], {key}: {value}}}")
+    assert done.status in (1, 2)
+    assert f"unknown key '{key}', did you mean '{meant}'?" in done.err
+
+
+def test_a_weight_called_w_is_no_part_of_a_quaternion(run: Run) -> None:
+    done = run("mean", "--weights", "w", "-f", "json", stdin="x,y,z,w\n0,0,0,1\n4,0,0,3\n")
+    assert json.loads(done.out)["xyz"] == [3.0, 0.0, 0.0]
+
+
+def test_eight_numbers_between_commas_are_a_trajectory_without_being_told(run: Run) -> None:
+    text = "1.0,0,0,0,0,0,0,1\n2.0,1,0,0,0,0,0,1\n"
+    assert json.loads(run("lookup", "-", "world", "body", "--at", "1.5", "-f", "json", stdin=text).out)["xyz"] == [0.5, 0.0, 0.0]
+
+
+def test_the_help_of_a_group_lists_its_commands(run: Run) -> None:
+    for arguments, named in (((), ("convert", "lookup", "calc")), (("sim",), ("follow", "run", "sweep", "teleop"))):
+        text = run(*arguments, "--help").out
+        assert all(f"\n  {name} " in text for name in named)
+
+
+def test_angles_of_a_urdf_beyond_a_turn_are_doubted(run: Run) -> None:
+    robot = '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin rpy="0 0 90"/></joint></robot>'
+    assert "rpy 90 is more than a full turn in radians; degrees? [degrees]" in run("check", "-", stdin=robot).out

@@ -319,3 +319,15 @@ def test_what_was_read_is_said_once(run: Callable[..., Any]) -> None:
     done = run("lookup", "a.xml", "world", "hand", files={"a.xml": KEYS})
     states = "parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)"
     assert done.err == f"frametool: a.xml: MJCF of MuJoCo, 4 joints at rest (--joint NAME=VALUE); {states}\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<mujoco><compiler alignfree="true"/><worldbody><body name="a"><freejoint/></body></worldbody></mujoco>',
+        '<mujoco><worldbody><body name="a"><freejoint align="true"/></body></worldbody></mujoco>',
+    ],
+)
+def test_a_frame_that_mujoco_moves_onto_its_inertia_is_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(FormatError, match="alignfree: MuJoCo moves this body's frame onto its inertia"):
+        read_all(tmp_path, text)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -95,3 +96,18 @@ def test_what_is_wrong_with_virtual_joints_is_named(run: Run) -> None:
 def test_urdf_and_srdf_are_told_apart_though_both_are_robots(run: Run) -> None:
     assert "URDF robot" in run("tree", "-v", "a", files={"a": URDF}).err
     assert "SRDF, the semantics of a robot" in run("tree", "a", files={"a": SRDF}).err
+
+
+def test_a_state_that_speaks_of_a_floating_base_or_a_fixed_joint_leaves_these_out(run: Callable[..., Any]) -> None:
+    robot = (
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="revolute"><parent link="a"/>'
+        '<child link="b"/><limit lower="-1" upper="1"/></joint><joint name="f" type="fixed"><parent link="b"/><child link="c"/></joint></robot>'
+    )
+    state = (
+        '<robot name="r"><gripper name="g"/><group_state name="home" group="g"><joint name="root" value="0 0 1 0 0 0 1"/>'
+        '<joint name="f" value="0.5"/><joint name="j" value="0.25"/></group_state></robot>'
+    )
+    files = {"a.urdf": robot, "a.srdf": state}
+    done = run("lookup", "a.urdf", "a", "c", "--joints", "a.srdf:home", "--to", "rotvec", "-f", "json", files=files)
+    assert json.loads(done.out)["rotvec"] == pytest.approx([0.25, 0.0, 0.0])
+    assert all(f"joint '{name}' does not move in the robot; its value is left out" in done.err for name in ("root", "f"))

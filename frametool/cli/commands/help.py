@@ -66,7 +66,7 @@ def command(ctx: click.Context, name: str | None) -> None:
             show_help(click.Context(found, parent=ctx.parent, info_name=name))
         return
     if name is not None and name not in known:
-        raise click.UsageError(f"no topic {shown(name)}{alternatives(name, (*known, *COMMANDS), 'topics')}")
+        raise click.UsageError(f"no topic {shown(name)}{alternatives(name, tuple(known | COMMANDS), 'topics')}")
     width = max(map(len, known))
     listed = "".join(f"  {each:{width}}  {about}\n" for each, about in known.items())
     with writing(None) as write:
