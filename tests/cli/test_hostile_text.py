@@ -31,6 +31,8 @@ def test_no_control_character_reaches_a_terminal(tmp_path: Path) -> None:
         for content in (TREE, MOVING):
             Path(os.fsdecode(bytes(tmp_path) + b"/" + name)).write_text(content)
             for command in COMMANDS:
+                if "FILE" not in command and (name, content) != (NAMES[0], TREE):
+                    continue  # the same each time
                 arguments = [word.replace("FILE", os.fsdecode(name)) for word in command.split(" ")]
                 done = subprocess.run([*TOOL, *arguments], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, check=False)
                 shown = (done.stdout + done.stderr).decode().replace("\n", "").replace("\ufffd", "")
