@@ -102,7 +102,7 @@ def command(
 
 def _given(arguments: Iterable[str], expressions: Iterable[str], scope: Scope) -> Iterator[tuple[str, bool]]:
     """Yield the expressions in order, and whether -e gave them; names of files are bound."""
-    for text in arguments:
+    for text in () if tuple(arguments) == ("-",) else arguments:  # a lone - is standard input, read in any case
         if file_named_in(text, scope) is None:
             yield text.strip(), False
     for text in expressions:
