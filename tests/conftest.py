@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from oracles_of_use import Tool
 
 # the same examples in every run, however busy the machine is
-settings.register_profile("steady", deadline=None, derandomize=True)
+settings.register_profile("steady", deadline=None, derandomize=True, max_examples=60)  # more: -m fuzz, -m large
 settings.load_profile("steady")
 
 
