@@ -12,7 +12,7 @@ from frametool import __version__
 from frametool.cli import COMMANDS
 from frametool.cli.command import EXIT_CODES
 from frametool.cli.commands.help import topic, topics
-from frametool.cli.help import GROUPS, option_row
+from frametool.cli.help_page import GROUPS, option_row
 
 FOLDER = Path(__file__).resolve().parent.parent / "frametool" / "data" / "share" / "man" / "man1"
 

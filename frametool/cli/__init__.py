@@ -98,7 +98,7 @@ def _run(arguments: list[str]) -> int:
 
     from frametool.cli.error_json import wants_json
     from frametool.cli.group import called
-    from frametool.cli.help import show_help
+    from frametool.cli.help_page import show_help
     from frametool.cli.stderr import say_error
     from frametool.errors import FrametoolError
     from frametool.stream.faults import Misused

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.help import WithHelp
+from frametool.cli.help_page import WithHelp
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.formats import FORMATS, readers, writers

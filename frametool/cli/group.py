@@ -10,7 +10,7 @@ import click
 
 from frametool import __version__
 from frametool.cli import COMMANDS
-from frametool.cli.help import WithHelp
+from frametool.cli.help_page import WithHelp
 from frametool.cli.sink import writing
 from frametool.errors import alternatives, shown
 

@@ -124,6 +124,8 @@ class Output:
             self.poses_as_they_come(sample_results(tree)) if self.is_trajectory else self.poses(sample_results(tree))
             return
         if self.style.form != "text":
+            if loses := FORMATS[self.style.form].loses:
+                say(f"note: {loses}")
             self.text(self._module("").write_tree(tree, self.style))
             return
         from frametool.view.tree_text import print_tree, write_tree

@@ -17,6 +17,7 @@ class Format(NamedTuple):
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
     asks: the options that say what it leaves open
+    loses: what a tree written in it may have had and it does not hold, told then
     instead: of a form that is known and not read: what to do
     """
 
@@ -29,6 +30,7 @@ class Format(NamedTuple):
     signs: tuple[tuple[str, str | bytes], ...] = ()
     states: str = ""
     asks: tuple[str, ...] = ()
+    loses: str = ""
     instead: str = ""
     names: tuple[str, ...] = ()
 
@@ -382,6 +384,7 @@ FORMATS = {
         writes=("tree",),
         writer="frametool.formats.urdf_writer",
         signs=(("xml", "robot"),),
+        loses="written as links that are fixed to one another; joints, limits and shapes are no frames",
         states="parent<-child, metres, radians, rpy about fixed axes",
     ),
     "srdf": Format(

@@ -15,6 +15,7 @@ from frametool.errors import FormatError, shown, warn
 from frametool.stream.header import has_names_of_ours
 from frametool.stream.output_columns import NAMED
 from frametool.stream.rows import Block, Broken
+from frametool.stream.trajectory_columns import TUM
 from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans
 
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENT = b"#"
 NEWLINE = 10
-EIGHT = 8  # numbers without names are a trajectory's: t x y z qx qy qz qw
 UNCLOSED = "a quote is opened here and not closed"
 
 
@@ -89,7 +89,7 @@ def open_table(block: bytes, delimiter: bytes, *, header: bool, source: str) -> 
         head, titles, title, end = named
         return Table(delimiter, _names(titles, source), len(titles), mark + head, titles, title, end), rest
     if not own:
-        if header and delimiter and len(cells) != EIGHT:
+        if header and delimiter and len(cells) != len(TUM):
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
         return Table(delimiter, None, len(cells), mark + comments), rest
     title = line.rstrip(b"\r\n")

@@ -164,8 +164,10 @@ def command(
 
 def _are_numbers(values: Sequence[str], *, told: bool) -> bool:
     """Tell bare numbers from mappings and files; one that is alone is a number where --from says of what."""
-    if len(values) != 1 or is_inline(values[0]):
-        return bool(values) and not is_inline(values[0])
+    if not values or is_inline(values[0]):
+        return False
+    if len(values) > 1:
+        return True
     try:
         parse_angle(values[0])
     except ValueInvalid:

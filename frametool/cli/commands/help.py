@@ -9,7 +9,7 @@ import click
 
 from frametool.cli import COMMANDS
 from frametool.cli.command import TEXT, Command
-from frametool.cli.help import show_help
+from frametool.cli.help_page import show_help
 from frametool.cli.sink import writing
 from frametool.errors import alternatives, shown
 

@@ -9,7 +9,6 @@ import click
 from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options, verbose_option
 from frametool.cli.output import Output
 from frametool.cli.reading_options import reading_options
-from frametool.cli.stderr import say
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import load_tree
 
@@ -48,6 +47,4 @@ def command(
     output = Output("tree", "trajectory", **options)
     frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize))
     stamp = at_ns(at)
-    if output.style.form == "urdf":
-        say("note: written as links that are fixed to one another; joints, limits and shapes are no frames")
     output.tree(frames if stamp is None else frames.tree_at(stamp), color)
