@@ -23,7 +23,7 @@ from frametool.geometry import arrays, quaternion, rigid
 from frametool.geometry.transform import Transform
 from frametool.stream.row_layout import POINT, POSE, VECTOR
 from frametool.stream.row_transforms import NOWHERE
-from frametool.stream.stamp_columns import stamps_of_seconds
+from frametool.text.seconds import nanoseconds_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -129,12 +129,13 @@ def _stamps(column: Any, name: str) -> tuple[Ints, Flags | None]:
     whole = in_one(column)
     missing = nulls_of(whole)
     seconds = whole.to_numpy(zero_copy_only=False).astype(np.float64)
+    stamps, none = nanoseconds_of(seconds)
     if missing is not None:
-        seconds[missing] = 0.0
-    if not np.isfinite(seconds).all():
-        row = int(np.argmin(np.isfinite(seconds)))
-        raise ValueInvalid(f"{name}[{row}]: {seconds[row]} is no time in seconds")
-    return stamps_of_seconds(seconds), missing
+        none &= ~missing
+    if none.any():
+        row = int(np.argmax(none))
+        raise ValueInvalid(f"{name}[{row}]: {seconds[row]} is no time in seconds; integers are nanoseconds")
+    return stamps, missing
 
 
 def _moved(mover: Components, given: Sequence[ArrowFloats], as_: str, nulls: Flags | None) -> Components:

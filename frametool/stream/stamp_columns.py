@@ -8,14 +8,14 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
-from frametool.stream.stamp_source import LARGEST, read_header_stamp, read_stamp
+from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
 from frametool.text.parse import LOWEST, trimmed
-from frametool.text.shortest import shortest_spans
-from frametool.text.spans import Spans, windows
+from frametool.text.spans import windows
 
 if TYPE_CHECKING:
-    from frametool.text.array_types import Bytes, Flags, Floats, Ints, Words
+    from frametool.text.array_types import Bytes, Flags, Ints, Words
+    from frametool.text.spans import Spans
 
 _WORDS = 3
 _LONGEST = 8 * _WORDS
@@ -38,28 +38,6 @@ def parse_stamps(cells: Spans, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
         except ValueInvalid as error:
             reasons[row] = str(error)
     return stamps, reasons
-
-
-def stamps_of_seconds(seconds: Floats) -> Ints:
-    """Return decimal seconds (n,), finite ones, as nanoseconds: what their shortest text says, not their last bit.
-
-    What is finer than a nanosecond is rounded.  Raises ValueInvalid for a time beyond 64 bits of nanoseconds.
-    """
-    cells = shortest_spans(seconds.reshape(-1, 1), b",")
-    stamps, reasons = parse_stamps(Spans(cells.data, cells.starts[:, 0], cells.ends[:, 0] - 1), in_ns=False)
-    for row in reasons:
-        stamps[row] = _rounded(float(seconds[row]))
-    return stamps
-
-
-def _rounded(seconds: float) -> int:
-    """Return seconds as whole nanoseconds; raises ValueInvalid."""
-    from decimal import Decimal
-
-    stamp_ns = round(Decimal(repr(seconds)) * BILLION)
-    if abs(stamp_ns) > LARGEST:
-        raise ValueInvalid(f"{seconds!r} s is beyond 64 bits of nanoseconds; are these some? then let them be integers")
-    return stamp_ns
 
 
 def parse_header_stamps(seconds: Spans, nanoseconds: Spans) -> tuple[Ints, dict[int, str]]:

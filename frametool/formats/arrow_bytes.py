@@ -1,0 +1,79 @@
+"""Where the bytes of pyarrow's files come from and go: files, pipes, and whoever writes what a batch became."""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from shutil import copyfileobj
+from stat import S_ISREG
+from tempfile import TemporaryFile
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import FormatError, printable
+from frametool.formats.arrow_columns import require_pyarrow
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.input_file import InputFile
+
+PIECE = 1 << 20  # bytes
+
+
+@contextmanager
+def translated(name: str) -> Iterator[None]:
+    """Turn whatever pyarrow raises for a broken file into one line; raises FormatError."""
+    pa = require_pyarrow(name)
+    try:
+        yield
+    except (pa.ArrowException, OSError, EOFError, UnicodeDecodeError) as error:
+        first = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise FormatError(f"it cannot be read: {printable(first[:200].rstrip('. '))}", source=name) from None
+
+
+def seekable(file: InputFile) -> tuple[Any, int]:
+    """Return what pyarrow reads at any place, and its size; what comes by a pipe is put into a file without a name."""
+    pa = require_pyarrow(file.name)
+    if file.path != "-" and S_ISREG(os.stat(file.path).st_mode):
+        return pa.OSFile(file.path), os.path.getsize(file.path)
+    stream: Any = file.stream
+    if not stream.seekable():
+        stream = TemporaryFile()  # noqa: SIM115 - it lives as long as what reads it
+        copyfileobj(file.stream, stream, PIECE)
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(0)
+    return pa.PythonFile(stream, mode="r"), size
+
+
+class Collected:
+    """A file to write to; what was written is taken out piece by piece."""
+
+    closed = False
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._pieces: list[bytes] = []
+        self._size = 0
+
+    def write(self, data: Any) -> int:
+        """Keep some bytes."""
+        piece = bytes(data)
+        self._pieces.append(piece)
+        self._size += len(piece)
+        return len(piece)
+
+    def tell(self) -> int:
+        """Return how many bytes were written so far."""
+        return self._size
+
+    def flush(self) -> None:
+        """Do nothing: what is written is there."""
+
+    def close(self) -> None:
+        """Take nothing more."""
+        self.closed = True
+
+    def taken(self) -> bytes:
+        """Return what was written since the last time."""
+        pieces, self._pieces = self._pieces, []
+        return b"".join(pieces)

@@ -1,0 +1,174 @@
+"""Parquet: groups of rows, read one after the other and written as they were: types, metadata, compression, groups."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import warn
+from frametool.formats.arrow_bytes import Collected, seekable, translated
+from frametool.formats.arrow_columns import require_pyarrow
+from frametool.formats.arrow_rows import ArrowBatch, ArrowRows, kind_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.documents.input_file import InputFile
+    from frametool.formats.column_file import ColumnWriter, Kind, Made, OutColumn
+    from frametool.grammar.result import Style
+    from frametool.text.array_types import Ints
+
+ROWS = 1 << 16  # a batch: what is made of it stays near the cache
+LARGEST = 1 << 28  # bytes of a group of rows that is held as a whole
+NEW_GROUP = 1 << 20  # rows of a group where the input has none
+SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of a number as it is
+DICTIONARIES = {"PLAIN_DICTIONARY", "RLE_DICTIONARY"}
+OWN_SCHEMA = b"ARROW:schema"
+
+
+class ParquetColumns:
+    """A file that was opened: its schema is read, its rows are not."""
+
+    vectors: tuple[tuple[str, ...], ...] = ()
+    gaps = False
+
+    def __init__(self, file: InputFile) -> None:
+        """Read the schema; raises FormatError."""
+        self.name = file.name
+        parquet = require_pyarrow(self.name, "parquet")
+        with translated(self.name):
+            source, _ = seekable(file)
+            self.file = parquet.ParquetFile(source)
+            self.schema = self.file.schema_arrow
+        self.about = self.file.metadata
+        self.names: tuple[str, ...] | None = tuple(self.schema.names)
+        self.width = len(self.schema.names)
+
+    def kind(self, place: int) -> Kind | None:
+        """Return the type of a column's numbers; None for what is no number."""
+        return kind_of(self.schema.field(place).type)
+
+    def batches(self) -> Iterator[ArrowBatch]:
+        """Yield the rows, group by group."""
+        told = False
+        for group in range(self.about.num_row_groups):
+            about = self.about.row_group(group)
+            share = _compressed(about) / max(about.num_rows, 1)
+            is_large = about.total_byte_size > LARGEST
+            if is_large and not told:
+                warn(f"{self.name}: groups of rows beyond {LARGEST >> 20} MiB are written in parts")
+                told = True
+            left = about.num_rows
+            for rows in self._pieces(group) if is_large else self._whole(group):
+                left -= rows.num_rows
+                yield ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
+
+    def _whole(self, group: int) -> Sequence[Any]:
+        """Return a group in batches; its columns are read side by side."""
+        with translated(self.name):
+            table = self.file.read_row_group(group)
+            return table.to_batches(max_chunksize=ROWS) or [_no_rows(self.schema)]
+
+    def _pieces(self, group: int) -> Iterator[Any]:
+        """Yield a group in batches that are read when they are asked for."""
+        pieces = self.file.iter_batches(batch_size=ROWS, row_groups=[group])
+        while True:
+            with translated(self.name):
+                rows = next(pieces, None)
+            if rows is None:
+                return
+            yield rows
+
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
+        """Return what writes the same schema, compressed in the same way; the form may be another one of Arrow's."""
+        del drops
+        from frametool.formats.arrow_files import writer_of
+
+        return writer_of(style.form, "parquet", columns, self.schema, self._compression())
+
+    def _compression(self) -> dict[str, Any]:
+        """Return how the columns are compressed and encoded, as the writer of pyarrow wants to be told."""
+        if not self.about.num_row_groups:
+            return {}
+        group = self.about.row_group(0)
+        columns = [group.column(at) for at in range(group.num_columns)]
+        codecs = {column.path_in_schema: _codec(column.compression) for column in columns}
+        stamps = [at for at, column in enumerate(columns) if column.physical_type == "INT96"]
+        return {
+            "compression": codecs,
+            "use_dictionary": [column.path_in_schema for column in columns if _repeats(column)],
+            "use_deprecated_int96_timestamps": bool(stamps),
+            "store_schema": OWN_SCHEMA in (self.about.metadata or {}),
+        }
+
+
+def _no_rows(schema: Any) -> Any:
+    """Return a batch of no rows."""
+    pa = require_pyarrow("Parquet")
+    return pa.RecordBatch.from_arrays([pa.array([], field.type) for field in schema], schema=schema)
+
+
+def _compressed(group: Any) -> int:
+    """Count the bytes that a group of rows takes in the file."""
+    return sum(group.column(at).total_compressed_size for at in range(group.num_columns))
+
+
+def _codec(name: str) -> str:
+    return "NONE" if name == "UNCOMPRESSED" else name
+
+
+def _repeats(column: Any) -> bool:
+    """Tell whether a dictionary of the values of a column made it shorter; for others trying costs time."""
+    plain = SIZES.get(column.physical_type, 0) * column.num_values
+    return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
+
+
+class Writer:
+    """Write rows in groups: those of the input, or of a million."""
+
+    def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
+        """Begin a file; `how` is the compression of the input's columns, others have that of most."""
+        del form
+        self.pa = require_pyarrow("Parquet")
+        self.rows = ArrowRows(columns, given)
+        self.sink = Collected()
+        codecs: dict[str, str] = how.get("compression", {})
+        if codecs:
+            usual = Counter(codecs.values()).most_common(1)[0][0]
+            missing = [field.name for field in self.rows.schema if field.name not in codecs]
+            how = {**how, "compression": {**dict.fromkeys(missing, usual), **codecs}}
+        parquet = require_pyarrow("Parquet", "parquet")
+        self.writer = parquet.ParquetWriter(self.pa.PythonFile(self.sink, mode="w"), self.rows.schema, **how)
+        self.waiting: list[Any] = []
+        self.size = self.count = self.read = 0
+
+    def of_rows(self, batch: ArrowBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
+        """Return what is written once a group of rows is whole."""
+        new = self.rows.of_batch(batch, rows, made)
+        self.waiting.append(new)
+        self.size += new.nbytes
+        self.count += new.num_rows
+        self.read += new.num_rows if batch is None else batch.size
+        ends = batch.ends_group if batch is not None else self.count >= NEW_GROUP
+        if ends or self.size > LARGEST:
+            self._write_group()
+        return self.sink.taken()
+
+    def _write_group(self) -> None:
+        """Write what waits; a group whose rows were all left out is none."""
+        if self.count or not self.read:
+            table = self.pa.Table.from_batches(self.waiting, self.rows.schema)
+            self.writer.write_table(table, row_group_size=max(self.count, 1))
+        self.waiting, self.size, self.count, self.read = [], 0, 0, 0
+
+    def end(self) -> bytes:
+        """Return the last group and what stands behind all."""
+        if self.waiting:
+            self._write_group()
+        self.writer.close()
+        return self.sink.taken()
+
+
+def open_columns(file: InputFile) -> ParquetColumns:
+    """Open a file; raises FormatError."""
+    return ParquetColumns(file)
