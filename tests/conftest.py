@@ -23,11 +23,6 @@ settings.register_profile("steady", deadline=None, derandomize=True, max_example
 settings.load_profile("steady")
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Name the marker of what runs only where engines are installed."""
-    config.addinivalue_line("markers", "engines: examples for Spark, Ray, dask, DuckDB, Polars; run with -m engines")
-
-
 class Outcome(NamedTuple):
     """What a run of the command line left behind."""
 

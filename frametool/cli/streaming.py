@@ -26,7 +26,7 @@ from frametool.cli.completions import ColumnNames
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
-from frametool.formats import FORMATS, holds_arrays, is_trajectory, readers
+from frametool.formats import FORMATS, are_kin, holds_arrays, is_trajectory, readers
 from frametool.formats.detect import by_sign, detect
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
@@ -162,7 +162,8 @@ class Stream:
                 request = request._replace(notations=())  # its rows stay what they are
             if form in RECORDS and (output.told or form) != form and request.gathered is None:
                 return self._run_as_values(stream, form, request, output)
-            if holds_arrays(form) and (output.told in (None, form) or request.gathered is not None):
+            kin = output.told is None or (output.told in FORMATS and are_kin(form, output.told))
+            if holds_arrays(form) and (kin or request.gathered is not None):
                 return self._run_columns(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES

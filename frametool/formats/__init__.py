@@ -43,6 +43,7 @@ DH = ("standard", "modified")
 _TREE = "frametool.formats.tree_reader"
 _MESSAGES = "frametool.ros.message_reader"
 _TABLE = "frametool.stream.table_samples"
+_ARROW = "frametool.formats.arrow_files"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _MESSAGE_KEYS = (
@@ -405,6 +406,38 @@ FORMATS = {
         writer="frametool.formats.npy",
         signs=(("magic", rb"\x93NUMPY"),),
     ),
+    "parquet": Format(
+        "Parquet (pip install 'frametool[arrow]')",
+        suffixes=(".parquet", ".pq"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"PAR1"),),
+    ),
+    "arrow": Format(
+        "a file of Arrow, Feather (pip install 'frametool[arrow]')",
+        suffixes=(".arrow", ".feather", ".ipc"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"ARROW1"),),
+    ),
+    "arrow-stream": Format(
+        "a stream of Arrow (pip install 'frametool[arrow]')",
+        suffixes=(".arrows",),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
+    ),
+    "feather1": Format(
+        "Feather of the first version",
+        signs=(("magic", rb"FEA1"),),
+        instead="write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)",
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
         suffixes=(".xacro",),
@@ -478,6 +511,11 @@ def is_trajectory(name: str) -> bool:
 def holds_arrays(name: str) -> bool:
     """Tell whether a form holds columns of numbers and no text."""
     return name in FORMATS and not {"arrays"}.isdisjoint((*FORMATS[name].reads, *FORMATS[name].writes))
+
+
+def are_kin(first: str, second: str) -> bool:
+    """Tell whether one module reads the first form and writes the second, with all that both can hold."""
+    return FORMATS[first].reader == FORMATS[second].writer
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
