@@ -46,25 +46,31 @@ def seekable(file: InputFile) -> tuple[Any, int]:
 
 
 class Collected:
-    """A file to write to; what was written is taken out piece by piece."""
+    """A file to write to, whose bytes are taken out piece by piece; the memory of a piece is that of the one before."""
 
     closed = False
 
     def __init__(self) -> None:
         """Begin with nothing."""
-        self._pieces: list[bytes] = []
-        self._size = 0
+        self._space = bytearray(PIECE)
+        self._filled = 0
+        self._taken = 0
 
     def write(self, data: Any) -> int:
         """Keep some bytes."""
-        piece = bytes(data)
-        self._pieces.append(piece)
-        self._size += len(piece)
+        piece = memoryview(data).cast("B")
+        end = self._filled + len(piece)
+        if end > len(self._space):
+            grown = bytearray(max(end, 2 * len(self._space)))
+            grown[: self._filled] = memoryview(self._space)[: self._filled]
+            self._space = grown
+        self._space[self._filled : end] = piece
+        self._filled = end
         return len(piece)
 
     def tell(self) -> int:
         """Return how many bytes were written so far."""
-        return self._size
+        return self._taken + self._filled
 
     def flush(self) -> None:
         """Do nothing: what is written is there."""
@@ -73,7 +79,8 @@ class Collected:
         """Take nothing more."""
         self.closed = True
 
-    def taken(self) -> bytes:
-        """Return what was written since the last time."""
-        pieces, self._pieces = self._pieces, []
-        return b"".join(pieces)
+    def taken(self) -> memoryview:
+        """Return what was written since the last time; it holds until the next bytes are written."""
+        size, self._filled = self._filled, 0
+        self._taken += size
+        return memoryview(self._space)[:size]

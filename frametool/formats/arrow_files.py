@@ -8,6 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from frametool.errors import FormatError, shown
 from frametool.formats.arrow_columns import require_pyarrow
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
 
 HOLDS_TEXTS = True
-PARQUET = b"PAR1"
+BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow", b"\xff\xff\xff\xff": "arrow-stream"}
 MODULES = {
     "parquet": "frametool.formats.parquet",
     "arrow": "frametool.formats.arrow_ipc",
@@ -31,7 +32,11 @@ def open_columns(file: InputFile, options: Options) -> ColumnFile:
     """Open a file of any of these forms; raises FileProblem without pyarrow, FormatError for a broken file."""
     del options
     require_pyarrow(file.name)
-    form = "parquet" if file.head().startswith(PARQUET) else "arrow"
+    head = file.head()
+    form = next((form for begin, form in BEGINNINGS.items() if head.startswith(begin)), "")
+    if not form:
+        found = f"it begins with {shown(head[:8])}" if head else "it is empty"
+        raise FormatError(f"neither Parquet (PAR1) nor Arrow (ARROW1): {found}", source=file.name)
     opened: ColumnFile = import_module(MODULES[form]).open_columns(file)
     return opened
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, Any
 
-from frametool.formats.arrow_bytes import Collected, seekable, translated
+from frametool.formats.arrow_bytes import seekable, translated
 from frametool.formats.arrow_columns import require_pyarrow
-from frametool.formats.arrow_rows import ArrowBatch, ArrowRows, kind_of
+from frametool.formats.arrow_rows import ArrowBatch, kind_of, no_rows
+from frametool.formats.arrow_writer import GroupWriter
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.input_file import InputFile
-    from frametool.formats.column_file import ColumnWriter, Kind, Made, OutColumn
+    from frametool.formats.column_file import ColumnWriter, Kind, OutColumn
     from frametool.grammar.result import Style
-    from frametool.text.array_types import Ints
 
 MAGIC = b"ARROW1"
 BODY_AT = 8  # behind the magic and two bytes that fill it up
@@ -131,43 +131,26 @@ def _table(message: memoryview, table: int, field: int) -> int:
     return place + int(struct.unpack_from("<i", message, place)[0])
 
 
-class Writer:
-    """Write batches as they come."""
+class Writer(GroupWriter):
+    """Write each group of rows as one batch."""
 
     def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
-        """Begin a file or a stream; `how` has the codec of the input's batches, if any."""
-        self.pa = require_pyarrow("Arrow")
-        self.rows = ArrowRows(columns, given)
-        self.sink = Collected()
+        """Begin with nothing; `how` has the codec of the input's batches, if any."""
+        super().__init__(columns, given)
+        self.form = form
+        self.codec = how.get("codec")
+
+    def begin(self) -> Any:
+        """Return the writer of a file or a stream."""
         ipc = require_pyarrow("Arrow", "ipc")
-        begin = ipc.new_file if form == "arrow" else ipc.new_stream
-        options = ipc.IpcWriteOptions(compression=how.get("codec"))
-        self.writer = begin(self.pa.PythonFile(self.sink, mode="w"), self.rows.schema, options=options)
-        self.waiting: list[Any] = []
-        self.read = 0
+        new = ipc.new_file if self.form == "arrow" else ipc.new_stream
+        return new(self.file, self.schema, options=ipc.IpcWriteOptions(compression=self.codec))
 
-    def of_rows(self, batch: ArrowBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Return what is written once a batch of the input is whole."""
-        self.waiting.append(self.rows.of_batch(batch, rows, made))
-        self.read += 0 if batch is None else batch.size
-        if batch is None or batch.ends_group:
-            self._write()
-        return self.sink.taken()
-
-    def _write(self) -> None:
-        """Write what waits as one batch; one whose rows were all left out is none."""
-        table = self.pa.Table.from_batches(self.waiting, self.rows.schema)
-        if table.num_rows or not self.read:
-            whole = self.waiting[0] if len(self.waiting) == 1 else self.pa.concat_batches(self.waiting)
-            self.writer.write_batch(whole)
-        self.waiting, self.read = [], 0
-
-    def end(self) -> bytes:
-        """Return what stands behind all."""
-        if self.waiting:
-            self._write()
-        self.writer.close()
-        return self.sink.taken()
+    def write(self, table: Any) -> None:
+        """Write a batch."""
+        batches = table.combine_chunks().to_batches()
+        for batch in batches or [no_rows(self.schema)]:
+            self.writer.write_batch(batch)
 
 
 def open_columns(file: InputFile) -> IpcColumns:

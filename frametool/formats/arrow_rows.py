@@ -34,6 +34,12 @@ def kind_of(arrow_type: Any) -> Kind | None:
     return NUMBERS.get(str(arrow_type))
 
 
+def no_rows(schema: Any) -> Any:
+    """Return a batch of no rows."""
+    pa = require_pyarrow("Arrow")
+    return pa.RecordBatch.from_arrays([pa.array([], field.type) for field in schema], schema=schema)
+
+
 class ArrowBatch:
     """Some rows of a file.
 

@@ -6,21 +6,19 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import warn
-from frametool.formats.arrow_bytes import Collected, seekable, translated
+from frametool.formats.arrow_bytes import seekable, translated
 from frametool.formats.arrow_columns import require_pyarrow
-from frametool.formats.arrow_rows import ArrowBatch, ArrowRows, kind_of
+from frametool.formats.arrow_rows import ArrowBatch, kind_of, no_rows
+from frametool.formats.arrow_writer import LARGEST, GroupWriter
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.input_file import InputFile
-    from frametool.formats.column_file import ColumnWriter, Kind, Made, OutColumn
+    from frametool.formats.column_file import ColumnWriter, Kind, OutColumn
     from frametool.grammar.result import Style
-    from frametool.text.array_types import Ints
 
 ROWS = 1 << 16  # a batch: what is made of it stays near the cache
-LARGEST = 1 << 28  # bytes of a group of rows that is held as a whole
-NEW_GROUP = 1 << 20  # rows of a group where the input has none
 SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of a number as it is
 DICTIONARIES = {"PLAIN_DICTIONARY", "RLE_DICTIONARY"}
 OWN_SCHEMA = b"ARROW:schema"
@@ -67,7 +65,7 @@ class ParquetColumns:
         """Return a group in batches; its columns are read side by side."""
         with translated(self.name):
             table = self.file.read_row_group(group)
-            return table.to_batches(max_chunksize=ROWS) or [_no_rows(self.schema)]
+            return table.to_batches(max_chunksize=ROWS) or [no_rows(self.schema)]
 
     def _pieces(self, group: int) -> Iterator[Any]:
         """Yield a group in batches that are read when they are asked for."""
@@ -102,12 +100,6 @@ class ParquetColumns:
         }
 
 
-def _no_rows(schema: Any) -> Any:
-    """Return a batch of no rows."""
-    pa = require_pyarrow("Parquet")
-    return pa.RecordBatch.from_arrays([pa.array([], field.type) for field in schema], schema=schema)
-
-
 def _compressed(group: Any) -> int:
     """Count the bytes that a group of rows takes in the file."""
     return sum(group.column(at).total_compressed_size for at in range(group.num_columns))
@@ -123,50 +115,27 @@ def _repeats(column: Any) -> bool:
     return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
 
 
-class Writer:
-    """Write rows in groups: those of the input, or of a million."""
+class Writer(GroupWriter):
+    """Write groups of rows."""
 
     def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
-        """Begin a file; `how` is the compression of the input's columns, others have that of most."""
+        """Begin with nothing; `how` is the compression of the input's columns, others have that of most."""
         del form
-        self.pa = require_pyarrow("Parquet")
-        self.rows = ArrowRows(columns, given)
-        self.sink = Collected()
-        codecs: dict[str, str] = how.get("compression", {})
+        super().__init__(columns, given)
+        self.how = how
+
+    def begin(self) -> Any:
+        """Return the writer of a file."""
+        how, codecs = self.how, self.how.get("compression")
         if codecs:
             usual = Counter(codecs.values()).most_common(1)[0][0]
-            missing = [field.name for field in self.rows.schema if field.name not in codecs]
+            missing = [field.name for field in self.schema if field.name not in codecs]
             how = {**how, "compression": {**dict.fromkeys(missing, usual), **codecs}}
-        parquet = require_pyarrow("Parquet", "parquet")
-        self.writer = parquet.ParquetWriter(self.pa.PythonFile(self.sink, mode="w"), self.rows.schema, **how)
-        self.waiting: list[Any] = []
-        self.size = self.count = self.read = 0
+        return require_pyarrow("Parquet", "parquet").ParquetWriter(self.file, self.schema, **how)
 
-    def of_rows(self, batch: ArrowBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Return what is written once a group of rows is whole."""
-        new = self.rows.of_batch(batch, rows, made)
-        self.waiting.append(new)
-        self.size += new.nbytes
-        self.count += new.num_rows
-        self.read += new.num_rows if batch is None else batch.size
-        ends = batch.ends_group if batch is not None else self.count >= NEW_GROUP
-        if ends or self.size > LARGEST:
-            self._write_group()
-        return self.sink.taken()
-
-    def _write_group(self) -> None:
-        """Write what waits; a group whose rows were all left out is none."""
-        if self.count or not self.read:
-            table = self.pa.Table.from_batches(self.waiting, self.rows.schema)
-            self.writer.write_table(table, row_group_size=max(self.count, 1))
-        self.waiting, self.size, self.count, self.read = [], 0, 0, 0
-
-    def end(self) -> bytes:
-        """Return the last group and what stands behind all."""
-        if self.waiting:
-            self._write_group()
-        self.writer.close()
-        return self.sink.taken()
+    def write(self, table: Any) -> None:
+        """Write a group."""
+        self.writer.write_table(table, row_group_size=max(table.num_rows, 1))
 
 
 def open_columns(file: InputFile) -> ParquetColumns:
