@@ -144,8 +144,7 @@ class ArrowRows:
     def _made(self, made: Made, field: Any) -> Any:
         """Return what is made as a column; raises ValueInvalid for a null that the schema does not allow."""
         if made.absent is not None and not field.nullable and made.absent.any():
-            row = int(np.argmax(made.absent)) + 1
-            raise ValueInvalid(f"column {field.name} may hold no null, and a row would be null (the {row}th of its batch)")
+            raise ValueInvalid(f"column {field.name} is declared not to hold nulls, and a row becomes null there")
         if isinstance(made.values, np.ndarray) and made.values.dtype.kind not in "USO":
             return column_of(made.values, made.absent, field.type)
         texts = self.pa.array([text or None for text in made.values], self.pa.string())

@@ -22,6 +22,7 @@ ROWS = 1 << 16  # a batch: what is made of it stays near the cache
 SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of a number as it is
 DICTIONARIES = {"PLAIN_DICTIONARY", "RLE_DICTIONARY"}
 OWN_SCHEMA = b"ARROW:schema"
+OLD_LIST = ".list.item"  # what lists were called before the standard's `.list.element`
 
 
 class ParquetColumns:
@@ -91,11 +92,11 @@ class ParquetColumns:
         group = self.about.row_group(0)
         columns = [group.column(at) for at in range(group.num_columns)]
         codecs = {column.path_in_schema: _codec(column.compression) for column in columns}
-        stamps = [at for at, column in enumerate(columns) if column.physical_type == "INT96"]
         return {
             "compression": codecs,
             "use_dictionary": [column.path_in_schema for column in columns if _repeats(column)],
-            "use_deprecated_int96_timestamps": bool(stamps),
+            "use_deprecated_int96_timestamps": any(column.physical_type == "INT96" for column in columns),
+            "use_compliant_nested_type": not any(OLD_LIST in column.path_in_schema for column in columns),
             "store_schema": OWN_SCHEMA in (self.about.metadata or {}),
         }
 
