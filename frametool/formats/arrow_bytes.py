@@ -31,18 +31,17 @@ def translated(name: str) -> Iterator[None]:
         raise FormatError(f"it cannot be read: {printable(first[:200].rstrip('. '))}", source=name) from None
 
 
-def seekable(file: InputFile) -> tuple[Any, int]:
-    """Return what pyarrow reads at any place, and its size; what comes by a pipe is put into a file without a name."""
+def seekable(file: InputFile) -> Any:
+    """Return what pyarrow reads at any place; what comes by a pipe is put into a file without a name first."""
     pa = require_pyarrow(file.name)
     if file.path != "-" and S_ISREG(os.stat(file.path).st_mode):
-        return pa.OSFile(file.path), os.path.getsize(file.path)
+        return pa.OSFile(file.path)
     stream: Any = file.stream
     if not stream.seekable():
         stream = TemporaryFile()  # noqa: SIM115 - it lives as long as what reads it
         copyfileobj(file.stream, stream, PIECE)
-    size = stream.seek(0, os.SEEK_END)
     stream.seek(0)
-    return pa.PythonFile(stream, mode="r"), size
+    return pa.PythonFile(stream, mode="r")
 
 
 class Collected:

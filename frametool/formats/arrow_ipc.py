@@ -41,7 +41,7 @@ class IpcColumns:
         ipc = require_pyarrow(self.name, "ipc")
         with translated(self.name):
             if self.form == "arrow":
-                self.reader = ipc.open_file(seekable(file)[0])
+                self.reader = ipc.open_file(seekable(file))
             else:
                 self.reader = ipc.open_stream(self.pa.PythonFile(file.stream, mode="r"))
             self.schema = self.reader.schema
@@ -57,7 +57,10 @@ class IpcColumns:
         for rows in self._records():
             for start in range(0, max(rows.num_rows, 1), ROWS):
                 part = rows.slice(start, ROWS)
-                yield ArrowBatch(part, part.nbytes, ends_group=start + ROWS >= rows.num_rows)
+                batch = ArrowBatch(part, part.nbytes, ends_group=start + ROWS >= rows.num_rows)
+                yield batch
+                batch.let_go()
+            rows = part = None  # before the next are read
 
     def _records(self) -> Iterator[Any]:
         """Yield the batches of the file."""

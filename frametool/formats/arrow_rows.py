@@ -53,6 +53,10 @@ class ArrowBatch:
         self.bytes_read = bytes_read
         self.ends_group = ends_group
 
+    def let_go(self) -> None:
+        """Hold the rows no longer: they keep their whole group in memory."""
+        self.rows = None
+
     @property
     def size(self) -> int:
         """Count the rows."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from frametool.formats.column_file import Made, OutColumn
     from frametool.text.array_types import Ints
 
-LARGEST = 1 << 28  # bytes of a group of rows that is held as a whole
+LARGEST = 3 << 26  # bytes of a group of rows that is held as a whole, four times in all: below 1 GB
 NEW_GROUP = 1 << 20  # rows of a group where the input has none
 OURS = ("frame", "name", "parent")  # columns of names that we make: frames, whatever they look like
 

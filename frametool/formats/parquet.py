@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from frametool.formats.column_file import ColumnWriter, Kind, OutColumn
     from frametool.grammar.result import Style
 
+SMALL = 1 << 26  # bytes of a group that may be held beside another one
+BUFFER = 1 << 20  # bytes that are read at once of a group that is not held
 ROWS = 1 << 16  # a batch: what is made of it stays near the cache
 SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of a number as it is
 DICTIONARIES = {"PLAIN_DICTIONARY", "RLE_DICTIONARY"}
@@ -36,10 +38,11 @@ class ParquetColumns:
         self.name = file.name
         parquet = require_pyarrow(self.name, "parquet")
         with translated(self.name):
-            source, _ = seekable(file)
-            self.file = parquet.ParquetFile(source)
+            self.source = seekable(file)
+            self.file = parquet.ParquetFile(self.source, pre_buffer=False)
             self.schema = self.file.schema_arrow
         self.about = self.file.metadata
+        self.told = False
         self.names: tuple[str, ...] | None = tuple(self.schema.names)
         self.width = len(self.schema.names)
 
@@ -48,29 +51,45 @@ class ParquetColumns:
         return kind_of(self.schema.field(place).type)
 
     def batches(self) -> Iterator[ArrowBatch]:
-        """Yield the rows, group by group."""
-        told = False
-        for group in range(self.about.num_row_groups):
-            about = self.about.row_group(group)
-            share = _compressed(about) / max(about.num_rows, 1)
-            is_large = about.total_byte_size > LARGEST
-            if is_large and not told:
-                warn(f"{self.name}: groups of rows beyond {LARGEST >> 20} MiB are written in parts")
-                told = True
-            left = about.num_rows
-            for rows in self._pieces(group) if is_large else self._whole(group):
-                left -= rows.num_rows
-                yield ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
+        """Yield the rows, group by group; while a small one is worked on, the next is read."""
+        from concurrent.futures import ThreadPoolExecutor
 
-    def _whole(self, group: int) -> Sequence[Any]:
-        """Return a group in batches; its columns are read side by side."""
+        count = self.about.num_row_groups
+        following = None
+        with ThreadPoolExecutor(1) as ahead:
+            for group in range(count):
+                table = self._table(group) if following is None else following.result()
+                is_small = self.about.row_group(group).total_byte_size <= SMALL
+                following = ahead.submit(self._table, group + 1) if is_small and group + 1 < count else None
+                yield from self._of_group(group, table)
+                table = None  # before the next is read
+
+    def _of_group(self, group: int, table: Any) -> Iterator[ArrowBatch]:
+        """Yield the batches of a group, of its table or, where that would be too large, as they are read."""
+        about = self.about.row_group(group)
+        share = sum(about.column(at).total_compressed_size for at in range(about.num_columns)) / max(about.num_rows, 1)
+        left = about.num_rows
+        for rows in self._pieces(group) if table is None else _batches_of(table, self.schema):
+            left -= rows.num_rows
+            batch = ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
+            yield batch
+            batch.let_go()
+
+    def _table(self, group: int) -> Any:
+        """Read a group, its columns side by side; None for one that is too large to be held."""
+        if self.about.row_group(group).total_byte_size > LARGEST:
+            return None
         with translated(self.name):
-            table = self.file.read_row_group(group)
-            return table.to_batches(max_chunksize=ROWS) or [no_rows(self.schema)]
+            return self.file.read_row_group(group)
 
     def _pieces(self, group: int) -> Iterator[Any]:
         """Yield a group in batches that are read when they are asked for."""
-        pieces = self.file.iter_batches(batch_size=ROWS, row_groups=[group])
+        if not self.told:
+            warn(f"{self.name}: groups of rows beyond {LARGEST >> 20} MiB are written in parts")
+            self.told = True
+        parquet = require_pyarrow(self.name, "parquet")
+        file = parquet.ParquetFile(self.source, metadata=self.about, buffer_size=BUFFER, pre_buffer=False)
+        pieces = file.iter_batches(batch_size=ROWS, row_groups=[group])
         while True:
             with translated(self.name):
                 rows = next(pieces, None)
@@ -101,9 +120,9 @@ class ParquetColumns:
         }
 
 
-def _compressed(group: Any) -> int:
-    """Count the bytes that a group of rows takes in the file."""
-    return sum(group.column(at).total_compressed_size for at in range(group.num_columns))
+def _batches_of(table: Any, schema: Any) -> Sequence[Any]:
+    """Return a table in batches, one where it has no rows."""
+    return table.to_batches(max_chunksize=ROWS) or [no_rows(schema)]
 
 
 def _codec(name: str) -> str:
