@@ -188,6 +188,8 @@ class Stream:
         from frametool.stream.column_stream import run_columns
 
         name = self.path or "stdin"
+        if output.path is None and request.gathered is None and sys.stdout.isatty():
+            raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))

@@ -60,7 +60,7 @@ class IpcColumns:
                 batch = ArrowBatch(part, part.nbytes, ends_group=start + ROWS >= rows.num_rows)
                 yield batch
                 batch.let_go()
-            rows = part = None  # before the next are read
+            del rows, part  # before the next are read
 
     def _records(self) -> Iterator[Any]:
         """Yield the batches of the file."""

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 # bits of whole numbers -> how numpy calls them, as Arrow prints its types
 WHOLES = {f"{sign}int{bits}": np.dtype(f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)}
 NUMBERS: dict[str, Kind] = {**WHOLES, **{name: np.dtype(kind) for name, kind in DTYPES.items()}}
-TEXTS = ("string", "large_string", "string_view")
 NO_TIME = "no time: null"
 
 
@@ -96,9 +95,11 @@ class ArrowBatch:
             raise ValueInvalid(f"column {shown(name)}: {seconds[row]} s is beyond 64 bits of nanoseconds; {remedy}")
 
     def texts(self, place: int) -> list[str]:
-        """Return a column as texts, "" for null; what is nested as JSON."""
+        """Return a column as texts, "" for null; what is nested as JSON, bytes that are no UTF-8 as \\xff."""
         column = self.rows.column(place)
         pa = require_pyarrow("an Arrow column")
+        if "binary" in str(column.type):
+            return [(data or b"").decode("utf-8", "backslashreplace") for data in column.to_pylist()]
         try:
             return [text or "" for text in column.cast(pa.string()).to_pylist()]
         except (pa.ArrowInvalid, pa.ArrowNotImplementedError, pa.ArrowTypeError):
