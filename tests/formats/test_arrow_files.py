@@ -414,14 +414,15 @@ def test_what_is_no_such_file_is_said_in_one_line(use: Use, data: bytes, words: 
     assert words in done.err
 
 
-def test_bytes_that_flipped_are_one_line_or_other_numbers(use: Use) -> None:
-    data = encoded(cloud().select(["id", *XYZ]), codec="zstd")
+@pytest.mark.parametrize("form", FORMS)
+def test_bytes_that_flipped_are_one_line_or_other_numbers(use: Use, form: str) -> None:
+    data = encoded(cloud().select(["id", *XYZ, "tag"]), form, codec="zstd")
     generator = np.random.default_rng(3)
-    for _ in range(60):
+    for _ in range(30):
         broken = bytearray(data)
         for place in generator.integers(4, len(data), 3).tolist():
             broken[place] ^= 1 << int(generator.integers(8))
-        done = use("apply", "--transform", POSE, data=bytes(broken))
+        done = use("apply", "--transform", POSE, data=bytes(broken), form=form)
         assert done.status in (0, 1, 2)
         assert (done.status == 0) == bool(done.data)
         assert len(done.err) < 2000
@@ -441,6 +442,23 @@ def test_columns_that_cannot_be_moved_are_named(use: Use, columns: dict[str, Any
     done = use("apply", "--transform", POSE, data=encoded(pa.table(columns)))
     assert (done.status, done.err.count("\n"), done.data) in ((1, 1, b""), (2, 1, b""))
     assert words in done.err
+
+
+def test_a_group_too_large_to_be_held_is_written_in_parts(use: Use, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("parquet", "arrow_writer"):
+        monkeypatch.setattr(f"frametool.formats.{module}.LARGEST", 1 << 20)
+    xyz = np.random.default_rng(4).normal(size=(200_000, 3))
+    given = pa.table(dict(zip(XYZ, xyz.T, strict=True)))
+    done = use("apply", "--transform", POSE, data=encoded(given, rows=None))
+    assert points(done.table()).tobytes() == MOVER.apply(xyz).tobytes()
+    assert done.err.count("\n") == done.err.count("are written in parts") == 1
+    assert pq.ParquetFile(io.BytesIO(done.data)).num_row_groups == 4
+
+
+def test_bytes_are_text_where_they_are_utf_8_and_escaped_elsewhere(run: Callable[..., Outcome]) -> None:
+    given = pa.table({**{name: [1.0, 2.0] for name in XYZ}, "raw": pa.array([b"caf\xc3\xa9", b"\xff\x00"])})
+    rows = run("apply", "--transform", POSE, "-f", "csv", stdin=encoded(given)).out.splitlines()
+    assert [row.split(",")[-1] for row in rows[1:]] == ["caf\u00e9", "\\xff\x00"]
 
 
 def test_without_pyarrow_the_extra_is_named(use: Use, monkeypatch: pytest.MonkeyPatch) -> None:
