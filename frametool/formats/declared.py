@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import stat
-from typing import TYPE_CHECKING
+from shutil import copyfileobj
+from tempfile import TemporaryFile
+from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError
 
@@ -60,6 +62,14 @@ def pieces(stream: BinaryIO) -> Iterator[bytes]:
     """Yield the rest of a stream."""
     while piece := stream.read(PIECE):
         yield piece
+
+
+def kept_in_file(stream: BinaryIO) -> BinaryIO:
+    """Return a file with the rest of a stream, for what has to be read here and there."""
+    kept: Any = TemporaryFile()  # noqa: SIM115 - gone when it is let go
+    copyfileobj(stream, kept, PIECE)
+    kept.seek(0)
+    return kept  # type: ignore[no-any-return]
 
 
 def read_exactly(file: InputFile, size: int, what: str) -> bytes:
