@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from copy import deepcopy
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
+from weakref import finalize
 
 import numpy as np
 
@@ -176,50 +177,54 @@ class LasWriter:
         self.packed = packed
         self.given = given
         self.name = given.file.name if given else "las"
-        self.kept = TemporaryFile()  # noqa: SIM115 - closed at the end
+        self.kept = TemporaryFile()  # noqa: SIM115 - closed with the writer
+        finalize(self, self.kept.close)
         self.writer: Any = None
         self.count = 0
+        self.left_out = 0  # points without numbers
 
     def of_rows(self, batch: LasBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Take the points of a batch; nothing is written yet."""
-        laspy = _laspy(self.name)
-        new = {
-            column.name: each.values
-            for column, each in zip((each for each in self.columns if each.passed is None), made, strict=True)
-        }
-        size = len(made[0].values)
-        if not size:
+        """Take the points of a batch, those that have a place; nothing is written yet."""
+        columns = [each for each in self.columns if each.passed is None]
+        new = {column.name: np.asarray(each.values) for column, each in zip(columns, made, strict=True)}
+        there = np.all([np.isfinite(new[name]) for name in XYZ if name in new], axis=0)
+        if not there.all():
+            self.left_out += int(np.count_nonzero(~there))
+            new = {name: values[there] for name, values in new.items()}
+            rows = np.flatnonzero(there) if rows is None else rows[there]
+        if not there.any():
             return b""
         self._begin(new)
         with _refusals(self.name):
-            if batch is None:
-                points = laspy.ScaleAwarePointRecord.zeros(size, header=self.header)
-            else:
-                array = batch.points.array if rows is None else batch.points.array[rows]
-                points = laspy.ScaleAwarePointRecord(
-                    array.copy(), batch.points.point_format, self.header.scales, self.header.offsets
-                )
-            for name, values in new.items():
-                if name in XYZ:
-                    points.array[name.upper()] = self._stored(values, XYZ.index(name))
-                else:
-                    points[name] = values
-            self.writer.write_points(points)
-        self.count += size
+            self.writer.write_points(self._points(batch, rows, new))
+        self.count += len(there)
         return b""
 
     def _begin(self, new: dict[str, Any]) -> None:
         """Choose the offsets near the first points, and write the header."""
         if self.writer is not None:
             return
-        laspy = _laspy(self.name)
-        middle = [float(np.median(new[name])) if len(new[name]) else 0.0 for name in XYZ if name in new]
-        if len(middle) == len(XYZ):
-            if not np.isfinite(middle).all():
-                raise ValueInvalid("las holds no nan: every point has a place")
-            self.header.offsets = np.rint(middle)
+        if set(XYZ) <= new.keys():
+            self.header.offsets = np.rint([np.median(new[name]) for name in XYZ])
         with _refusals(self.name):
-            self.writer = laspy.LasWriter(self.kept, self.header, do_compress=self.packed, closefd=False)
+            self.writer = _laspy(self.name).LasWriter(
+                self.kept, self.header, do_compress=self.packed, closefd=False
+            )
+
+    def _points(self, batch: LasBatch | None, rows: Ints | None, new: dict[str, Any]) -> Any:
+        """Return points as the library writes them."""
+        kind = _laspy(self.name).ScaleAwarePointRecord
+        if batch is None:
+            points = kind.zeros(len(new["x"]), header=self.header)
+        else:
+            array = batch.points.array.copy() if rows is None else batch.points.array[rows]
+            points = kind(array, batch.points.point_format, self.header.scales, self.header.offsets)
+        for name, values in new.items():
+            if name in XYZ:
+                points.array[name.upper()] = self._stored(values, XYZ.index(name))
+            else:
+                points[name] = values
+        return points
 
     def _stored(self, values: Floats, axis: int) -> Ints:
         """Return coordinates as they are stored; raises FormatError for one that does not fit."""
@@ -245,10 +250,12 @@ class LasWriter:
                 self.writer.write_evlrs(evlrs)
             self.writer.close()
         scales = ", ".join(f"{scale:g}" for scale in dict.fromkeys(map(float, self.header.scales)))
-        warn(f"{self.name}: x y z are rounded to the scale of the file, {scales} m")
+        warn(f"{self.name}: x y z are rounded to the scale of las, {scales} m")
+        if self.left_out:
+            rows = "1 point" if self.left_out == 1 else f"{self.left_out} points"
+            warn(f"{self.name}: {rows} without numbers left out: las has no place for them")
         self.kept.seek(0)
-        with self.kept:
-            yield from pieces(self.kept)  # type: ignore[arg-type]
+        yield from pieces(self.kept)
 
 
 @contextmanager

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 NORMALS = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
 KINDS = {"f": "F", "i": "I", "u": "U", "b": "U"}
 _BEGIN = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n"
+_FIELD_KEYS = ("FIELDS", "SIZE", "TYPE", "COUNT")
 _HALF = 2  # bytes of a float that PCD has no type for
 
 
@@ -91,9 +92,7 @@ class PcdFile:
         if quaternion.complaint(x, y, z, w):
             warn(f"{name}: VIEWPOINT is left as it is: {' '.join(f'{each:g}' for each in given[3:])} is no rotation")
             return
-        tx, ty, tz, x, y, z, w = rigid.compose(*pose, tx, ty, tz, *quaternion.repaired(x, y, z, w, floats))
-        x, y, z, w = quaternion.from_quaternion(x, y, z, w, floats)
-        self.viewpoint = " ".join(repr(each + 0.0) for each in (tx, ty, tz, w, x, y, z))
+        self.viewpoint = viewpoint_words(rigid.compose(*pose, tx, ty, tz, *quaternion.repaired(x, y, z, w, floats)))
 
     def batches(self) -> Iterator[Batch]:
         """Yield the points; raises FormatError where the file ends too early, or holds more."""
@@ -212,20 +211,33 @@ class PcdWriter(StructuredWriter):
 
     def __init__(
         self, columns: Sequence[OutColumn], fields: Sequence[str], kind: Kind, *, count: int | None,
-        head: Callable[[int], bytes], cloud: PcdFile | None = None,
+        head: Callable[[int], bytes] | None = None, cloud: PcdFile | None = None,
     ) -> None:  # fmt: skip
-        """Take what makes the header for so many points, and the cloud that they come from."""
+        """Take what makes the header for so many points, and the cloud that they come from; without it `words` do."""
         super().__init__(columns, fields, kind, count=count)
         self.head_of = head
         self.cloud = cloud
+        self.words: dict[str, str] = {}
 
     def head(self, count: int) -> bytes:
         """Return the header."""
-        return self.head_of(count)
+        if self.head_of is not None:
+            return self.head_of(count)
+        words = {"WIDTH": str(count), "HEIGHT": "1", "VIEWPOINT": "0 0 0 1 0 0 0"} | self.words
+        words |= {"POINTS": str(count), "DATA": "binary"}
+        order = (*_FIELD_KEYS, "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
+        return (_BEGIN + "".join(f"{key} {words[key]}\n" for key in order)).encode()
 
     def tail(self) -> bytes:
         """Return what stands behind the points: less than one."""
         return self.cloud.behind if self.cloud else b""
+
+
+def viewpoint_words(pose: Rigid) -> str:
+    """Return the pose of a sensor as the words of VIEWPOINT: tx ty tz qw qx qy qz."""
+    tx, ty, tz, *turned = pose
+    x, y, z, w = quaternion.from_quaternion(*turned, floats)
+    return " ".join(repr(each + 0.0) for each in (tx, ty, tz, w, x, y, z))
 
 
 def _columns_of(fields: Sequence[PcdField], *, padded: bool) -> tuple[list[PcdColumn], Kind]:
@@ -272,14 +284,9 @@ def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> Pcd
     del style
     named = named_xyz(columns)
     fields = [_new_field(column) for column in named]
-    kind = _columns_of(fields, padded=True)[1]
-
-    def head(points: int) -> bytes:
-        words = fields_as_words(fields) | {"WIDTH": str(points), "HEIGHT": "1", "VIEWPOINT": "0 0 0 1 0 0 0"}
-        words |= {"POINTS": str(points), "DATA": "binary"}
-        return (_BEGIN + "".join(f"{key} {each}\n" for key, each in words.items())).encode()
-
-    return PcdWriter(named, (), kind, count=count, head=head)
+    writer = PcdWriter(named, (), _columns_of(fields, padded=True)[1], count=count)
+    writer.words |= fields_as_words(fields)
+    return writer
 
 
 def named_xyz(columns: Sequence[OutColumn]) -> list[OutColumn]:

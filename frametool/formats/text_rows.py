@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
+from weakref import finalize
 
 import numpy as np
 
@@ -206,7 +207,9 @@ class TextWriter:
         self.behind = behind
         self.written = 0
         self.begun = False
-        self.waiting = None if count is not None else TemporaryFile()  # noqa: SIM115 - gone when it is let go
+        self.waiting = None if count is not None else TemporaryFile()  # noqa: SIM115 - closed with the writer
+        if self.waiting is not None:
+            finalize(self, self.waiting.close)
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
         """Return the text of a batch."""

@@ -376,7 +376,7 @@ def run_columns(
     columns = rows.columns() if into is None else rows.named_columns()
     move_along(file, request)
     if rows.narrow:
-        kinds = ", ".join(sorted({str(kind) for kind in rows.narrow.values()}))
+        kinds = ", ".join(sorted({kind.name for kind in rows.narrow.values()}))
         warn(f"{source}: {kinds} columns are computed as float64 and rounded once")
     drops = request.on_error == SKIP or request.operation.velocity
     writer: ColumnWriter | None = None

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from frametool.cli.cloud_files import clouds_of
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.completions import ColumnNames
 from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options
@@ -96,6 +97,7 @@ def command(
     stream, explaining = Stream(options), Explaining(options)
     output = Output("points", "trajectory", deg=deg, **options)
     plan = explaining.plan(output, stream) if explaining else None
+    clouds = clouds_of(stream, output) if stream.path else None
     if pose is None:
         way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize), at)
     elif time_column is not None or at is not None:
@@ -104,6 +106,10 @@ def command(
         way, rest = _way_by_pose(pose, stream.given, degrees=deg, normalize=normalize), arguments
     if time_column is not None:
         _check_timed(rest, at)
+    if clouds is not None:
+        if rest not in ((), ("-",)) or time_column or frame_column or kinds or plan is not None:
+            raise click.UsageError("the clouds of a bag move at their own stamps, from their own frames; no records")
+        return clouds.run(way.from_frame, way.target)
     kind = _kind(kinds, stream)
     if plan is not None:
         records = list(_sources(rest, kind))
