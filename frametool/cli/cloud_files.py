@@ -82,7 +82,8 @@ class BagOfClouds:
                 say_warning(message, rule, kind)
 
         with self.kept, heard_by(once):
-            for count, cloud in enumerate(read_clouds(self.reader, self.topics, self.path, self.tally), 1):
+            for cloud in read_clouds(self.reader, self.topics, self.path, self.tally):
+                count += 1
                 if isinstance(cloud, FormatError):
                     bad.take([Fault(cloud.line, "", cloud.message)])
                     continue

@@ -162,7 +162,8 @@ class Stream:
                 request = request._replace(notations=())  # its rows stay what they are
             if form in RECORDS and (output.told or form) != form and request.gathered is None:
                 return self._run_as_values(stream, form, request, output)
-            if holds_arrays(form) and (output.told is None or holds_arrays(output.told) or request.gathered is not None):
+            stays = output.told is None or holds_arrays(output.told)
+            if holds_arrays(form) and (stays or request.gathered is not None):
                 return self._run_columns(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
@@ -190,7 +191,9 @@ class Stream:
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
-        into: Any = import_module(FORMATS[output.told or form].writer)
+        into: Any = module
+        if output.told is not None and request.gathered is None:
+            into = import_module(FORMATS[output.told].writer)
         outcomes = run_columns(opened, request, output.style, source=name, into=None if into is module else into)
         status = self._write(outcomes, output, name, counted="row")
         if (states := FORMATS[form].states) and not self.options["quiet"]:

@@ -422,7 +422,7 @@ FORMATS = {
         reader="frametool.formats.pcd",
         writes=("points", "arrays"),
         writer="frametool.formats.pcd",
-        signs=(("magic", rb"# ?\.PCD|(?:\s*#[^\n]*\n|\s*\n)*VERSION[ \t]+[\d.]+\s+(?:#[^\n]*\n)*(?:FIELDS|COLUMNS)\s"),),
+        signs=(("magic", rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*VERSION[ \t]+[\d.]+\s+(?:#[^\n]*\n)*(?:FIELDS|COLUMNS)\s"),),
         states="metres; VIEWPOINT, the pose of the sensor, moves along",
     ),
     "ply": Format(

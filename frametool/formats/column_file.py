@@ -118,7 +118,7 @@ class ColumnFile(Protocol):
 
 @runtime_checkable
 class MovesAlong(Protocol):
-    """A file in which more than its columns has a place among its points: the pose of the sensor, rotations of splats."""
+    """A file in which more than its points has a place among them: the pose of the sensor, rotations of splats."""
 
     def moved_by(self, pose: Rigid | None) -> None:
         """Move that by the pose that moves all points, before any is read; None: there is no such one."""

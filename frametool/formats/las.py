@@ -63,7 +63,7 @@ def _whole(name: str) -> Iterator[None]:
         yield
     except FrametoolError:
         raise
-    except Exception as error:  # a broken file makes the library raise anything, also MemoryError
+    except Exception as error:  # noqa: BLE001 - a broken file makes the library raise anything, also MemoryError
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
         raise FormatError(f"the file cannot be read; is it whole? ({said})", source=name) from None
 
@@ -265,7 +265,7 @@ def _refusals(name: str) -> Iterator[None]:
         yield
     except FrametoolError:
         raise
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - the library raises what it likes
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
         raise FormatError(f"it cannot be written as las: {said}", source=name) from None
 

@@ -18,6 +18,7 @@ from frametool.formats.declared import PIECE, bytes_left, kept_in_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
     from frametool.formats.column_file import Batch, ColumnWriter, Kind, Made, OutColumn
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
@@ -72,7 +73,7 @@ class NpzFile:
             raise Unanswered(f"several arrays fit; give --array {'|'.join(fitting)}", source=self.file.name)
         if not fitting:
             raise FormatError(
-                f"no array is n x 3, n x 7 or has fields x, y, z; --array NAME reads another; arrays: {listing(arrays)}",
+                f"no array is n x 3, n x 7 or has fields x, y, z; give --array NAME; arrays: {listing(arrays)}",
                 source=self.file.name,
             )
         return arrays[fitting[0]]
@@ -119,7 +120,7 @@ class NpzWriter:
         self.before = before
         self.behind = behind
         self.out = _Taken()
-        self.zip = ZipFile(self.out, "w")  # type: ignore[arg-type]
+        self.zip = ZipFile(self.out, "w")  # type: ignore[call-overload]
         self.member = _like(member)
         self.stream: Any = None
 
@@ -136,11 +137,13 @@ class NpzWriter:
             self.stream = self.zip.open(self.member, "w", force_zip64=True)
 
     def _copy(self, members: Sequence[ZipInfo]) -> None:
-        for member in members:
-            if self.given is not None:
-                with _whole(self.given.file.name), self.given.zip.open(member) as source:
-                    with self.zip.open(_like(member), "w", force_zip64=True) as target:
-                        copyfileobj(source, target, PIECE)
+        for member in members if self.given is not None else ():
+            with (
+                _whole(self.given.file.name),
+                self.given.zip.open(member) as source,
+                self.zip.open(_like(member), "w", force_zip64=True) as target,
+            ):
+                copyfileobj(source, target, PIECE)
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last batch."""

@@ -1,6 +1,6 @@
 """PCD, the point clouds of PCL: x y z in metres, normals, and other fields, which pass byte for byte.
 
-Read: `ascii`, `binary`, `binary_compressed`, the last of which is written as `binary`.  VIEWPOINT moves with the points.
+Read: `ascii`, `binary`, and `binary_compressed`, which is written as `binary`.  VIEWPOINT moves with the points.
 What the header says is in `frametool.formats.pcd_head`.
 """
 
@@ -26,12 +26,11 @@ if TYPE_CHECKING:
 
     from frametool.documents.input_file import InputFile
     from frametool.formats.column_file import Batch, ColumnWriter, Kind, OutColumn
-    from frametool.formats.pcd_head import PcdHead
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
-NORMALS = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
+NORMALS: tuple[tuple[str, ...], ...] = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
 KINDS = {"f": "F", "i": "I", "u": "U", "b": "U"}
 _BEGIN = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n"
 _FIELD_KEYS = ("FIELDS", "SIZE", "TYPE", "COUNT")
@@ -72,7 +71,7 @@ class PcdFile:
             line = self.head.text.count(b"\n") + 1
             kinds = [column.kind for column in self.columns]
             cells = [column.cell for column in self.columns]
-            every = sum(field.count for field in self.head.fields)
+            every = sum(field.values for field in self.head.fields)
             self.text = TextRows(file, self.names, kinds, cells, every, self.head.points, line)
 
     def kind(self, place: int) -> Kind | None:
@@ -141,10 +140,10 @@ class PcdFile:
         for field in self.head.fields:
             if field.name == PADDING and not padded:
                 continue
-            size = self.head.points * field.count * field.size
-            table = data[at : at + size].view(field.code).reshape(-1, field.count)
+            size = self.head.points * field.values * field.size
+            table = data[at : at + size].view(field.code).reshape(-1, field.values)
             at += size
-            for place in range(field.count if field.name != PADDING else 0):
+            for place in range(field.values if field.name != PADDING else 0):
                 found[f"{column}"] = table[:, place]
                 column += 1
         return found
@@ -171,11 +170,11 @@ class PcdFile:
         while at < len(columns):
             passed = places[at]
             field = None if passed is None else self.columns[passed].field
-            if passed is not None and field is not None and field.count > 1:
+            if passed is not None and field is not None and field.values > 1:
                 whole = [place for place, each in enumerate(self.columns) if each.field is field]
-                if places[at : at + field.count] == whole:
+                if places[at : at + field.values] == whole:
                     found.append(field)
-                    at += field.count
+                    at += field.values
                     continue
             found.append(_new_field(columns[at]))
             at += 1
@@ -235,8 +234,8 @@ class PcdWriter(StructuredWriter):
 
 def viewpoint_words(pose: Rigid) -> str:
     """Return the pose of a sensor as the words of VIEWPOINT: tx ty tz qw qx qy qz."""
-    tx, ty, tz, *turned = pose
-    x, y, z, w = quaternion.from_quaternion(*turned, floats)
+    tx, ty, tz, x, y, z, w = pose
+    x, y, z, w = quaternion.from_quaternion(x, y, z, w, floats)
     return " ".join(repr(each + 0.0) for each in (tx, ty, tz, w, x, y, z))
 
 
@@ -247,11 +246,11 @@ def _columns_of(fields: Sequence[PcdField], *, padded: bool) -> tuple[list[PcdCo
     at, cell = 0, 0
     for field in fields:
         if field.name == PADDING:
-            at += field.size * field.count * padded
-            cell += field.count
+            at += field.size * field.values * padded
+            cell += field.values
             continue
-        for place in range(field.count):
-            columns.append(PcdColumn(field, field.name if field.count == 1 else f"{field.name}_{place}", cell))
+        for place in range(field.values):
+            columns.append(PcdColumn(field, field.name if field.values == 1 else f"{field.name}_{place}", cell))
             offsets.append(at)
             at += field.size
             cell += 1

@@ -46,7 +46,7 @@ class PcdField(NamedTuple):
     name: str
     kind: str
     size: int
-    count: int
+    values: int
 
     @property
     def code(self) -> str:
@@ -84,7 +84,7 @@ def fields_as_words(fields: Sequence[PcdField]) -> dict[str, str]:
         "FIELDS": " ".join(field.name for field in fields),
         "SIZE": " ".join(str(field.size) for field in fields),
         "TYPE": " ".join(field.kind for field in fields),
-        "COUNT": " ".join(str(field.count) for field in fields),
+        "COUNT": " ".join(str(field.values) for field in fields),
     }
 
 
@@ -186,7 +186,7 @@ class _Header:
                 known = ", ".join(map(str, TYPES[kind]))
                 self.refuse("SIZE", f"SIZE {shown(size)} of field {shown(name)}: TYPE {kind} has {known}")
             found.append(PcdField(name, kind, int(size), self._whole("COUNT", count, f" of field {shown(name)}")))
-        if sum(field.count for field in found) > _WIDEST:
+        if sum(field.values for field in found) > _WIDEST:
             self.refuse("COUNT", f"more than {_WIDEST} values a point")
         return tuple(found)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
-NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
+NORMALS: tuple[tuple[str, ...], ...] = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
 SPLAT = ("rot_1", "rot_2", "rot_3", "rot_0")  # x y z w
 HARMONICS = "f_rest_0"
 _NAMES = {code: name for name, code in reversed(TYPES.items())}
@@ -55,13 +55,13 @@ class PlyFile:
         self.turn: tuple[float, ...] | None = None
         self.text: TextRows | None = None
         self.behind = b""
-        count = self.vertex.count
+        count = self.vertex.instances
         if self.head.order:
-            self.before = self._skipped(sum(each.count * each.size for each in before))
+            self.before = self._skipped(sum(each.instances * each.size for each in before))
             check_declared(file, count, self.record.itemsize, "vertices", last=self.is_last)
         else:
             line = self.head.text.count(b"\n") + 1
-            self.before = self._lines(sum(each.count for each in before))
+            self.before = self._lines(sum(each.instances for each in before))
             line += self.before.count(b"\n")
             check_declared(file, count, 2 * self.width - 1, "vertices", last=False)
             self.text = TextRows(file, self.names, kinds, range(self.width), self.width, count, line)
@@ -94,7 +94,7 @@ class PlyFile:
         if not turns or not set(SPLAT) <= set(self.names):
             return
         if pose is None or self.text is not None or any(self._code(each)[0] != "f" for each in SPLAT):
-            why = "not all points are moved by the same pose" if pose is None else "they are turned in binary files only"
+            why = "not all points are moved by the same pose" if pose is None else "only binary files are turned"
             warn(f"{name}: rot_0 .. rot_3, the rotations of splats, are left as they are: {why}")
             return
         self.turn = pose[3:]
@@ -112,14 +112,14 @@ class PlyFile:
                 self.behind = self.text.check_end()
             return
         size = self.record.itemsize
-        for batch in record_batches(self.file, self.record, self.vertex.count, rows_of_batch(size)):
+        for batch in record_batches(self.file, self.record, self.vertex.instances, rows_of_batch(size)):
             if self.turn is not None:
                 self._turn_splats(batch, self.turn)
             yield batch
         if self.is_last:
             self.behind = self.file.stream.read(size)
             if size and len(self.behind) == size:
-                raise FormatError(f"the header says {self.vertex.count} vertices, more follow", source=self.file.name)
+                raise FormatError(f"the header says {self.vertex.instances} vertices, more follow", source=self.file.name)
 
     def _turn_splats(self, batch: StructuredBatch, turn: Sequence[float]) -> None:
         """Multiply rotations from the left, in place: the Hamilton product, which keeps their norms."""
@@ -141,7 +141,7 @@ class PlyFile:
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Return what writes a file of the same kind."""
-        count = None if drops else self.vertex.count
+        count = None if drops else self.vertex.instances
 
         def head(vertices: int) -> bytes:
             return self._head(columns, vertices) + self.before
@@ -160,7 +160,7 @@ class PlyFile:
     def _head(self, columns: Sequence[OutColumn], count: int) -> bytes:
         """Return the header with what changed in it: how many vertices there are, and their properties."""
         text = self.head.text
-        if count != self.vertex.count:
+        if count != self.vertex.instances:
             if not self.is_last:
                 names = ", ".join(shown(each.name) for each in self.head.elements if each is not self.vertex)
                 raise ValueInvalid(f"vertices cannot be left out: other elements count them ({names})")

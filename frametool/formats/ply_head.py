@@ -38,7 +38,7 @@ class PlyElement(NamedTuple):
     """One element: its name, how many there are, its properties as (name, type), "" for the type of a list."""
 
     name: str
-    count: int
+    instances: int
     properties: tuple[tuple[str, str], ...] = ()
     line: int = 0
 
@@ -83,7 +83,7 @@ class PlyHead(NamedTuple):
                 line=vertex.line,
             )
         for each in before:
-            if self.order and each.lists and each.count:
+            if self.order and each.lists and each.instances:
                 raise FormatError(
                     f"element {shown(each.name)} with the list {shown(each.lists[0])} stands before {VERTEX!r}; "
                     f"write {VERTEX!r} first, or the file as ascii",

@@ -257,7 +257,7 @@ def splice(
         ends = np.append(ends[:-1], len(cells.data) - MARGIN)
     at = begins
     places = {column: place for place, column in enumerate(batch.at)}
-    new = {place: each for place, each in zip(_made_at(columns), made, strict=True)}
+    new = dict(zip(_made_at(columns), made, strict=True))
     parts: list[Spans] = []
     for _, place in sorted(places.items()):
         if place in new:

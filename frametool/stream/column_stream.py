@@ -109,7 +109,8 @@ class ColumnRows:
         """Return the columns of the output, each with a name: those of a file without names get the usual ones."""
         if self.table.names:
             return self.columns()
-        names = [name for target in self.plan.targets for name in (*XYZ[: 3 * (target.unit is not None)], *target.names)]
+        targets = self.plan.targets
+        names = [name for each in targets for name in (*XYZ[: 3 * (each.unit is not None)], *each.names)]
         return [
             column._replace(
                 name=names[given.number] if isinstance(given, New) and given.number < len(names) else f"column_{at}"
@@ -168,8 +169,9 @@ class ColumnRows:
         results = self.of_batch(batch)
         rows = np.arange(batch.size) if results.rows is None else results.rows
         stamp_at = self.layout.time
-        if stamp_at is None and (found := stamp_column(self.table.names)) not in self.layout.frames:
-            stamp_at = found
+        found = stamp_column(self.table.names)
+        if stamp_at is None and found not in self.layout.frames and not self.file.vectors:
+            stamp_at = found  # `t` or `time` of a cloud is what its sensor counts, in whatever unit
         stamps = None
         if stamp_at is not None:
             name = self.table.name(stamp_at)
@@ -185,7 +187,11 @@ class ColumnRows:
         names: list[Sequence[str | None]] = [[name] for name in unnamed]
         for role, texts in results.names.items():
             names[role] = [text or None for text in texts]
-        return RowPoses(results.numbers, stamps, rows, names[PARENT], names[NAME], extras, results.given)
+        own = self.plan.targets[0].size if len(self.plan.shapes) > 1 else results.numbers.shape[1]
+        for column in self.layout.columns:
+            if isinstance(column, New) and column.number >= own:
+                extras[column.name] = results.numbers[:, column.number]
+        return RowPoses(results.numbers[:, :own], stamps, rows, names[PARENT], names[NAME], extras, results.given)
 
     # --- what is read ---
 
@@ -336,7 +342,7 @@ def _with_vectors(file: ColumnFile, request: Request) -> Request:
         return request
     columns = (",".join(XYZ), *(",".join(each) for each in there))
     kinds = (POINT, *[VECTOR] * len(there))
-    return request._replace(columns=columns, kinds=kinds, poses=len(columns))
+    return request._replace(columns=columns, kinds=kinds, poses=len(columns), notations=())
 
 
 def _chosen(block: Block, rows: Ints) -> Block:
