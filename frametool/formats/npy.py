@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, shown
-from frametool.formats.structured import StructuredBatch, StructuredWriter, is_number
+from frametool.formats.structured import PIECE, StructuredBatch, StructuredWriter, is_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -101,8 +101,7 @@ class NpyFile:
             raise FormatError(f"records in {len(self.shape)} axes; wanted is one row of them", source=file.name)
         else:
             self.record, self.width = header.kind, len(header.kind.names or ())
-        if header.by_columns and len(self.shape) > 1:
-            raise FormatError("its columns stand one by one; save numpy.ascontiguousarray(..) of it", source=file.name)
+        self.by_columns = header.by_columns and len(self.shape) > 1
         self.fields = self.record.names or ()
 
     def kind(self, place: int) -> Kind | None:
@@ -112,10 +111,25 @@ class NpyFile:
 
     def batches(self) -> Iterator[StructuredBatch]:
         """Yield the rows; raises FormatError where the file ends too early."""
-        yield from record_batches(self.file, self.record, self.count, ROWS)
+        if self.by_columns:
+            yield from self._rows_of_columns()
+        else:
+            yield from record_batches(self.file, self.record, self.count, ROWS)
+
+    def _rows_of_columns(self) -> Iterator[StructuredBatch]:
+        """Yield the rows of an array whose columns stand one after the other: all of it is read for that."""
+        data, size = bytearray(), self.count * self.record.itemsize
+        while len(data) < size and (piece := self.file.stream.read(min(PIECE, size - len(data)))):
+            data += piece
+        if len(data) < size:
+            raise FormatError(f"the file ends after {len(data)} of {size} bytes", source=self.file.name)
+        array = np.frombuffer(data, self.record[0]).reshape(self.shape, order="F")
+        for first in range(0, self.count, ROWS):
+            rows = np.ascontiguousarray(array[first : first + ROWS]).reshape(-1, self.width)
+            yield StructuredBatch(rows.view(self.record)[:, 0], self.fields)
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> NpyWriter:
-        """Return what writes an array of the same kind."""
+        """Return what writes an array of the same kind, row after row."""
         del style
         kind = _record_of(columns, self.record)
         if self.plain and len(columns) == self.width:
