@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from copy import deepcopy
+from importlib import import_module
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 from weakref import finalize
@@ -44,7 +45,7 @@ LAZ = "laz"
 def _laspy(name: str) -> Any:
     """Import the library, and keep it from printing; raises FileProblem where it is not installed."""
     try:
-        import laspy
+        laspy = import_module("laspy")  # it ships no types
     except ImportError:
         problem = "LAS is read and written with an extra; install it: pip install 'frametool[las]'"
         raise FileProblem(f"{name}: {problem}") from None

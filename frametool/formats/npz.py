@@ -137,10 +137,13 @@ class NpzWriter:
             self.stream = self.zip.open(self.member, "w", force_zip64=True)
 
     def _copy(self, members: Sequence[ZipInfo]) -> None:
-        for member in members if self.given is not None else ():
+        given = self.given
+        if given is None:
+            return
+        for member in members:
             with (
-                _whole(self.given.file.name),
-                self.given.zip.open(member) as source,
+                _whole(given.file.name),
+                given.zip.open(member) as source,
                 self.zip.open(_like(member), "w", force_zip64=True) as target,
             ):
                 copyfileobj(source, target, PIECE)

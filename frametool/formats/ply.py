@@ -119,7 +119,8 @@ class PlyFile:
         if self.is_last:
             self.behind = self.file.stream.read(size)
             if size and len(self.behind) == size:
-                raise FormatError(f"the header says {self.vertex.instances} vertices, more follow", source=self.file.name)
+                said = f"the header says {self.vertex.instances} vertices, more follow"
+                raise FormatError(said, source=self.file.name)
 
     def _turn_splats(self, batch: StructuredBatch, turn: Sequence[float]) -> None:
         """Multiply rotations from the left, in place: the Hamilton product, which keeps their norms."""
