@@ -25,7 +25,7 @@ def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
 
     streams: the command has those of streams too, `--in` and `--quiet` among them
     """
-    own = (_ARRAY,) if streams else (in_option, _quiet_option)
+    own = () if streams else (in_option, _quiet_option)
     return lambda function: decorated(function, (*own, *_READING_OPTIONS))
 
 
@@ -41,7 +41,7 @@ _CAMERA_AXES = _option(
 _STAMPS = _option(
     "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
 )
-_ARRAY = _option("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
+array_option = _option("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
 _EDGES = _option("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
 _READING_OPTIONS = (
     _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
@@ -62,4 +62,4 @@ _READING_OPTIONS = (
 
 def pose_reading_options(function: Function) -> Function:
     """Add to a command of streams the options about trajectories: the times of their poses, the axes of cameras."""
-    return decorated(function, [_CAMERA_AXES, _STAMPS, _EDGES, _ARRAY])
+    return decorated(function, [_CAMERA_AXES, _STAMPS, _EDGES, array_option])

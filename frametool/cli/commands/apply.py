@@ -14,7 +14,7 @@ from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted
 from frametool.cli.poses import one_pose, pose_source, usage_if_inline, values_of
-from frametool.cli.reading_options import reading_options
+from frametool.cli.reading_options import array_option, reading_options
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
@@ -66,6 +66,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
 @reading_options(streams=True)
+@array_option
 @stream_options
 def command(
     arguments: tuple[str, ...],
@@ -90,9 +91,8 @@ def command(
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
       ros2 topic echo /clicked_point | frametool apply tf.txt map
 
-    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point; ROS messages go
-    by their headers (frametool help records). Without SOURCE each record says its own frame; without records standard
-    input is read.
+    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point (help records).
+    Without SOURCE records say their own frame. Without records -i FILE, also a cloud's, or stdin is read.
     """
     stream, explaining = Stream(options), Explaining(options)
     output = Output("points", "trajectory", deg=deg, **options)
