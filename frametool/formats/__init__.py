@@ -422,7 +422,7 @@ FORMATS = {
         reader="frametool.formats.pcd",
         writes=("points", "arrays"),
         writer="frametool.formats.pcd",
-        signs=(("magic", rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*VERSION[ \t]+[\d.]+\s+(?:#[^\n]*\n)*(?:FIELDS|COLUMNS)\s"),),
+        signs=(("magic", rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "),),
         states="metres; VIEWPOINT, the pose of the sensor, moves along",
     ),
     "ply": Format(

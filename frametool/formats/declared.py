@@ -47,7 +47,7 @@ def check_declared(file: InputFile, count: int, size: int, what: str, *, last: b
     if left is None:
         return
     if left < count * size:
-        there = left // size
+        there = max(left, 0) // size
         raise FormatError(
             f"the header says {count} {what} of {size} bytes, the file holds {there}; is it whole?", source=file.name
         )

@@ -122,7 +122,8 @@ class LasFile:
             header = self.header = self.reader.header
             if not header.are_points_compressed:
                 file.stream.seek(header.offset_to_point_data)
-                check_declared(file, header.point_count, header.point_format.size, "points", last=False)
+                last = not (header.number_of_evlrs or header.start_of_waveform_data_packet_record)
+                check_declared(file, header.point_count, header.point_format.size, "points", last=last)
             elif header.point_count > whole * MOST_PACKED:
                 raise FormatError(f"the header says {header.point_count} points, in {whole} bytes", source=file.name)
             others = [name for name in header.point_format.dimension_names if name not in STORED]

@@ -67,7 +67,6 @@ class PcdFile:
         if self.head.data == "binary":
             check_declared(file, self.head.points, self.record.itemsize, "points", last=True)
         elif self.head.data == "ascii":
-            check_declared(file, self.head.points, 2 * self.width - 1, "points", last=False)
             line = self.head.text.count(b"\n") + 1
             kinds = [column.kind for column in self.columns]
             cells = [column.cell for column in self.columns]

@@ -37,7 +37,7 @@ _KEYS = (
 )  # fmt: skip
 _VERSIONS = (".5", "0.5", ".6", "0.6", ".7", "0.7")
 _MOST_POINTS = 1 << 62
-_WIDEST = 1 << 20  # values of one point
+_WIDEST = 1 << 16  # values of one point
 
 
 class PcdField(NamedTuple):

@@ -63,7 +63,8 @@ class PlyFile:
             line = self.head.text.count(b"\n") + 1
             self.before = self._lines(sum(each.instances for each in before))
             line += self.before.count(b"\n")
-            check_declared(file, count, 2 * self.width - 1, "vertices", last=False)
+            if not self.width:
+                raise FormatError(f"the {count} vertices have no properties", source=file.name)
             self.text = TextRows(file, self.names, kinds, range(self.width), self.width, count, line)
 
     def _skipped(self, size: int) -> bytes:
