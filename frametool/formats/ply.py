@@ -139,7 +139,21 @@ class PlyFile:
         """Yield what stands behind the vertices."""
         if self.is_last:
             return (self.behind,)
-        return self.text.behind() if self.text is not None else pieces(self.file.stream)
+        return self._counted(self.text) if self.text is not None else pieces(self.file.stream)
+
+    def _counted(self, text: TextRows) -> Iterator[bytes]:
+        """Yield the lines of the other elements; raises FormatError where there are not as many as the header says."""
+        at = self.head.elements.index(self.vertex)
+        expected = sum(each.instances for each in self.head.elements[at + 1 :])
+        lines, begun = 0, b""
+        for piece in text.behind():
+            yield piece
+            *whole, begun = (begun + piece).split(b"\n")
+            lines += sum(map(bool, map(bytes.strip, whole)))
+        lines += bool(begun.strip())
+        if lines != expected:
+            said = f"behind the vertices stand {lines} lines, the header says {expected}; correct the header"
+            raise FormatError(said, source=self.file.name)
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Return what writes a file of the same kind."""
