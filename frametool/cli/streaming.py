@@ -26,7 +26,7 @@ from frametool.cli.completions import ColumnNames
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
-from frametool.formats import FORMATS, are_kin, holds_arrays, is_trajectory, readers
+from frametool.formats import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.formats.detect import by_sign, detect
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
@@ -162,8 +162,8 @@ class Stream:
                 request = request._replace(notations=())  # its rows stay what they are
             if form in RECORDS and (output.told or form) != form and request.gathered is None:
                 return self._run_as_values(stream, form, request, output)
-            kin = output.told is None or (output.told in FORMATS and are_kin(form, output.told))
-            if holds_arrays(form) and (kin or request.gathered is not None):
+            stays = output.told is None or holds_arrays(output.told)
+            if holds_arrays(form) and (stays or request.gathered is not None):
                 return self._run_columns(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
@@ -179,7 +179,7 @@ class Stream:
             return self._run(stream, form, request, output)
 
     def _run_columns(self, stream: Any, form: str, request: Request, output: Output) -> int:
-        """Write columns of numbers in the form they came in."""
+        """Write columns of numbers in the form they came in, or in another that holds such."""
         from importlib import import_module
 
         from frametool.cli.trees import answers
@@ -193,7 +193,15 @@ class Stream:
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
-        return self._write(run_columns(opened, request, output.style, source=name), output, name, counted="row")
+        into: Any = module
+        if output.told is not None and request.gathered is None:
+            into = import_module(FORMATS[output.told].writer)
+        outcomes = run_columns(opened, request, output.style, source=name, into=None if into is module else into)
+        status = self._write(outcomes, output, name, counted="row")
+        if (states := FORMATS[form].states) and not self.options["quiet"]:
+            told = f", now in {request.told}" if request.told and request.operation.moves else ""
+            say(f"{name}: {FORMATS[form].summary}{told}; {states}")
+        return status
 
     def _run_as_poses(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of rows, or of poses that no table holds, in another form."""

@@ -438,6 +438,56 @@ FORMATS = {
         signs=(("magic", rb"FEA1"),),
         instead="write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)",
     ),
+    "npz": Format(
+        "NPZ of numpy, several arrays in a zip file",
+        suffixes=(".npz",),
+        reads=("arrays",),
+        reader="frametool.formats.npz",
+        writes=("poses", "points", "arrays"),
+        writer="frametool.formats.npz",
+        signs=(("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
+        asks=("array",),
+    ),
+    "pcd": Format(
+        "PCD point cloud",
+        suffixes=(".pcd",),
+        reads=("arrays",),
+        reader="frametool.formats.pcd",
+        writes=("points", "arrays"),
+        writer="frametool.formats.pcd",
+        signs=(("magic", rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "),),
+        states="metres; VIEWPOINT, the pose of the sensor, moves along",
+    ),
+    "ply": Format(
+        "PLY point cloud or mesh",
+        suffixes=(".ply",),
+        reads=("arrays",),
+        reader="frametool.formats.ply",
+        writes=("points", "arrays"),
+        writer="frametool.formats.ply",
+        signs=(("magic", rb"ply\r?\n"),),
+        states="metres",
+    ),
+    "las": Format(
+        "LAS laser scan",
+        suffixes=(".las",),
+        reads=("arrays",),
+        reader="frametool.formats.las",
+        writes=("points", "arrays"),
+        writer="frametool.formats.las",
+        signs=(("magic", rb"LASF.{100}[\x00-\x7f]"),),
+        states="metres",
+    ),
+    "laz": Format(
+        "LAZ laser scan",
+        suffixes=(".laz",),
+        reads=("arrays",),
+        reader="frametool.formats.las",
+        writes=("points", "arrays"),
+        writer="frametool.formats.las",
+        signs=(("magic", rb"LASF.{100}[\x80-\xff]"),),
+        states="metres",
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
         suffixes=(".xacro",),
@@ -511,11 +561,6 @@ def is_trajectory(name: str) -> bool:
 def holds_arrays(name: str) -> bool:
     """Tell whether a form holds columns of numbers and no text."""
     return name in FORMATS and not {"arrays"}.isdisjoint((*FORMATS[name].reads, *FORMATS[name].writes))
-
-
-def are_kin(first: str, second: str) -> bool:
-    """Tell whether one module reads the first form and writes the second, with all that both can hold."""
-    return FORMATS[first].reader == FORMATS[second].writer
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:

@@ -116,7 +116,7 @@ class StructuredWriter:
         """Return what stands behind the records."""
         return b""
 
-    def of_rows(self, batch: StructuredBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
+    def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
         """Return the records of a batch."""
         records = self.records(batch, rows, made)
         head = self.head(self.count) if self.count is not None and not self.written else b""

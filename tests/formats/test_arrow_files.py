@@ -330,6 +330,27 @@ def test_the_same_rows_give_the_same_numbers_in_every_form(use: Use, run: Callab
     assert {each.tobytes() for each in found} == {MOVER.apply(points(given)).tobytes()}
 
 
+def test_arrays_of_numpy_take_columns_of_numbers_and_are_taken(run: Callable[..., Outcome], use: Use, tmp_path: Path) -> None:
+    given = cloud(pa.float32()).append_column("gain", pa.array([None, 2.5] * (ROWS // 2)))
+    done = run("apply", "--transform", POSE, "-o", "made.npy", stdin=encoded(given))
+    assert "left out: it holds numbers" in done.err
+    records = np.load(tmp_path / "made.npy")
+    kinds = {"id": "u4", "x": "f4", "y": "f4", "z": "f4", "gain": "f8"}
+    assert {name: records.dtype[name] for name in records.dtype.names} == {name: np.dtype(kind) for name, kind in kinds.items()}
+    assert np.isnan(records["gain"]).tolist() == [True, False] * (ROWS // 2)
+    back = use("convert", "--from", "quaternion", data=(tmp_path / "made.npy").read_bytes())
+    assert back.status == 1  # points are no poses
+    again = use("apply", "--transform", "{xyz: [0, 0, 0]}", data=(tmp_path / "made.npy").read_bytes()).table()
+    assert {field.name: str(field.type) for field in again.schema} == {"id": "uint32", "x": "float", "y": "float", "z": "float", "gain": "double"}
+    assert points(again).tobytes() == np.stack([records[name] for name in XYZ], axis=1).tobytes()
+
+
+def test_whole_numbers_with_nulls_have_no_place_in_an_array(run: Callable[..., Outcome]) -> None:
+    given = cloud().select(XYZ).append_column("n", pa.array([None, 2] * (ROWS // 2)))
+    done = run("apply", "--transform", POSE, "-o", "made.npy", stdin=encoded(given))
+    assert (done.status, done.err) == (1, "frametool: column n holds nulls, and int64 has none; -f csv leaves them empty\n")
+
+
 def test_other_columns_go_into_a_table_of_text(run: Callable[..., Outcome]) -> None:
     given = cloud().slice(0, 2)
     header, first, second = run("apply", "--transform", POSE, "-f", "csv", stdin=encoded(given)).out.splitlines()
