@@ -36,7 +36,7 @@ class IpcColumns:
         self.name = file.name
         self.pa = require_pyarrow(self.name)
         head = file.head()
-        self.form = "arrow" if head.startswith(MAGIC) else "arrow-stream"
+        self.form = "arrow" if head.startswith(MAGIC) else "arrows"
         self.codec = codec_in(head[BODY_AT:] if self.form == "arrow" else head)
         ipc = require_pyarrow(self.name, "ipc")
         with translated(self.name):

@@ -34,7 +34,7 @@ POSE = "{xyz: [1, -2, 0.5], rpy_deg: [10, 20, 30]}"
 MOVER = frametool.Transform(frametool.Rotation.from_rpy(np.radians([10, 20, 30])), [1, -2, 0.5])
 ROWS = 40
 EXAMPLES = console.ROOT / "examples"
-FORMS = ("parquet", "arrow", "arrow-stream")
+FORMS = ("parquet", "arrow", "arrows")
 
 
 def encoded(table: Any, form: str = "parquet", rows: int | None = 16, codec: str | None = None, **options: Any) -> bytes:
@@ -168,7 +168,7 @@ def test_the_schema_that_parquet_itself_has_stays(use: Use, options: dict[str, A
 
 
 @pytest.mark.parametrize("codec", [None, "lz4", "zstd"])
-@pytest.mark.parametrize("form", ["arrow", "arrow-stream"])
+@pytest.mark.parametrize("form", ["arrow", "arrows"])
 def test_batches_and_their_compression_stay(use: Use, form: str, codec: str | None) -> None:
     data = encoded(cloud(), form, codec=codec)
     made = use("apply", "--transform", POSE, data=data, form=form).data
