@@ -196,7 +196,8 @@ class Stream:
         into: Any = module
         if output.told is not None and request.gathered is None:
             into = import_module(FORMATS[output.told].writer)
-        outcomes = run_columns(opened, request, output.style, source=name, into=None if into is module else into)
+        style = output.style.in_form(output.told or form)
+        outcomes = run_columns(opened, request, style, source=name, into=None if into is module else into)
         status = self._write(outcomes, output, name, counted="row")
         if (states := FORMATS[form].states) and not self.options["quiet"]:
             told = f", now in {request.told}" if request.told and request.operation.moves else ""
