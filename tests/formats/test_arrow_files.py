@@ -495,3 +495,9 @@ def test_without_pyarrow_the_extra_is_named(use: Use, monkeypatch: pytest.Monkey
 
 def test_a_file_of_the_first_feather_says_what_to_do(use: Use) -> None:
     assert "write it anew" in use("apply", "--transform", POSE, data=b"FEA1" + b"\0" * 100).err
+
+
+def test_rows_of_joints_are_refused_by_their_form(use: Use) -> None:
+    done = use("fk", str(EXAMPLES / "arm.urdf"), "arm_base", "tool", data=encoded(cloud()))
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "rows of joints are a table of text, records or messages, not parquet" in done.err
