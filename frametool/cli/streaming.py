@@ -188,13 +188,16 @@ class Stream:
         from frametool.stream.column_stream import run_columns
 
         name = self.path or "stdin"
+        if output.path is None and request.gathered is None and sys.stdout.isatty():
+            raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
         into: Any = module
         if output.told is not None and request.gathered is None:
             into = import_module(FORMATS[output.told].writer)
-        outcomes = run_columns(opened, request, output.style, source=name, into=None if into is module else into)
+        style = output.style.in_form(output.told or form)
+        outcomes = run_columns(opened, request, style, source=name, into=None if into is module else into)
         status = self._write(outcomes, output, name, counted="row")
         if (states := FORMATS[form].states) and not self.options["quiet"]:
             told = f", now in {request.told}" if request.told and request.operation.moves else ""

@@ -43,6 +43,7 @@ DH = ("standard", "modified")
 _TREE = "frametool.formats.tree_reader"
 _MESSAGES = "frametool.ros.message_reader"
 _TABLE = "frametool.stream.table_samples"
+_ARROW = "frametool.formats.arrow_files"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _MESSAGE_KEYS = (
@@ -455,6 +456,38 @@ FORMATS = {
         writer="frametool.formats.las",
         signs=(("magic", rb"LASF.{100}[\x80-\xff]"),),
         states="metres",
+    ),
+    "parquet": Format(
+        "Parquet (pip install 'frametool[arrow]')",
+        suffixes=(".parquet", ".pq"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"PAR1"),),
+    ),
+    "arrow": Format(
+        "a file of Arrow, Feather (pip install 'frametool[arrow]')",
+        suffixes=(".arrow", ".feather", ".ipc"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"ARROW1"),),
+    ),
+    "arrow-stream": Format(
+        "a stream of Arrow (pip install 'frametool[arrow]')",
+        suffixes=(".arrows",),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
+    ),
+    "feather1": Format(
+        "Feather of the first version",
+        signs=(("magic", rb"FEA1"),),
+        instead="write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)",
     ),
     "xacro": Format(
         "xacro, from which URDF is made",

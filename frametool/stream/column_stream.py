@@ -76,6 +76,9 @@ class ColumnRows:
         except FormatError as error:
             error.line = 0  # the names of columns stand in no line here
             raise
+        for place in self.layout.places:
+            if file.kind(place) is None:
+                raise Misused(f"column {self.table.name(place)} holds no numbers", source=source)
         self.plan = self.plan._replace(pieces=())
         self.naming = Naming(self.table, self.layout, self.request.for_kind(self.shape.kind))
         self.state = State()
@@ -84,9 +87,6 @@ class ColumnRows:
         self.mended = 0
         self.narrow = self._narrow()
         self.numbers = sum(isinstance(column, New) for column in self.layout.columns)
-        for place in self.layout.places:
-            if file.kind(place) is None:
-                raise Misused(f"column {self.table.name(place)} holds no numbers", source=source)
 
     @property
     def shape(self) -> Shape:
