@@ -425,7 +425,7 @@ FORMATS = {
         writes=("points", "arrays"),
         writer="frametool.formats.pcd",
         signs=(("magic", _PCD),),
-        states="metres; VIEWPOINT, the pose of the sensor, moves along",
+        states="metres; VIEWPOINT: pose of the sensor among the points, w first",
     ),
     "ply": Format(
         "PLY point cloud or mesh",

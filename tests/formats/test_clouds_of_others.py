@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from clouds import RNG, cloud, move, moved, pcd, ply, turned, xyz
+from clouds import RNG, cloud, move, moved, pcd, turned, xyz
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -68,10 +68,3 @@ def test_what_we_make_of_a_table_others_read(run: Run, tmp_path: Path, form: str
         found = pytest.importorskip("plyfile").PlyData.read(tmp_path / "out.ply")["vertex"].data
     assert np.allclose(xyz(found), moved(POINTS[:20]), rtol=1e-12)
     assert found["id"].tolist() == list(range(20))
-
-
-def test_a_mesh_of_theirs_keeps_its_faces_byte_for_byte(run: Run, tmp_path: Path) -> None:
-    given = cloud(9)
-    faces = bytes(range(60))
-    data = ply(given, after="element face 4\nproperty list uchar int vertex_indices\nproperty list uchar float uv\n") + faces
-    assert (move(run, tmp_path, "ply", data).data or b"").endswith(faces)
