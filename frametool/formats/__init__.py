@@ -60,6 +60,7 @@ _DH = (
     rf"(?im)\A(?!\s*<){_AT_HEAD}(?<![^\W_])(?:alpha|\u03b1|twist))"
     rf"{_AT_HEAD}(?:{_LENGTH % '[ar]'}|link_length)){_AT_HEAD}(?:{_LENGTH % 'd'}|link_offset))"
 )
+_PCD = rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "
 _KITTI = (
     r"\A(?:#[^\n]*\n)*(?:calib_time: *\d|"
     r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
@@ -423,8 +424,8 @@ FORMATS = {
         reader="frametool.formats.pcd",
         writes=("points", "arrays"),
         writer="frametool.formats.pcd",
-        signs=(("magic", rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "),),
-        states="metres; VIEWPOINT, the pose of the sensor, moves along",
+        signs=(("magic", _PCD),),
+        states="metres; VIEWPOINT: pose of the sensor among the points, w first",
     ),
     "ply": Format(
         "PLY point cloud or mesh",
