@@ -475,7 +475,7 @@ FORMATS = {
         writer=_ARROW,
         signs=(("magic", rb"ARROW1"),),
     ),
-    "arrow-stream": Format(
+    "arrows": Format(
         "a stream of Arrow (pip install 'frametool[arrow]')",
         suffixes=(".arrows",),
         reads=("arrays",),
