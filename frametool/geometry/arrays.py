@@ -10,7 +10,7 @@ from numpy import any as some
 from numpy import copysign, fmod, frexp, ldexp, maximum, minimum, sqrt, where
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import far_angles, trig
+from frametool.geometry import far_angles, out_array, trig
 
 __all__ = [
     "all_near_one", "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp",
@@ -118,11 +118,26 @@ def run(kernel: Kernel, count: int, parts: Components, *args: object) -> Compone
     return tuple(out)
 
 
-def rows(kernel: Kernel, count: int, parts: Components, *args: object) -> Array:
-    """Apply a kernel to components; return an array (..., count) of rows."""
-    shape = batch_shape(parts)
-    out = np.empty((*shape, count))
-    walk(kernel, parts, out.reshape(-1, count).T, *args)
+def rows(
+    kernel: Kernel, inner: tuple[int, ...], parts: Components, *args: object, out: Array | None = None
+) -> Array:
+    """Apply a kernel to components; return rows (..., *inner), in `out` where the caller gives one.
+
+    Where rows are written over components that are still to be read, a fresh array is made first.
+    """
+    shape = (*batch_shape(parts), *inner)
+    if out is not None:
+        out_array.require_fitting(out, shape)
+        columns = out_array.flat_columns(out, len(inner))
+        touched = tuple(part for part in parts if out_array.shares_memory(out, (part,)))
+        if columns is not None and (not touched or out_array.in_step(out, len(inner), touched)):
+            walk(kernel, parts, columns, *args)
+            return out
+    fresh = np.empty(shape)
+    walk(kernel, parts, fresh.reshape(-1, int(np.prod(inner))).T, *args)
+    if out is None:
+        return fresh
+    out[...] = fresh
     return out
 
 
@@ -165,6 +180,11 @@ def guarded(kernel: Kernel, complain: Callable[[], object]) -> Kernel:
 def all_finite(results: Components) -> bool:
     """Tell whether all results are finite, by the first and the last: what goes wrong in a row shows in one of them."""
     return bool(np.isfinite(np.sum(results[0]) + np.sum(results[-1])))
+
+
+def finite_throughout(parts: Components) -> bool:
+    """Tell whether all components are finite."""
+    return all(np.isfinite(np.min(part)) and np.isfinite(np.max(part)) for _, block in cut(parts, 0) for part in block)
 
 
 def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:

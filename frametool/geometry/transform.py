@@ -24,6 +24,9 @@ class Transform(Batched):
     """One rigid transform, or an array of them of any shape; frozen.
 
     `a_from_c = a_from_b @ b_from_c`; `point_in_a = a_from_b.apply(point_in_b)`.  Metres and radians.
+
+    `out=` of `as_matrix`, `log` and every `apply`: a writable numpy array of float64 of the result's shape, which is
+    filled and returned; it may be what is read.  `Rotation` says precisely what is taken.
     """
 
     __slots__ = ()
@@ -108,13 +111,13 @@ class Transform(Batched):
         """The rotation."""
         return Rotation.of(*self._components[3:])
 
-    def as_matrix(self) -> Array:
+    def as_matrix(self, *, out: Array | None = None) -> Array:
         """Return homogeneous matrices of shape (..., 4, 4)."""
-        return dispatch.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
+        return dispatch.rows(rigid.to_homogeneous, (4, 4), self._components, out=out)
 
-    def log(self) -> Array:
+    def log(self, *, out: Array | None = None) -> Array:
         """Return the twists (vx, vy, vz, wx, wy, wz), shape (..., 6), whose `exp` this is; angles up to pi."""
-        return dispatch.rows(rigid.log, 6, self._components)
+        return dispatch.rows(rigid.log, (6,), self._components, out=out)
 
     def __matmul__(self, other: Transform) -> Transform:
         """Compose: a_from_b @ b_from_c is a_from_c."""
@@ -137,24 +140,24 @@ class Transform(Batched):
             dispatch.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
         )
 
-    def apply(self, points: Numbers) -> Array:
+    def apply(self, points: Numbers, *, out: Array | None = None) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
         given = validation.columns(points, 3, "points")
-        return dispatch.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix)
+        return dispatch.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix, out=out)
 
-    def apply_vector(self, vectors: Numbers) -> Array:
+    def apply_vector(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
-        return self.rotation.apply(vectors)
+        return self.rotation.apply(vectors, out=out)
 
-    def apply_twist(self, twists: Numbers) -> Array:
+    def apply_twist(self, twists: Numbers, *, out: Array | None = None) -> Array:
         """Move velocities (vx, vy, vz, wx, wy, wz), shape (..., 6): that of the same body at this side's origin."""
         given = validation.columns(twists, 6, "twists")
-        return dispatch.moved(spatial.move_twist, self._components, given, "twists")
+        return dispatch.moved(spatial.move_twist, self._components, given, "twists", out=out)
 
-    def apply_wrench(self, wrenches: Numbers) -> Array:
+    def apply_wrench(self, wrenches: Numbers, *, out: Array | None = None) -> Array:
         """Move wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to this side's origin."""
         given = validation.columns(wrenches, 6, "wrenches")
-        return dispatch.moved(spatial.move_wrench, self._components, given, "wrenches")
+        return dispatch.moved(spatial.move_wrench, self._components, given, "wrenches", out=out)
 
     def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
         """Interpolate: translation along the line, rotation by slerp; fractions 0 and 1 give the ends to the bit.
