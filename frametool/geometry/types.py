@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     Two: TypeAlias = tuple[N, N]
     Three: TypeAlias = tuple[N, N, N]
     Four: TypeAlias = tuple[N, N, N, N]
+    Five: TypeAlias = tuple[N, N, N, N, N]
     Six: TypeAlias = tuple[N, N, N, N, N, N]
     Seven: TypeAlias = tuple[N, N, N, N, N, N, N]
     Eight: TypeAlias = tuple[N, N, N, N, N, N, N, N]

@@ -177,6 +177,13 @@ def test_a_way_walked_at_many_fractions() -> None:
     assert_same(segment.along, joined(ways, within * 2))
 
 
+def test_a_way_prepared_once_is_the_slerp_of_its_ends() -> None:
+    for way, (fraction,) in zip(WAYS, MANY_FRACTIONS * 2, strict=False):
+        if 0.0 < fraction < 1.0:
+            walked: Any = segment.along(*way[:7], *segment.prepare(*way, floats), fraction, floats)
+            assert quaternion.unit(*walked[3:], floats) == quaternion.slerp(*way[3:7], *way[10:], fraction, floats)
+
+
 def test_neighbours_that_are_no_angles_or_far_ones_change_nothing() -> None:
     alone = bits([trig.half_sincos(angle, floats) for angle in (0.3, -0.0)])
     for odd in (math.nan, math.inf, 1e30):
