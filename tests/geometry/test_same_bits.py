@@ -178,10 +178,14 @@ def test_a_way_walked_at_many_fractions() -> None:
 
 
 def test_a_way_prepared_once_is_the_slerp_of_its_ends() -> None:
+    prepare: Callable[..., Any] = segment.prepare
+    unit: Callable[..., Any] = quaternion.unit
+    slerp: Callable[..., Any] = quaternion.slerp
     for way, (fraction,) in zip(WAYS, MANY_FRACTIONS * 2, strict=False):
         if 0.0 < fraction < 1.0:
-            walked: Any = segment.along(*way[:7], *segment.prepare(*way, floats), fraction, floats)
-            assert quaternion.unit(*walked[3:], floats) == quaternion.slerp(*way[3:7], *way[10:], fraction, floats)
+            pose: Any = (*way[:7], *prepare(*way, floats))
+            walked = segment.along(*pose, fraction, floats)
+            assert unit(*walked[3:], floats) == slerp(*way[3:7], *way[10:], fraction, floats)
 
 
 def test_neighbours_that_are_no_angles_or_far_ones_change_nothing() -> None:

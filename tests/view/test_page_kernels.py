@@ -37,11 +37,12 @@ def in_the_page(folder: Path, call: str, cases: Sequence[Any]) -> Any:
 
 @NEEDS_CHROMIUM
 def test_the_way_between_samples_is_that_of_the_buffer(tmp_path: Path) -> None:
-    cases = [
+    cases: list[Any] = [
         [[*DRAWN.normal(size=3).tolist(), *start], [*DRAWN.normal(size=3).tolist(), *end], float(DRAWN.uniform())]
         for ends in (NEAR, FAR, TURNS)
         for start, end in zip(TURNS, ends, strict=True)
     ]
-    expected = [segment.along(*a, *segment.prepare(*a, *b, floats), fraction, floats) for a, b, fraction in cases]
+    prepare: Any = segment.prepare
+    expected = [segment.along(*a, *prepare(*a, *b, floats), fraction, floats) for a, b, fraction in cases]
     found = in_the_page(tmp_path, "([a, b, fraction]) => along(a, b, fraction)", cases)
     assert [tuple(pose) for pose in found] == expected
