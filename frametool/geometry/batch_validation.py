@@ -89,10 +89,11 @@ def _repaired(
     """Return how far the rows of a block are off, None if no row needs a word; the block made rotations; the worst."""
     if rule is None:
         return None, block, 0.0
-    off = rule.deviation(*block, arrays)
-    worst = float(arrays.largest(off))
+    worst = rule.furthest(*block, arrays)
     if worst <= min(rule.exact, SILENT):
         return None, block, worst
+    off = rule.deviation(*block, arrays)
+    worst = arrays.furthest(off)
     refused = ~(off < np.inf) if normalize else ~(off <= TOLERATED)
     rough = np.flatnonzero((off > rule.exact) & ~refused)
     grades = None if worst <= SILENT else np.where(refused, np.inf, 0.0 if normalize else off)

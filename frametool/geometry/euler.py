@@ -78,7 +78,8 @@ def from_quaternion(x: N, y: N, z: N, w: N, axes: str, xp: Functions[N], *, degr
         middle = 2.0 * incline(xp.sqrt(squared_difference), xp.sqrt(squared_sum), xp)
     else:
         middle = incline(2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity), radius, xp)
-    if xp.some(xp.minimum(squared_sum, squared_difference) <= LOCK * (squared_sum + squared_difference)):
+    limit = LOCK * (xp.furthest(squared_sum) + xp.furthest(squared_difference))  # of the longest row: none is missed
+    if not (xp.least(squared_sum) > limit and xp.least(squared_difference) > limit):
         a, b, c, d, radius = _without_third(a, b, c, d, squared_sum, squared_difference, radius, static, xp)
     ac, bd, ad, bc = a * c, b * d, a * d, b * c
     outer, inner = bearing(bc + ad + 0.0, ac - bd, radius, xp), bearing(bc - ad + 0.0, ac + bd, radius, xp)

@@ -55,6 +55,20 @@ def defect(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N
     return largest_of([abs(entry) for entry in gram], xp)
 
 
+def furthest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> float:
+    """Return the largest deviation of all rows, inf where one is mirrored or far off.
+
+    By minima and maxima, which cost a quarter of the deviation of each row.
+    """
+    off = [
+        xp.furthest(a * a + b * b + c * c, 1.0), xp.furthest(d * d + e * e + f * f, 1.0),
+        xp.furthest(g * g + h * h + i * i, 1.0), xp.furthest(a * d + b * e + c * f),
+        xp.furthest(a * g + b * h + c * i), xp.furthest(d * g + e * h + f * i),
+    ]  # fmt: skip
+    right = all(part <= TOLERATED for part in off) and xp.least(determinant(a, b, c, d, e, f, g, h, i)) > SINGULAR
+    return max(off) if right else inf
+
+
 def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
     """Return the rotation nearest to a matrix of positive determinant: its orthogonal polar factor.
 
@@ -97,7 +111,7 @@ def newton(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Nine[N]:
 def deviation(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
     """Return how far a matrix is from orthonormal; inf if it is mirrored, singular or not finite."""
     off = defect(a, b, c, d, e, f, g, h, i, xp)
-    if xp.largest(off) <= TOLERATED:
+    if xp.furthest(off) <= TOLERATED:
         return xp.where(determinant(a, b, c, d, e, f, g, h, i) > SINGULAR, off, inf)
     volume = relative_volume(a, b, c, d, e, f, g, h, i, xp)
     return xp.where(volume > SINGULAR, xp.where(off < FARTHEST, off, FARTHEST), inf)

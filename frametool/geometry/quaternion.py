@@ -62,7 +62,7 @@ def conjugate(x: N, y: N, z: N, w: N) -> Four[N]:
 def unit(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     """Normalise a quaternion of moderate norm; what is unit to 4 eps keeps its bits."""
     squared = x * x + y * y + z * z + w * w
-    if xp.all_near_one(squared, UNIT):
+    if xp.furthest(squared, 1.0) <= UNIT:
         return x, y, z, w
     norm = xp.where(abs(squared - 1.0) > UNIT, xp.sqrt(squared), 1.0)
     return x / norm, y / norm, z / norm, w / norm
@@ -203,11 +203,16 @@ def deviation(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
     """Return how far the norm is from 1 (to first order below 1e-6); inf for what has no direction or is not finite."""
     squared = x * x + y * y + z * z + w * w
     off = abs(squared - 1.0)
-    if xp.largest(off) <= SILENT:
+    if xp.furthest(off) <= SILENT:
         return off
     size = largest_of((abs(x), abs(y), abs(z), abs(w)), xp)
     off = xp.where(off <= SILENT, off, xp.minimum(abs(xp.sqrt(squared) - 1.0), FARTHEST))
     return xp.where((size > 0.0) & (size < inf), off, inf)
+
+
+def furthest(x: N, y: N, z: N, w: N, xp: Functions[N]) -> float:
+    """Return how far the squared norm furthest from 1 is: the deviation where all are within 1e-6, more elsewhere."""
+    return xp.furthest(x * x + y * y + z * z + w * w, 1.0)
 
 
 def repaired(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:

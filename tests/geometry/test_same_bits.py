@@ -181,10 +181,11 @@ def test_a_way_prepared_once_is_the_slerp_of_its_ends() -> None:
     prepare: Callable[..., Any] = segment.prepare
     unit: Callable[..., Any] = quaternion.unit
     slerp: Callable[..., Any] = quaternion.slerp
+    along: Callable[..., Any] = segment.along
     for way, (fraction,) in zip(WAYS, MANY_FRACTIONS * 2, strict=False):
         if 0.0 < fraction < 1.0:
             pose: Any = (*way[:7], *prepare(*way, floats))
-            walked = segment.along(*pose, fraction, floats)
+            walked = along(*pose, fraction, floats)
             assert unit(*walked[3:], floats) == slerp(*way[3:7], *way[10:], fraction, floats)
 
 

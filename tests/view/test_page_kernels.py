@@ -11,7 +11,7 @@ import numpy as np
 import samples
 from browsers import NEEDS_CHROMIUM, seen_in_chromium
 
-from frametool.geometry import floats, quaternion, segment
+from frametool.geometry import floats, segment
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 DRAWN = np.random.default_rng(4)
 TURNS = samples.quaternions(20)
-NEAR = [quaternion.normalized(*(np.array(row) + 1e-9 * DRAWN.normal(size=4)).tolist(), floats) for row in TURNS]
+NEAR = [[part + 1e-9 * float(DRAWN.normal()) for part in row] for row in TURNS]
 FAR = [TURNS[place] for place in DRAWN.permutation(len(TURNS)).tolist()]
 
 
@@ -43,6 +43,7 @@ def test_the_way_between_samples_is_that_of_the_buffer(tmp_path: Path) -> None:
         for start, end in zip(TURNS, ends, strict=True)
     ]
     prepare: Any = segment.prepare
-    expected = [segment.along(*a, *prepare(*a, *b, floats), fraction, floats) for a, b, fraction in cases]
+    along: Any = segment.along
+    expected = [along(*a, *prepare(*a, *b, floats), fraction, floats) for a, b, fraction in cases]
     found = in_the_page(tmp_path, "([a, b, fraction]) => along(a, b, fraction)", cases)
     assert [tuple(pose) for pose in found] == expected
