@@ -8,7 +8,7 @@ from frametool.geometry import trig
 
 __all__ = [
     "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
-    "ldexp", "least", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
+    "ldexp", "least", "mask", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -20,7 +20,7 @@ A1, A2, A3, A4, A5, A6 = trig.ARC_ABOVE
 B1, B2, B3, B4, B5, B6 = trig.ARC_BELOW
 LEVEL, RIGHT_ANGLE, RIGHT_ANGLE_REST = trig.LEVEL, trig.RIGHT_ANGLE, trig.RIGHT_ANGLE_REST
 maximum, minimum = max, min
-some = bool
+some = mask = bool
 least = float
 
 

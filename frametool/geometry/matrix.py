@@ -31,8 +31,8 @@ def to_quaternion(
     yy, zz = 1.0 + (r22 - r11 - r33), 1.0 + (r33 - r11 - r22)
     wx, wy, wz = r32 - r23, r13 - r31, r21 - r12
     xy, xz, yz = r12 + r21, r13 + r31, r23 + r32
-    w_first, y_first = ww >= xx, yy >= zz
-    upper = where(w_first, ww, xx) >= where(y_first, yy, zz)
+    w_first, y_first = xp.mask(ww >= xx), xp.mask(yy >= zz)
+    upper = xp.mask(xp.maximum(ww, xx) >= xp.maximum(yy, zz))
     x = where(upper, where(w_first, wx, xx), where(y_first, xy, xz))
     y = where(upper, where(w_first, wy, xy), where(y_first, yy, yz))
     z = where(upper, where(w_first, wz, xz), where(y_first, yz, zz))
