@@ -48,13 +48,13 @@ def mask(condition: Condition) -> Any:
 def where(condition: Any, yes: Array | float, no: Array | float) -> Array:
     """Choose element by element, by a condition or its `mask`.
 
-    By bits: `np.where` branches, which costs 4 ns where the conditions of neighbours differ, this 0.9, or 0.5 by a mask.
+    By bits: `np.where` branches, which costs 4 ns where neighbours differ; this 0.9, or 0.5 by a mask.
     """
     if isinstance(condition, (bool, np.bool_)):
         return np.where(condition, yes, no)
     bits = condition if condition.dtype == np.int64 else mask(condition)
     other = np.asarray(no, np.float64).view(np.int64)
-    chosen = (np.asarray(yes, np.float64).view(np.int64) ^ other) & bits
+    chosen: Indices = (np.asarray(yes, np.float64).view(np.int64) ^ other) & bits
     chosen ^= other
     return chosen.view(np.float64)
 

@@ -134,14 +134,16 @@ class Rotation(Batched):
         return cls._of_columns(made)
 
     @classmethod
-    def from_columns(cls, spec: str, given: Components, name: str, *, normalize: bool = False) -> Rotation:
-        """Check and convert the columns of a notation; errors call them `name`."""
+    def from_columns(
+        cls, spec: str, given: Components, name: str, *, normalize: bool = False, into: Array | None = None
+    ) -> Rotation:
+        """Check and convert the columns of a notation; errors call them `name`, `into` is where many come to stand."""
         form = _form(spec)
         if validation.single(given):
             return cls.of(*form.checked_quaternion(given, floats, normalize=normalize))
         from frametool.geometry.batch_validation import require_rotations
 
-        return cls._of_columns(require_rotations(form, given, name, normalize=normalize))
+        return cls._of_columns(require_rotations(form, given, name, normalize=normalize, into=into))
 
     def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
         """Return rows of the columns of a notation, of another shape where one is told, in `out` if given."""

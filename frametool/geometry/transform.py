@@ -14,7 +14,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from frametool.geometry.types import Array, Numbers, Rigid
+    from frametool.geometry.types import Array, Components, Numbers, Rigid
 
 NEAR_BY = 1e-9  # metres: translations closer than this count as close
 _new = object.__new__
@@ -72,8 +72,7 @@ class Transform(Batched):
             ValueInvalid: wrong shapes, not finite, or no rotation; names the first such row.
         """
         shift = validation.columns(xyz, 3, "xyz")
-        rotation = Rotation.from_quaternion(xyzw, normalize=normalize)
-        return cls._of_columns(validation.joined((*shift, *rotation.components), "xyz"))
+        return cls._read(shift, "xyz", "xyzw", validation.columns(xyzw, 4, "xyzw"), "xyzw", normalize=normalize)
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Transform:
@@ -84,8 +83,24 @@ class Transform(Batched):
         """
         m = validation.matrices(matrices, 4, "matrix")
         validation.check_last_row(m, "matrix")
-        rotation = Rotation.from_columns("matrix", (*m[0:3], *m[4:7], *m[8:11]), "matrix", normalize=normalize)
-        return cls._of_columns(validation.joined((m[3], m[7], m[11], *rotation.components), "matrix"))
+        turn = *m[0:3], *m[4:7], *m[8:11]
+        return cls._read((m[3], m[7], m[11]), "matrix", "matrix", turn, "matrix", normalize=normalize)
+
+    @classmethod
+    def _read(
+        cls, shift: Components, shift_name: str, spec: str, turn: Components, turn_name: str, *, normalize: bool
+    ) -> Transform:
+        """Check and convert columns; rotations as many as translations are made where they stay, without a copy."""
+        shape = validation.batch_shape(shift)
+        if not shape or validation.batch_shape(turn) != shape:
+            rotation = Rotation.from_columns(spec, turn, turn_name, normalize=normalize)
+            return cls._of_columns(validation.joined((*shift, *rotation.components), shift_name))
+        import numpy as np
+
+        made = np.empty((7, *shape))
+        Rotation.from_columns(spec, turn, turn_name, normalize=normalize, into=made[3:])
+        validation.copy_finite(shift, made[:3], shift_name)
+        return cls._of_columns(tuple(made))
 
     @classmethod
     def exp(cls, twist: Numbers) -> Transform:
@@ -99,7 +114,7 @@ class Transform(Batched):
     @property
     def xyz(self) -> Array:
         """The translations, shape (..., 3), metres."""
-        return dispatch.stacked(self._components[:3])
+        return dispatch.rows(lambda x, y, z, _xp: (x, y, z), (3,), self._components[:3])
 
     @property
     def xyzw(self) -> Array:
