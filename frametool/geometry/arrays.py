@@ -5,6 +5,8 @@ The only module of the core that needs numpy at import.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy import fmod, frexp, ldexp, maximum, minimum, sqrt
 
@@ -226,7 +228,7 @@ def guarded(kernel: Kernel, complain: Callable[[], object]) -> Kernel:
 
 def all_finite(results: Components) -> bool:
     """Tell whether all results are finite, by the first and the last: what goes wrong in a row shows in one of them."""
-    return bool(np.isfinite(np.sum(results[0]) + np.sum(results[-1])))
+    return math.isfinite(np.asarray(results[0]).sum() + np.asarray(results[-1]).sum())
 
 
 def finite_throughout(parts: Components) -> bool:

@@ -52,10 +52,10 @@ def to_quaternion(first: N, second: N, third: N, axes: str, xp: Functions[N], *,
         vector[j] = sb * (cosines + sines)
         vector[k] = sb * (mixed - turned) * parity
     else:
-        signed = sb * parity
+        signed, level = (sb, cb) if parity > 0.0 else (-sb, -cb)
         w = cb * cosines - signed * sines
         vector[i] = cb * mixed + signed * turned
-        vector[j] = sb * cosines - (cb * parity) * sines
+        vector[j] = sb * cosines - level * sines
         vector[k] = cb * turned + signed * mixed
     x, y, z = vector
     return settled(x, y, z, w) if degrees else (x, y, z, w)

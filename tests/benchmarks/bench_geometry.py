@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-ROUNDS = 15
+ROUNDS = 9
 
 
 class Case(NamedTuple):
