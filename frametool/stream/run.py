@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import shown, warn
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
+from frametool.text.ranges import Range, content
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from frametool.stream.blocks import Run
     from frametool.stream.faults import BadRows, Fault
     from frametool.stream.rows import Block
+
+    Write = Callable[[bytes | memoryview], None]
 
 
 class RowNote(NamedTuple):
@@ -68,7 +71,7 @@ class Outcome(NamedTuple):
     is_open: whether an array goes on behind the block; None for what is no array
     """
 
-    text: bytes
+    text: bytes | memoryview
     faults: Sequence[Fault] = ()
     rows: int = 0
     lines: int = 0
@@ -79,9 +82,7 @@ class Outcome(NamedTuple):
     is_open: bool | None = None
 
 
-def run(
-    outcomes: Iterable[Outcome], write: Callable[[bytes], None], bad: BadRows, advance: Callable[[int, int], None]
-) -> int:
+def run(outcomes: Iterable[Outcome], write: Write, bad: BadRows, advance: Callable[[int, int], None]) -> int:
     """Write what becomes of each block, report its faults, and return the exit status.
 
     advance: is told rows and bytes done after each block.  Raises BadRow at the first fault if that is the rule.
@@ -107,10 +108,10 @@ def run(
     return bad.finish(rows)
 
 
-def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:
+def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes | Range], jobs: int) -> Iterator[Outcome]:
     """Process blocks in order, over several processes if asked for."""
     if jobs < 2:
-        return map(process, blocks)
+        return map(process, map(content, blocks))
     from frametool.stream.workers import spread
 
     return spread(process, blocks, jobs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,10 +17,11 @@ from frametool.stream.table_names import Naming
 from frametool.stream.table_plan import plan_table
 from frametool.stream.trajectory_columns import STAMPS, as_trajectory, has_header
 from frametool.text.cells import RecordEnds, torn_record
-from frametool.text.lines import BLOCK_BYTES, read_blocks
+from frametool.text.lines import BLOCK_BYTES, read_blocks, whole_lines
+from frametool.text.ranges import blocks_behind, place_in_file
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Callable, Generator, Iterator
 
     from frametool.stream.blocks import Plan
     from frametool.stream.output_columns import Layout
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
     from frametool.text.lines import ByteStream
+    from frametool.text.ranges import Range
 
 
 DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b"", "kitti": b"", "euroc": b","}
@@ -43,13 +46,19 @@ def run_table(
     size: int = 0,
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
+    jobs = 1 if request.in_order else jobs
+    begin = place_in_file(stream) if jobs > 1 else None
     table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header, size=size)
     request, unasked = settle_stamps(table, request, source)
     plan, layout = plan_table(table, request, source)
     yield Outcome(table.opening(layout), lines=lines, size=taken)
     named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
     work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
-    yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
+    following: Iterator[bytes | Range] = blocks
+    if begin is not None:
+        behind, whole = begin + taken + len(rest), _record_ends(DELIMITERS[form])
+        following = blocks_behind(stream, begin, behind, name=source, size=size or BLOCK_BYTES, whole=whole)
+    yield from mapped(work, chain((rest,) if rest else (), following), jobs)
 
 
 class Begun(NamedTuple):
@@ -78,11 +87,13 @@ def begin_table(
 
 
 def _blocks(stream: ByteStream, delimiter: bytes, size: int) -> Iterator[bytes]:
-    """Return blocks of whole rows; cells in quotes may hold line ends."""
-    size = size or BLOCK_BYTES
-    if not delimiter:
-        return read_blocks(stream, size=size)
-    return read_blocks(stream, size=size, whole=RecordEnds(delimiter))
+    """Return blocks of whole rows."""
+    return read_blocks(stream, size=size or BLOCK_BYTES, whole=_record_ends(delimiter)())
+
+
+def _record_ends(delimiter: bytes) -> Callable[[], Callable[[bytes], int]]:
+    """Return what makes a finder of the ends of rows; cells in quotes may hold line ends."""
+    return partial(RecordEnds, delimiter) if delimiter else lambda: whole_lines
 
 
 def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:

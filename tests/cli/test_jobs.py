@@ -60,7 +60,7 @@ def test_a_parent_that_dies_takes_its_workers_along(number: int, tmp_path: Path)
 
 
 def test_more_processes_than_anyone_has_are_refused() -> None:
-    for count in ("0", "257", "99999999999999999999"):
+    for count in ("-1", "257", "99999999999999999999"):
         status, out, err = run(*MOVE[:-1], count, text=HEAD)
         assert (status, out, err.count(b"\n")) == (2, b"", 1)
 
