@@ -14,7 +14,7 @@ from frametool.stream.scalar import result_of
 from frametool.stream.splitter import ARRAY, Splitter
 from frametool.stream.template import learn, nulled
 from frametool.text.lines import BLOCK_BYTES, read_blocks
-from frametool.text.ranges import blocks_behind, place_in_file
+from frametool.text.ranges import blocks_behind, extent_in_file
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator
@@ -47,7 +47,7 @@ def _outcomes(
     stream: ByteStream, splitter: Splitter, form: str, request: Request, *, source: str, jobs: int, size: int
 ) -> Generator[Outcome]:
     jobs = 1 if request.in_order else jobs
-    begin = place_in_file(stream) if jobs > 1 else None
+    extent = extent_in_file(stream) if jobs > 1 else None
     blocks = read_blocks(stream, whole=splitter.whole, size=size or BLOCK_BYTES)
     first = next(blocks, None)
     if first is None:
@@ -63,10 +63,10 @@ def _outcomes(
     process = RecordBlocks(splitter, form, request, source)
     begun = [first, second] if second else [first]
     following: Iterator[bytes | Range] = blocks
-    if begin is not None:
-        behind = begin + sum(map(len, begun))
+    if extent is not None:
+        taken = sum(map(len, begun))
         following = blocks_behind(
-            stream, begin, behind, name=source, size=size or BLOCK_BYTES, whole=lambda: splitter.whole
+            stream, extent, taken, name=source, size=size or BLOCK_BYTES, whole=lambda: splitter.whole
         )
     yield from mapped(process, chain(begun, following), jobs)
 

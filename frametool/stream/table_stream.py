@@ -12,13 +12,13 @@ from frametool.stream.blocks import Run, State
 from frametool.stream.faults import NULL, Fault, Misused
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, RowNote, mapped, notes_of
-from frametool.stream.table import UNCLOSED, open_table, table_block
+from frametool.stream.table import BYTE_ORDER_MARK, COMMENT, UNCLOSED, open_table, table_block
 from frametool.stream.table_names import Naming
 from frametool.stream.table_plan import plan_table
 from frametool.stream.trajectory_columns import STAMPS, as_trajectory, has_header
 from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import BLOCK_BYTES, read_blocks, whole_lines
-from frametool.text.ranges import blocks_behind, place_in_file
+from frametool.text.ranges import blocks_behind, extent_in_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -47,7 +47,7 @@ def run_table(
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
     jobs = 1 if request.in_order else jobs
-    begin = place_in_file(stream) if jobs > 1 else None
+    extent = extent_in_file(stream) if jobs > 1 else None
     table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header, size=size)
     request, unasked = settle_stamps(table, request, source)
     plan, layout = plan_table(table, request, source)
@@ -55,9 +55,11 @@ def run_table(
     named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
     work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
     following: Iterator[bytes | Range] = blocks
-    if begin is not None:
-        behind, whole = begin + taken + len(rest), _record_ends(DELIMITERS[form])
-        following = blocks_behind(stream, begin, behind, name=source, size=size or BLOCK_BYTES, whole=whole)
+    if extent is not None:
+        whole = _record_ends(DELIMITERS[form])
+        following = blocks_behind(
+            stream, extent, taken + len(rest), name=source, size=size or BLOCK_BYTES, whole=whole
+        )
     yield from mapped(work, chain((rest,) if rest else (), following), jobs)
 
 
@@ -77,7 +79,7 @@ def begin_table(
     """Read the head of a table in a form; raises FormatError."""
     delimiter = DELIMITERS[form]
     blocks = _blocks(stream, delimiter, size)
-    first = _first_rows(blocks, delimiter)
+    first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
     table, rest = open_table(first, delimiter, header=header and has_header(form, first), source=source)
@@ -96,12 +98,13 @@ def _record_ends(delimiter: bytes) -> Callable[[], Callable[[bytes], int]]:
     return partial(RecordEnds, delimiter) if delimiter else lambda: whole_lines
 
 
-def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
+def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
     """Return the first blocks, up to one that holds more than comments."""
     text = b""
     for block in blocks:
         text += block
-        if delimiter or any(line.strip() and not line.startswith(b"#") for line in block.splitlines()):
+        lines = text.removeprefix(BYTE_ORDER_MARK).splitlines()
+        if any(line.strip() and not line.startswith(COMMENT) for line in lines):
             return text
     return text or None
 

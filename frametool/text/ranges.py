@@ -50,7 +50,7 @@ class Range(NamedTuple):
             pieces.append(piece)
             at += len(piece)
         if at < end:
-            raise FileProblem(f"{self.name}: became shorter while it was read")
+            raise _shrunk(self.name)
         return b"".join(pieces)
 
 
@@ -59,19 +59,27 @@ def content(block: bytes | Range) -> bytes:
     return block.read() if isinstance(block, Range) else block
 
 
-def place_in_file(stream: ByteStream) -> int | None:
-    """Return the place of a stream in a plain file, None if it is something else."""
+class Extent(NamedTuple):
+    """Where a stream begins in a file, and where the file ends."""
+
+    begin: int
+    end: int
+
+
+def extent_in_file(stream: ByteStream) -> Extent | None:
+    """Return what is left of a plain file, None if a stream is something else."""
     try:
         file: FileStream = stream  # type: ignore[assignment]
-        return file.tell() if stat.S_ISREG(os.fstat(file.fileno()).st_mode) else None
+        about = os.fstat(file.fileno())
+        return Extent(file.tell(), about.st_size) if stat.S_ISREG(about.st_mode) else None
     except (AttributeError, OSError, ValueError):
         return None
 
 
 def blocks_behind(
     stream: ByteStream,
-    begin: int,
-    start: int,
+    extent: Extent,
+    taken: int,
     *,
     name: str,
     size: int = BLOCK_BYTES,
@@ -79,18 +87,25 @@ def blocks_behind(
 ) -> Iterator[bytes | Range]:
     """Yield the blocks of a file from a place on as `read_blocks` cuts them; as ranges up to the last.
 
-    begin: where the stream began, for the lines in errors; start: the end of a record behind it
+    extent: of the stream at its start; taken: the bytes of it that were read, whole records
     whole: makes what tells how many bytes of a text are finished records
+    Raises FileProblem if the file ends before it did at the start: what was there is lost then.
     """
     file: FileStream = stream  # type: ignore[assignment]
-    at = start
-    for each in _ranges(file.fileno(), name, start, size, whole()):
+    at = extent.begin + taken
+    for each in _ranges(file.fileno(), name, at, size, whole()):
         yield each
         at = each.start + each.size
     file.seek(at)
     yield from read_blocks(
-        stream, size=size, whole=whole(), lines_before=lambda: _count_lines(file.fileno(), begin, at)
+        stream, size=size, whole=whole(), lines_before=lambda: _count_lines(file.fileno(), extent.begin, at)
     )
+    if file.tell() < extent.end:
+        raise _shrunk(name)
+
+
+def _shrunk(name: str) -> FileProblem:
+    return FileProblem(f"{name}: became shorter while it was read")
 
 
 def _ranges(file: int, name: str, at: int, size: int, whole: Callable[[bytes], int]) -> Iterator[Range]:
