@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from frametool.stream.faults import BadRows, Fault
     from frametool.stream.rows import Block
 
-    Write = Callable[[bytes | memoryview], None]
-
 
 class RowNote(NamedTuple):
     """Something worth telling about a row: its line from 0, what it is about, and the sentence."""
@@ -82,7 +80,12 @@ class Outcome(NamedTuple):
     is_open: bool | None = None
 
 
-def run(outcomes: Iterable[Outcome], write: Write, bad: BadRows, advance: Callable[[int, int], None]) -> int:
+def run(
+    outcomes: Iterable[Outcome],
+    write: Callable[[bytes | memoryview], None],
+    bad: BadRows,
+    advance: Callable[[int, int], None],
+) -> int:
     """Write what becomes of each block, report its faults, and return the exit status.
 
     advance: is told rows and bytes done after each block.  Raises BadRow at the first fault if that is the rule.
@@ -100,7 +103,7 @@ def run(outcomes: Iterable[Outcome], write: Write, bad: BadRows, advance: Callab
             told.add(note.about)
             bad.take(fault for fault in faults if fault.line < line + note.line)
             faults = [fault for fault in faults if fault.line >= line + note.line]
-            warn(f"{bad.source}:{line + note.line}: {note.sentence}")
+            warn(f"{bad.place(line + note.line)}: {note.sentence}")
         bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
     if mended > 1:
