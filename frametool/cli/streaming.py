@@ -74,7 +74,7 @@ OPTIONS = {
     ),
     "jobs": click.option(
         "--jobs", type=click.IntRange(0, MOST_JOBS), default=1, show_default=True, metavar="N",
-        help="processes for a large stream; 0 is one for each core",
+        help="processes for a stream; 0 is all cores",
     ),
     "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
 }  # fmt: skip
