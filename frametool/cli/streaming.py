@@ -73,8 +73,8 @@ OPTIONS = {
         help="report at most N bad rows, count all",
     ),
     "jobs": click.option(
-        "--jobs", type=click.IntRange(1, MOST_JOBS), default=1, show_default=True, metavar="N",
-        help="processes for a large stream",
+        "--jobs", type=click.IntRange(0, MOST_JOBS), default=1, show_default=True, metavar="N",
+        help="processes for a stream; 0 is all cores",
     ),
     "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
 }  # fmt: skip
@@ -187,6 +187,7 @@ class Stream:
         from frametool.grammar.edges import Options, Tally, Topics
         from frametool.stream.column_stream import run_columns
 
+        self._jobs(f"one process is enough for {form}")
         name = self.path or "stdin"
         if output.path is None and request.gathered is None and sys.stdout.isatty():
             raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
@@ -214,6 +215,7 @@ class Stream:
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         name = self.path or "stdin"
+        self._jobs(f"rows become {target} one after the other")
         converted = OtherForm(form, request, output.style.in_form(target), name, answers())
         outcomes = converted.outcomes(stream, header=self.options["header"])
         status = self._write(outcomes, output, name, counted="row" if holds_arrays(form) else "line")
@@ -250,6 +252,7 @@ class Stream:
         """Write the results of records in another form than theirs."""
         from frametool.stream.record_values import stream_results
 
+        self._jobs(f"records become {output.told} one after the other")
         bad = self.policy(self.path or "stdin")
         output.values(stream_results(stream, form, request, output.style, bad))
         return ROWS_SKIPPED if bad.count else 0
@@ -312,13 +315,27 @@ class Stream:
             return run(outcomes, lambda _: None, self.policy(name), progress.advance)
 
     def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
+        jobs = self._jobs("each row needs those before it" if request.in_order else "")
         if form in RECORDS:
             from frametool.stream.record_stream import run_records
 
-            return run_records(stream, form, request, source=name, jobs=self.options["jobs"])
+            return run_records(stream, form, request, source=name, jobs=jobs)
         from frametool.stream.table_stream import run_table
 
-        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
+        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=jobs)
+
+    def _jobs(self, obstacle: str) -> int:
+        """Return how many processes do the work: one where something is in the way of more, which is said."""
+        if self.options["jobs"] == 1:
+            return 1
+        from frametool.stream.workers import can_spread, cores
+
+        jobs: int = min(self.options["jobs"] or cores(), MOST_JOBS)
+        obstacle = obstacle or ("" if can_spread() else "this system cannot fork processes")
+        if jobs == 1 or not obstacle:
+            return jobs
+        say(f"--jobs does not help here: {obstacle}; one process does the work")
+        return 1
 
 
 def _signed(begin: bytes, name: str) -> str:
