@@ -49,7 +49,7 @@ class Output:
         """
         self.path = output
         self.force = force
-        self.told = format_name or by_name(output, writers(*what))
+        self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
         self.notations = notations or ()
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
