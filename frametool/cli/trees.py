@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import READING, TREES_OPENED, VERBOSE, Text, forms_told
+from frametool.cli.command import FORMS, READING, TREES_OPENED, VERBOSE, Text, forms_told
 from frametool.cli.pasted_input import is_inline
 from frametool.cli.poses import source_of
 from frametool.cli.stderr import say
+from frametool.cli.tree_cache import TreeCache
 from frametool.errors import shown, warn
 from frametool.formats import FORMATS
 from frametool.grammar.edges import Answers
@@ -35,12 +36,23 @@ def load_tree(
 
     streams: `--in` is about what is streamed wherever that can be
     """
-    from frametool.formats.load import load_sources  # not every command that may read trees does
 
-    files = opened((argument, *more), streams=streams)
-    tree = load_sources(files, rules)
-    state(files)
-    return tree
+    def read() -> FrameTree | TransformBuffer:
+        from frametool.formats.load import load_sources  # not every command that may read trees does
+
+        files = opened((argument, *more), streams=streams)
+        tree = load_sources(files, rules)
+        state(files)
+        return tree
+
+    context = click.get_current_context(silent=True)
+    cache = None if context is None else context.find_object(TreeCache)
+    if context is None or cache is None:
+        return read()
+    context.meta[TREES_OPENED] = True
+    named = tuple(each if is_inline(each) else tree_file(each) for each in (argument, *more))
+    options = repr((streams, context.meta.get(FORMS), context.meta.get(READING), rules))
+    return cache.tree(named, options, read)
 
 
 def load_sides(
