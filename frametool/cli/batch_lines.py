@@ -36,21 +36,24 @@ def command_lines(stream: BinaryIO, source: str) -> Iterator[CommandLine]:
     Raises FormatError for what is no text of lines at all.
     """
     lines = _lines(stream, source)
-    for number, line, problem in lines:
-        text = line
+    for number, text, problem in lines:
+        yield _command_line(number, text, problem, lines, source)
+
+
+def _command_line(
+    number: int, text: str, problem: str, lines: Iterator[tuple[int, str, str]], source: str
+) -> CommandLine:
+    """Return the command that begins in a line, with the lines that a backslash joins to it."""
+    name, words = _taken_apart(text)
+    joined = 1
+    while words.goes_on and not problem:
+        _, more, problem = next(lines, (0, "", ""))
+        text = text[:-1] + more
+        joined += 1
+        if joined > MOST_JOINED:
+            raise FormatError(f"a command of more than {MOST_JOINED} lines", source=source, line=number)
         name, words = _taken_apart(text)
-        joined = 1
-        while words.goes_on and not problem:
-            _, more, problem = next(lines, (0, "", ""))
-            joined += 1
-            if joined > MOST_JOINED:
-                raise FormatError(f"a command of more than {MOST_JOINED} lines", source=source, line=number)
-            if not more and not problem:  # a backslash at the very end, or before an empty line
-                text = text[:-1]
-            else:
-                text = text[:-1] + more
-            name, words = _taken_apart(text)
-        yield CommandLine(number, name, Words([], problem) if problem else words)
+    return CommandLine(number, name, Words([], problem) if problem else words)
 
 
 def _taken_apart(text: str) -> tuple[str, Words]:

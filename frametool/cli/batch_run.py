@@ -74,6 +74,7 @@ class Batch:
     def _run_line(self, line: CommandLine) -> int:
         """Run one command and tell what goes wrong; return its status."""
         words: list[str] = []
+        status = 0
         problem: FrametoolError
         with telling_of(BatchLine(self.source, line.number)):
             try:
@@ -84,7 +85,6 @@ class Batch:
                 if status in FINISHED:
                     return status
                 problem = LineFailed(f"{words[0]} ended with status {status}", status=status)
-                problem.exit_code = status
             except BrokenPipeError:
                 raise
             except FrametoolError as error:
@@ -94,7 +94,7 @@ class Batch:
             if line.name:
                 self.results.lose(line.name, line.number)
             say_error(problem, in_json=wants_json(words), fate="line skipped" if self.skips else "")
-        return TROUBLE.get(words[0] if words else "", problem.exit_code)
+        return status or TROUBLE.get(words[0] if words else "", problem.exit_code)
 
     def _printed(self, words: Sequence[str], name: str = "") -> int:
         """Call a command; with a name for its result in a form that can be kept."""
@@ -133,7 +133,7 @@ def _refuse(words: Sequence[str]) -> None:
 def _without_input() -> Iterator[None]:
     """Keep commands from standard input, which holds their own lines or belongs to none of them."""
     before = sys.stdin
-    sys.stdin = _NoInput()  # type: ignore[assignment]
+    sys.stdin = _NoInput()
     try:
         yield
     finally:

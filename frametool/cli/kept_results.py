@@ -8,8 +8,6 @@ from contextlib import contextmanager, redirect_stdout
 from io import BytesIO, TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from frametool.documents.source import MOST_CHARACTERS
 from frametool.errors import ValueInvalid, alternatives
 from frametool.grammar.rotation import ROTATION_KEYS
@@ -18,6 +16,8 @@ from frametool.stream.record import PARTS, POINT_KEYS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    import click
 
 OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
 OF_RECORDS = {*POINT_KEYS, *ROTATION_KEYS, *PARTS, "x", "y", "z"}

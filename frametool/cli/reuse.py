@@ -19,12 +19,14 @@ class Prepared(NamedTuple):
     """What does not change from one call of a command to the next.
 
     parser: click's, made for all parameters
+    direct: the same, in which short names are found at once
     params: all of them
     absent: what the parser says of arguments that are not there
     values, meta: what parameters that are not there leave in a context
     """
 
     parser: Any
+    direct: Any
     params: list[click.Parameter]
     absent: Mapping[str, Any]
     values: Mapping[str, Any]
@@ -55,7 +57,9 @@ class Reused(click.Command):
             return super().parse_args(ctx, args)
         if self._prepared is None:
             self._prepared = self._prepare(ctx)
-        parser, params, absent, values, meta = self._prepared
+        parser, direct, params, absent, values, meta = self._prepared
+        if not any(each[2:3] == "=" for each in args):  # -f=x is no -f x
+            parser = direct
         parser.ctx = ctx
         given, rest, order = parser.parse_args(args=list(args))
         if rest or not args:
@@ -73,8 +77,10 @@ class Reused(click.Command):
         params = self.get_params(ctx)
         optional: list[click.Parameter] = [each for each in params if not each.required]
         empty = click.Command(None, params=optional, add_help_option=False).make_context("", [])
-        parser = self.make_parser(ctx)
-        return Prepared(parser, params, parser.parse_args(args=[])[0], empty.params, empty.meta)
+        parser, direct = self.make_parser(ctx), self.make_parser(ctx)
+        # click looks for -f among the long names first, and fails with all that an error message needs
+        direct._long_opt.update(direct._short_opt)  # noqa: SLF001
+        return Prepared(parser, direct, params, parser.parse_args(args=[])[0], empty.params, empty.meta)
 
 
 def _is_given(name: str, given: Mapping[str, Any], absent: Mapping[str, Any]) -> bool:
