@@ -59,7 +59,10 @@ def _refuse_other_results(name: str, text: str) -> None:
     lines = text.count("\n")
     if lines != 1:
         raise ValueInvalid(f"{name}: the command has {lines or 'no'} result{'s' * (lines != 1)}; {KEPT_ARE}")
-    value = json.loads(text)
+    try:
+        value = json.loads(text)
+    except ValueError:
+        raise ValueInvalid(f"{name}: the result is text; {KEPT_ARE}") from None
     keys = set(value) if isinstance(value, dict) else set()
     if not (isinstance(value, float | int) or keys & OF_TREES or keys & OF_RECORDS):
         raise ValueInvalid(f"{name}: the result is a report; {KEPT_ARE}")
@@ -71,8 +74,8 @@ def print_as_json(name: str, context: click.Context) -> None:
     if "json" not in getattr(formats, "choices", ()):
         raise Misused(f"{name}: {context.info_name} has no result that can be kept; {KEPT_ARE}")
     params = context.params
-    for told, option in ((params.get("output"), "-o FILE"), (params.get("explain"), "--explain")):
-        if told:
+    for param, option in (("output", "-o FILE"), ("explain", "--explain"), ("explain_full", "--explain-full")):
+        if params.get(param):
             raise Misused(f"{name}: a result is kept or written, not both; leave {option} or {name} = out")
     if params["format_name"] not in (None, *READABLE):
         raise Misused(f"{name}: -f {params['format_name']} is for printing, and {name} is kept; leave it out")

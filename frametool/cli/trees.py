@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -18,8 +19,8 @@ from frametool.formats import FORMATS
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from typing import Any
+    from collections.abc import Callable, Sequence
+    from typing import Any, TypeVar
 
     from click.shell_completion import CompletionItem
 
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
     from frametool.formats.robot import Robot
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
+
+    Value = TypeVar("Value")
+
 
 def load_tree(
     argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False
@@ -38,21 +42,9 @@ def load_tree(
     """
 
     def read() -> FrameTree | TransformBuffer:
-        from frametool.formats.load import load_sources  # not every command that may read trees does
+        return _loaded(opened((argument, *more), streams=streams), rules)
 
-        files = opened((argument, *more), streams=streams)
-        tree = load_sources(files, rules)
-        state(files)
-        return tree
-
-    context = click.get_current_context(silent=True)
-    cache = None if context is None else context.find_object(TreeCache)
-    if context is None or cache is None:
-        return read()
-    context.meta[TREES_OPENED] = True
-    named = tuple(each if is_inline(each) else tree_file(each) for each in (argument, *more))
-    options = repr((streams, context.meta.get(FORMS), context.meta.get(READING), rules))
-    return cache.tree(named, options, read)
+    return _read_once((argument, *more), f"{rules!r} {streams}", read)
 
 
 def load_sides(
@@ -63,16 +55,46 @@ def load_sides(
     places: are filled with where each frame of the one and the other was said to be
     """
     refuse_two_readers((*a, *b))
-    from frametool.formats.assembly import Rules
-    from frametool.formats.load import load_sources
+    count = len(a) + len(b)
 
-    rules = Rules(normalize=normalize)
+    def side(arguments: Sequence[str], behind: int) -> tuple[FrameTree | TransformBuffer, dict[str, Place]]:
+        from frametool.formats.assembly import Rules
+
+        where: dict[str, Place] = {}
+        return _loaded(opened(arguments, behind=behind, of=count), Rules(normalize=normalize), where), where
+
     trees = []
-    for arguments, behind, found in ((a, 0, places[0]), (b, len(a), places[1])):
-        files = opened(arguments, behind=behind, of=len(a) + len(b))
-        trees.append(load_sources(files, rules, found))
-        state(files)
+    for arguments, behind, found in zip((a, b), (0, len(a)), places, strict=True):
+        options = f"{normalize} {behind} of {count}"
+        tree, where = _read_once(arguments, options, partial(side, arguments, behind))
+        trees.append(tree)
+        found.update(where)
     return trees
+
+
+def _loaded(
+    files: Sequence[Recording], rules: Rules | None, places: dict[str, Place] | None = None
+) -> FrameTree | TransformBuffer:
+    """Merge files that are open, and say what they were taken for."""
+    from frametool.formats.load import load_sources  # not every command that may read trees does
+
+    tree = load_sources(files, rules, places)
+    state(files)
+    return tree
+
+
+def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]) -> Value:
+    """Return what is read from files; in a batch, what was read from them before as long as they have not changed.
+
+    options: what says how, beside the options that the context keeps
+    """
+    context = click.get_current_context(silent=True)
+    cache = None if context is None else context.find_object(TreeCache)
+    if context is None or cache is None:
+        return read()
+    context.meta[TREES_OPENED] = True
+    named = [each if is_inline(each) else tree_file(each) for each in arguments]
+    return cache.read(named, f"{options} {context.meta.get(FORMS)} {context.meta.get(READING)}", read)
 
 
 def state(files: Sequence[Recording]) -> None:

@@ -49,15 +49,15 @@ SHAPES: list[Callable[[Random], str]] = [
     lambda r: f"between '[{number(r)}, 0, 1]' '[0, {number(r)}, 0]'",
     lambda r: f"lookup robot.yaml {r.choice(FRAMES)} {r.choice(FRAMES)}",
     lambda r: f"lookup drive.yaml map base_link --at {abs(float(number(r))):g}",
-    lambda r: "lookup drive.yaml map base_link --times 0:4:1 --on-error skip",
+    lambda r: f"lookup drive.yaml map base_link --times 0:{r.randrange(9)}:1 --on-error skip",
     lambda r: f"lookup arm.urdf arm_base tool -j elbow={number(r)}",
     lambda r: f"apply robot.yaml {r.choice(FRAMES)} {r.choice(FRAMES)} {numbers(r, 3)}",
     lambda r: f"apply --transform {pose(r)} -i cloud.csv",
-    lambda r: "apply robot.yaml map -i hits.jsonl",
+    lambda r: f"apply robot.yaml {r.choice(FRAMES)} -i hits.jsonl",
     lambda r: f"tree {r.choice(('robot.yaml', 'arm.urdf', 'lift.sdf', 'camchain.yaml', 'drive.yaml'))}",
     lambda r: f"calc --tree robot.yaml 'inv(map<-base_link) * (map<-{r.choice(FRAMES)})'",
     lambda r: f"calc x={number(r)} 'x * 2' \"sqrt(x)\"",
-    lambda r: "mean -i walk.tum",
+    lambda r: f"mean -i walk.tum {r.choice(('', '--to rpy'))}",
     lambda r: r.choice(("check robot.yaml", "diff robot.yaml robot.yaml", "diff robot.yaml arm.urdf", "formats", "--version", "help pose")),
     lambda r: r.choice(("fk arm.urdf arm_base tool -i joints.csv", "monitor drive.yaml", "echo drive.yaml map base_link", "view robot.yaml")),
     lambda r: r.choice(("sim follow --duration 1", "static robot.yaml", "nope", "convert --help", "compose --nope", "sim", "lookup")),
@@ -279,8 +279,7 @@ def test_a_file_of_frames_is_read_once_until_it_changes(run: Run, monkeypatch: p
     assert done.status == 3
 
 
-@pytest.mark.usefixtures("folder")
-def test_a_file_that_was_written_a_moment_ago_is_read_again(run: Run, folder: Path) -> None:
+def test_a_file_that_was_written_a_moment_ago_is_read_again(folder: Path) -> None:
     one, two = ((f"{{frames: {{a: {{b: {{xyz: [{x}, 0, 0]}}}}}}}}") for x in (1, 2))
     (folder / "now.yaml").write_text(one)
     with shell.start("batch", cwd=folder) as process:
