@@ -184,7 +184,17 @@ def answers() -> Answers:
     """Return what the options say about all files whose form leaves it open."""
     named = {name: _reading(name) for name in Answers._fields if name not in ("joints", "frames")}
     given = {name: value for name, value in named.items() if value}
-    return Answers(joints=dict(map(_joint, _reading("joints"))), **given)
+    return Answers(joints=_joints(_reading("joints")), **given)
+
+
+def _joints(texts: Sequence[str]) -> dict[str, str]:
+    """Return the values of joints by name; raise a usage error for a joint that has two."""
+    values: dict[str, str] = {}
+    for name, value in map(_joint, texts):
+        if name in values:
+            raise click.UsageError(f"--joint {shown(name)} is given twice, {values[name]} and {value}; leave one out")
+        values[name] = value
+    return values
 
 
 def _joint(text: str) -> tuple[str, str]:
