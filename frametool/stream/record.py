@@ -38,6 +38,7 @@ PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque")}
 PARENT_KEYS = ("parent", "frame", "frame_id", "parent_frame_id")  # the frame a record is given in
 NAME_KEYS = ("name", "child_frame_id")  # what a pose is the pose of
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
+KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
 QUATERNION = (*XYZ, "w")
@@ -358,9 +359,10 @@ def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request)
 
 def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> None:
     """Stop at a key that is nearly that of a rotation or a position, where no other says it."""
+    if (rotations and position) or KNOWN.issuperset(value):
+        return
     wanted = [*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)]
-    known = {*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS}
-    unknown = islice((key for key in value if wanted and key not in known), MOST_COMPARED)
+    unknown = islice((key for key in value if key not in KNOWN), MOST_COMPARED)
     if near := [(key, hint) for key in unknown if (hint := _meant(key, value[key], wanted))]:
         raise _unknown(near)
 

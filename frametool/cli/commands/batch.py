@@ -15,18 +15,18 @@ from frametool.stream.faults import SKIP, STOP
 @click.option("--on-error", "on_failure", type=click.Choice((STOP, SKIP)), default=STOP, show_default=True,
               help="end at a line that fails, or report it and go on")
 def command(file: str, on_failure: str) -> int:  # fmt: skip
-    """Run the commands of FILE, or of standard input, one a line as typed behind frametool, in one process.
+    """Run the commands of FILE, or of standard input, in one process: one a line, as typed behind frametool.
 
     \b
       frametool batch commands.txt
-      printf 'convert --from rpy_deg 0 0 90\\nlookup robot.yaml map lidar\\n' | frametool batch
       frametool batch --on-error skip < commands.txt
-      frametool batch <<'END'
-      base = lookup robot.yaml map base_link    # kept, not printed
-      compose $base '{xyz: [0, 0, 1]}'
-      END
+      seq 0 90 | sed 's/.*/convert --from rpy_deg 0 0 &/' | frametool batch
 
-    Each prints what it would print alone into a pipe, and nothing stands between; a pipe is answered line by line.
+    \b
+      base = lookup robot.yaml map base_link                  # kept, not printed
+      compose $base '{xyz: [0, 0, 1]}' --to rpy_deg
+
+    Each line prints what it prints alone into a pipe, and nothing stands between; a pipe is answered line by line.
     Files of frames that several lines name are read once, and anew when they have changed.
 
     NAME = COMMAND keeps a pose, point, number or tree instead of printing it; $NAME or ${NAME} in an argument is then
@@ -34,8 +34,9 @@ def command(file: str, on_failure: str) -> int:  # fmt: skip
     bare $NAME counts, \\ takes the next character as it is, $$ is a dollar sign, # begins a comment, and a backslash at
     its end joins a line with the next. Pipes, > and < are not for a batch.
 
-    A line that fails is reported with its number: batch.txt:12: .. The status is that of the failed line, or 3 where
-    lines were skipped. Standard input is not for the lines: name files. A line cannot be a batch, nor sim --realtime.
+    A line that fails is reported with its number: commands.txt:12: .. The status is that of the failed line, or 3
+    where lines were skipped. Standard input is not for the lines: name files. A line cannot be a batch itself, nor run
+    on the clock or without end, as sim --realtime does.
     """
     from frametool.cli.batch_run import Batch
 
