@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation|Rotation):)", re.IGNORECASE)
-STREAMED = ("records", "rows")
-READ = readers("tree", "records", "rows", "joints")
+STREAMED = ("records", "rows", "arrays")
+READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 

@@ -26,7 +26,7 @@ from frametool.cli.completions import ColumnNames
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem
-from frametool.formats import FORMATS, is_trajectory, readers
+from frametool.formats import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.formats.detect import by_sign, detect
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
@@ -146,7 +146,9 @@ class Stream:
         with self.opened() as given:
             stream = given
             form, known_by = self.told_form(), ""
-            if not (form or tables_only or self._says_columns() or is_trajectory(_signed(stream.peek(), name))):
+            signed = form or _signed(stream.peek(), name)
+            is_listed = is_trajectory(signed) or holds_arrays(signed)
+            if not (form or tables_only or self._says_columns() or is_listed):
                 pasted, stream = self._pasted(stream, name, request)
                 if pasted is not None:
                     return self._run_pasted(pasted, request, output)
@@ -162,8 +164,11 @@ class Stream:
                 request = request._replace(notations=())  # its rows stay what they are
             if form in RECORDS and (output.told or form) != form and request.gathered is None:
                 return self._run_as_values(stream, form, request, output)
+            if holds_arrays(form) and (output.told in (None, form) or request.gathered is not None):
+                return self._run_columns(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
+            listed |= holds_arrays(form)
             if request.gathered is not None and not listed:
                 return self._gather(stream, form, request._replace(notations=()), name)
             from frametool.stream.row_layout import POSE
@@ -173,6 +178,21 @@ class Stream:
             if form not in RECORDS and (listed or output.told not in (None, form)) and not kindred:
                 return self._run_as_poses(stream, form, request, output)
             return self._run(stream, form, request, output)
+
+    def _run_columns(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        """Write columns of numbers in the form they came in."""
+        from importlib import import_module
+
+        from frametool.cli.trees import answers
+        from frametool.documents.input_file import InputFile
+        from frametool.grammar.edges import Options, Tally, Topics
+        from frametool.stream.column_stream import run_columns
+
+        name = self.path or "stdin"
+        module: Any = import_module(FORMATS[form].reader)
+        file = InputFile(self.path or "-", stream)
+        opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
+        return self._write(run_columns(opened, request, output.style, source=name), output, name, counted="row")
 
     def _run_as_poses(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of rows, or of poses that no table holds, in another form."""
@@ -185,7 +205,8 @@ class Stream:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         name = self.path or "stdin"
         converted = OtherForm(form, request, output.style.in_form(target), name, answers())
-        status = self._write(converted.outcomes(stream, header=self.options["header"]), output, name)
+        outcomes = converted.outcomes(stream, header=self.options["header"])
+        status = self._write(outcomes, output, name, counted="row" if holds_arrays(form) else "line")
         states = FORMATS[form].states
         if states and not self.options["quiet"]:
             about = converted.tally.about
@@ -223,9 +244,11 @@ class Stream:
         output.values(stream_results(stream, form, request, output.style, bad))
         return ROWS_SKIPPED if bad.count else 0
 
-    def policy(self, name: str) -> BadRows:
+    def policy(self, name: str, counted: str = "line") -> BadRows:
         """Return what reports and counts the bad rows of a source."""
-        return BadRows(name, self.options["on_error"], most=self.options["max_errors"], tell=self._tell)
+        return BadRows(
+            name, self.options["on_error"], most=self.options["max_errors"], tell=self._tell, counted=counted
+        )
 
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
@@ -250,7 +273,7 @@ class Stream:
         name = self.path or "stdin"
         return self._write(self._outcomes(stream, form, request, name), output, name)
 
-    def _write(self, outcomes: Generator[Outcome], output: Output, name: str) -> int:
+    def _write(self, outcomes: Generator[Outcome], output: Output, name: str, *, counted: str = "line") -> int:
         """Write what becomes of each block as it comes; return the exit status."""
         from contextlib import closing
 
@@ -263,7 +286,7 @@ class Stream:
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
             closing(outcomes),  # ends the processes of --jobs
         ):
-            return run(outcomes, write, self.policy(name), progress.advance)
+            return run(outcomes, write, self.policy(name, counted), progress.advance)
 
     def _gather(self, stream: Any, form: str, request: Request, name: str) -> int:
         """Let the request take all poses; nothing is written."""

@@ -11,9 +11,10 @@ class Format(NamedTuple):
     summary: what it is, in a line
     suffixes: of files in this form; names: what files are called to which it is written
     reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
-        `records` and `rows` by the streams; `trajectory`: it holds one frame that moves
+        `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
+        holds one frame that moves
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
-        `write_points` (also for a `report`), `write_tree` of `writer`
+        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
     asks: the options that say what it leaves open
@@ -395,6 +396,15 @@ FORMATS = {
         signs=(("xml child", f"robot/(?:{_SRDF})"),),
         states="virtual joints: parent_frame<-child_link; its states are values of joints (--joints FILE:STATE)",
     ),
+    "npy": Format(
+        "NPY of numpy: n x 3 points, n x 7 poses, records with fields",
+        suffixes=(".npy",),
+        reads=("arrays",),
+        reader="frametool.formats.npy",
+        writes=("poses", "points", "arrays"),
+        writer="frametool.formats.npy",
+        signs=(("magic", rb"\x93NUMPY"),),
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
         suffixes=(".xacro",),
@@ -463,6 +473,11 @@ def writers(*what: str) -> tuple[str, ...]:
 def is_trajectory(name: str) -> bool:
     """Tell whether a form is that of the poses of one frame over time, and of nothing else."""
     return name in FORMATS and "trajectory" in FORMATS[name].reads
+
+
+def holds_arrays(name: str) -> bool:
+    """Tell whether a form holds columns of numbers and no text."""
+    return name in FORMATS and not {"arrays"}.isdisjoint((*FORMATS[name].reads, *FORMATS[name].writes))
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:

@@ -47,6 +47,7 @@ class Block(NamedTuple):
     bad: rows whose names do not fit: column and reason
     lost: the first row whose result cannot name a frame, and that frame
     values, times: (n, c) and (n,) the numbers and the stamps in nanoseconds themselves, where they are no text
+    weights: (n,) the numbers beside them, where they are no text
     """
 
     numbers: Spans
@@ -61,6 +62,7 @@ class Block(NamedTuple):
     lost: Sequence[tuple[int, str]] = ()
     values: Floats | None = None
     times: Ints | None = None
+    weights: Floats | None = None
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:

@@ -68,7 +68,7 @@ class Outcome(NamedTuple):
     is_open: whether an array goes on behind the block; None for what is no array
     """
 
-    text: bytes
+    text: bytes | memoryview
     faults: Sequence[Fault] = ()
     rows: int = 0
     lines: int = 0
@@ -80,7 +80,10 @@ class Outcome(NamedTuple):
 
 
 def run(
-    outcomes: Iterable[Outcome], write: Callable[[bytes], None], bad: BadRows, advance: Callable[[int, int], None]
+    outcomes: Iterable[Outcome],
+    write: Callable[[bytes | memoryview], None],
+    bad: BadRows,
+    advance: Callable[[int, int], None],
 ) -> int:
     """Write what becomes of each block, report its faults, and return the exit status.
 
@@ -99,7 +102,7 @@ def run(
             told.add(note.about)
             bad.take(fault for fault in faults if fault.line < line + note.line)
             faults = [fault for fault in faults if fault.line >= line + note.line]
-            warn(f"{bad.source}:{line + note.line}: {note.sentence}")
+            warn(f"{bad.place(line + note.line)}: {note.sentence}")
         bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
     if mended > 1:
