@@ -36,7 +36,7 @@ class LineFailed(FrametoolError):
     """Report a command that said itself what is wrong, by its status."""
 
 
-class Batch:
+class CommandBatch:
     """The commands of a batch, and what they leave for those behind them: kept results, trees, the exit status.
 
     source: the batch as messages name it

@@ -43,7 +43,7 @@ _INSTEAD = {
 }
 
 
-class Part(NamedTuple):
+class WordPart(NamedTuple):
     """A piece of a word: text, or the name whose value stands there."""
 
     text: str
@@ -57,7 +57,7 @@ class Words(NamedTuple):
     goes_on: the line ends in a backslash, so the next one belongs to it
     """
 
-    words: list[list[Part]]
+    words: list[list[WordPart]]
     problem: str = ""
     goes_on: bool = False
 
@@ -69,9 +69,9 @@ class Words(NamedTuple):
 def split(line: str) -> Words:
     """Take a line apart; a `#` that begins a word begins a comment."""
     if not _SPECIAL.search(line):
-        return Words([[Part(word)] for word in line.replace("\t", " ").split(" ") if word])
-    words: list[list[Part]] = []
-    word: list[Part] | None = None
+        return Words([[WordPart(word)] for word in line.replace("\t", " ").split(" ") if word])
+    words: list[list[WordPart]] = []
+    word: list[WordPart] | None = None
     problem = ""
     for token in _TOKEN.finditer(line):
         kind, text = token.lastgroup or "", token[0]
@@ -100,7 +100,7 @@ class _Refused(Exception):
     """Report what only a shell can do."""
 
 
-def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[Part]:
+def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[WordPart]:
     """Yield the pieces of a token."""
     if kind == "double":
         for token in _IN_QUOTES.finditer(text):
@@ -111,25 +111,25 @@ def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[Part]:
     elif kind == "odd":
         raise _Refused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
     elif kind == "quoted":  # a backslash in double quotes stays before what needs none
-        yield Part(text if text in '$`"\\' else f"\\{text}")
+        yield WordPart(text if text in '$`"\\' else f"\\{text}")
     elif kind == "plain" and is_first and text.startswith("~/"):
-        yield Part(os.path.expanduser(text))
+        yield WordPart(os.path.expanduser(text))
     else:
-        yield Part(text)
+        yield WordPart(text)
 
 
-def _named(text: str) -> Part:
+def _named(text: str) -> WordPart:
     """Return what a dollar sign and what follows it stand for."""
     behind = text[1:]
     bare = behind[1:-1] if behind.startswith("{") else behind
     if re.fullmatch(NAME, bare):
-        return Part(bare, is_name=True)
+        return WordPart(bare, is_name=True)
     if behind == "$":
-        return Part("$")
+        return WordPart("$")
     if behind == "(":
         raise _Refused(f"$( is for a shell: {_INSTEAD['$(']}; in single quotes it is text")
     if not behind:
-        return Part(text)
+        return WordPart(text)
     raise _Refused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
 
 

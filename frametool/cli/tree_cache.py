@@ -22,7 +22,7 @@ MOST_BYTES = 1 << 28  # of the files and texts they were read from
 SETTLED_NS = 50_000_000  # a file that was written just now may change again within one tick of its clock
 
 
-class Kept(NamedTuple):
+class Remembered(NamedTuple):
     """A value, and the files it was read from as they were then."""
 
     value: Any
@@ -42,7 +42,7 @@ class TreeCache:
 
     def __init__(self) -> None:
         """Create an empty cache."""
-        self._kept: dict[Hashable, Kept] = {}
+        self._kept: dict[Hashable, Remembered] = {}
 
     def read(self, arguments: Sequence[str], options: Hashable, read: Callable[[], Value]) -> Value:
         """Return what `read` makes of some arguments: as it did before, or anew."""
@@ -58,7 +58,7 @@ class TreeCache:
             value = read()
         if _may_be_kept(files):
             size = sum(map(len, texts)) + sum(state.size for states in files.values() for state in states)
-            self._kept[key] = Kept(value, files, size)
+            self._kept[key] = Remembered(value, files, size)
             self._forget()
         return value
 

@@ -10,7 +10,13 @@ from frametool.documents.source import opened
 from frametool.stream.faults import SKIP, STOP
 
 
-@click.command(cls=Command, name="batch")
+class BatchCommand(Command):
+    """A command that ends as its lines do."""
+
+    exit_codes = "Exit codes: 0 done, 3 lines or rows skipped, else that of the line that failed."
+
+
+@click.command(cls=BatchCommand, name="batch")
 @click.argument("file", default="-", type=FILE, metavar="[FILE]")
 @click.option("--on-error", "on_failure", type=click.Choice((STOP, SKIP)), default=STOP, show_default=True,
               help="end at a line that fails, or report it and go on")
@@ -38,12 +44,12 @@ def command(file: str, on_failure: str) -> int:  # fmt: skip
     where lines were skipped. Standard input is not for the lines: name files. A line cannot be a batch itself, nor run
     on the clock or without end, as sim --realtime does.
     """
-    from frametool.cli.batch_run import Batch
+    from frametool.cli.batch_run import CommandBatch
 
     stream, skips = opened(file), on_failure == SKIP
     if file != "-":
         with stream:
-            return Batch(file, skips=skips).run(stream)
+            return CommandBatch(file, skips=skips).run(stream)
     if stream.isatty():
         say("reading from the terminal; end with Ctrl-D")
-    return Batch("stdin", skips=skips).run(stream)
+    return CommandBatch("stdin", skips=skips).run(stream)
