@@ -50,6 +50,7 @@ class CommandBatch:
         self.results = KeptResults()
         self.context = click.Context(group, info_name="frametool", obj=TreeCache())
         self.count = self.failed = self.status = 0
+        self.in_json = True  # as all lines that failed wanted their errors
 
     def run(self, stream: BinaryIO) -> int:
         """Run the commands of a stream as they come and return the exit status of all."""
@@ -68,7 +69,7 @@ class CommandBatch:
         if not self.failed:
             return self.status
         message = f"{self.source}: {self.failed} of {self.count} lines skipped"
-        say_error(RowsSkipped(message, source=self.source, bad=self.failed, rows=self.count), in_json=False)
+        say_error(RowsSkipped(message, source=self.source, bad=self.failed, rows=self.count), in_json=self.in_json)
         return ROWS_SKIPPED
 
     def _run_line(self, line: CommandLine) -> int:
@@ -93,7 +94,8 @@ class CommandBatch:
                 problem = FileProblem(words_of(error))
             if line.name:
                 self.results.lose(line.name, line.number)
-            say_error(problem, in_json=wants_json(words), fate="line skipped" if self.skips else "")
+            self.in_json &= (in_json := wants_json(words))
+            say_error(problem, in_json=in_json, fate="line skipped" if self.skips else "")
         return status or TROUBLE.get(words[0] if words else "", problem.exit_code)
 
     def _printed(self, words: Sequence[str], name: str = "") -> int:

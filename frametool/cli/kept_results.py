@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from contextlib import contextmanager, redirect_stdout
 from io import BytesIO, TextIOWrapper
@@ -40,7 +41,8 @@ class KeptResults:
         if name in self._lost:
             raise Misused(f"${name} has no value: line {self._lost[name]}, which sets it, has failed")
         known = alternatives(name, self._texts, "names") if self._texts else "; no line before has kept a result"
-        raise Misused(f"unknown name ${name}{known}; a dollar sign is $$, or stands in single quotes")
+        shells = "variables of the shell are not known here" if name in os.environ else "a dollar sign is $$"
+        raise Misused(f"unknown name ${name}{known}; {shells}")
 
     def keep(self, name: str, text: str) -> None:
         """Keep a result that was printed as JSON."""

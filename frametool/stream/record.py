@@ -283,6 +283,8 @@ def _refuse_repeated(record: Record, document: Any, path: Path, request: Request
 
 def _with_asked(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
     """Add the numbers under the keys that an expression asks for."""
+    if not request.operation.columns:
+        return record
     numbers, values = record.numbers, record.values
     for name in request.operation.columns:
         found = key_path(document, path, name, "a number")
@@ -333,7 +335,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
         record = record._replace(others=tuple(rotations[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
-    return record._replace(inverse=_is_inverse(value))
+    return record._replace(inverse=True) if _is_inverse(value) else record
 
 
 def _is_pose(positions: Sequence[str], rotation: object) -> bool:
@@ -556,7 +558,7 @@ def _with_names(
             parent = _named(header, ("frame_id",), (*above, *inside), parent, request)
             if not stamp and "stamp" in header:
                 stamp = _stamp_paths(header["stamp"], (*inside, "stamp"), above)
-    return record._replace(parent=parent, name=name, stamp=stamp)
+    return record._replace(parent=parent, name=name, stamp=stamp) if parent.paths or name.paths or stamp else record
 
 
 def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, request: Request) -> Name:

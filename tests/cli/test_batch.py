@@ -155,6 +155,7 @@ def test_a_kept_pose_has_all_its_bits(run: Run) -> None:
         ("convert 1 > x.json", "> is for a shell: write files with -o FILE"),
         ("convert $(pwd)", "$( is for a shell"),
         ("convert $bsae", "unknown name $bsae; did you mean 'base'? names: base; a dollar sign is $$"),
+        ("convert $HOME", "unknown name $HOME; names: base; variables of the shell are not known here"),
         ("convert $1", "$1 names nothing"),
         ("batch more.txt", "a batch runs no batch"),
         ("frametool convert 1", "leave that word out"),
@@ -222,7 +223,9 @@ def test_rows_that_a_line_skips_do_not_stop_the_batch(run: Run) -> None:
 def test_errors_of_a_line_in_json_are_objects_with_its_place(run: Run) -> None:
     lines = "lookup robot.yaml map lidr -f json\nconvert '{xyz: [1, 2]}' -f json\nconvert '{xyz: [1, 2]}'\n"
     done = run("batch", "--on-error", "skip", stdin=lines)
-    unknown, broken, *_ = done.err.splitlines()
+    unknown, broken, *_, last = done.err.splitlines()
+    assert last == "frametool: stdin: 3 of 3 lines skipped"
+    assert json.loads(run("batch", "--on-error", "skip", stdin=lines.partition("\n")[0]).err.splitlines()[-1])["bad"] == 1
     assert json.loads(unknown).items() >= {"error": "unknown_frame", "source": "stdin", "line": 1, "frame": "lidr"}.items()
     found: dict[str, Any] = json.loads(broken)
     assert found["message"].startswith("stdin:2: argument:1:")
