@@ -86,7 +86,7 @@ def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
         ctx.exit()
 
 
-EXTRAS = {"rosbags": "bag", "matplotlib": "plot"}  # package -> the extra it comes with
+EXTRAS = {"rosbags": "bag", "pyarrow": "arrow", "matplotlib": "plot"}  # package -> the extra it comes with
 
 
 def _surroundings() -> str:

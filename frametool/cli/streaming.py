@@ -164,7 +164,8 @@ class Stream:
                 request = request._replace(notations=())  # its rows stay what they are
             if form in RECORDS and (output.told or form) != form and request.gathered is None:
                 return self._run_as_values(stream, form, request, output)
-            if holds_arrays(form) and (output.told in (None, form) or request.gathered is not None):
+            stays = output.told is None or holds_arrays(output.told)
+            if holds_arrays(form) and (stays or request.gathered is not None):
                 return self._run_columns(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
@@ -180,7 +181,7 @@ class Stream:
             return self._run(stream, form, request, output)
 
     def _run_columns(self, stream: Any, form: str, request: Request, output: Output) -> int:
-        """Write columns of numbers in the form they came in."""
+        """Write columns of numbers in the form they came in, or in another that holds such."""
         from importlib import import_module
 
         from frametool.cli.trees import answers
@@ -189,10 +190,21 @@ class Stream:
         from frametool.stream.column_stream import run_columns
 
         name = self.path or "stdin"
+        if output.path is None and request.gathered is None and sys.stdout.isatty():
+            raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
-        return self._write(run_columns(opened, request, output.style, source=name), output, name, counted="row")
+        into: Any = module
+        if output.told is not None and request.gathered is None:
+            into = import_module(FORMATS[output.told].writer)
+        style = output.style.in_form(output.told or form)
+        outcomes = run_columns(opened, request, style, source=name, into=None if into is module else into)
+        status = self._write(outcomes, output, name, counted="row")
+        if (states := FORMATS[form].states) and not self.options["quiet"]:
+            told = f", now in {request.told}" if request.told and request.operation.moves else ""
+            say(f"{name}: {FORMATS[form].summary}{told}; {states}")
+        return status
 
     def _run_as_poses(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of rows, or of poses that no table holds, in another form."""

@@ -43,6 +43,7 @@ DH = ("standard", "modified")
 _TREE = "frametool.formats.tree_reader"
 _MESSAGES = "frametool.ros.message_reader"
 _TABLE = "frametool.stream.table_samples"
+_ARROW = "frametool.formats.arrow_files"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _MESSAGE_KEYS = (
@@ -404,6 +405,88 @@ FORMATS = {
         writes=("poses", "points", "arrays"),
         writer="frametool.formats.npy",
         signs=(("magic", rb"\x93NUMPY"),),
+    ),
+    "npz": Format(
+        "NPZ of numpy, several arrays in a zip file",
+        suffixes=(".npz",),
+        reads=("arrays",),
+        reader="frametool.formats.npz",
+        writes=("poses", "points", "arrays"),
+        writer="frametool.formats.npz",
+        signs=(("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
+        asks=("array",),
+    ),
+    "pcd": Format(
+        "PCD point cloud",
+        suffixes=(".pcd",),
+        reads=("arrays",),
+        reader="frametool.formats.pcd",
+        writes=("points", "arrays"),
+        writer="frametool.formats.pcd",
+        signs=(("magic", rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "),),
+        states="metres; VIEWPOINT, the pose of the sensor, moves along",
+    ),
+    "ply": Format(
+        "PLY point cloud or mesh",
+        suffixes=(".ply",),
+        reads=("arrays",),
+        reader="frametool.formats.ply",
+        writes=("points", "arrays"),
+        writer="frametool.formats.ply",
+        signs=(("magic", rb"ply\r?\n"),),
+        states="metres",
+    ),
+    "las": Format(
+        "LAS laser scan",
+        suffixes=(".las",),
+        reads=("arrays",),
+        reader="frametool.formats.las",
+        writes=("points", "arrays"),
+        writer="frametool.formats.las",
+        signs=(("magic", rb"LASF.{100}[\x00-\x7f]"),),
+        states="metres",
+    ),
+    "laz": Format(
+        "LAZ laser scan",
+        suffixes=(".laz",),
+        reads=("arrays",),
+        reader="frametool.formats.las",
+        writes=("points", "arrays"),
+        writer="frametool.formats.las",
+        signs=(("magic", rb"LASF.{100}[\x80-\xff]"),),
+        states="metres",
+    ),
+    "parquet": Format(
+        "Parquet (pip install 'frametool[arrow]')",
+        suffixes=(".parquet", ".pq"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"PAR1"),),
+    ),
+    "arrow": Format(
+        "a file of Arrow, Feather (pip install 'frametool[arrow]')",
+        suffixes=(".arrow", ".feather", ".ipc"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"ARROW1"),),
+    ),
+    "arrow-stream": Format(
+        "a stream of Arrow (pip install 'frametool[arrow]')",
+        suffixes=(".arrows",),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
+    ),
+    "feather1": Format(
+        "Feather of the first version",
+        signs=(("magic", rb"FEA1"),),
+        instead="write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)",
     ),
     "xacro": Format(
         "xacro, from which URDF is made",

@@ -6,13 +6,14 @@ so, `create(columns, count, style) -> ColumnWriter`.  Rows are counted from 1, b
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from frametool.geometry.types import Rigid
     from frametool.grammar.result import Style
     from frametool.text.array_types import Flags, Floats, Ints
 
@@ -113,3 +114,11 @@ class ColumnFile(Protocol):
 
         drops: rows may be left out, so that their number is not known before the end.
         """
+
+
+@runtime_checkable
+class MovesAlong(Protocol):
+    """A file in which more than its points has a place among them: the pose of the sensor, rotations of splats."""
+
+    def moved_by(self, pose: Rigid | None) -> None:
+        """Move that by the pose that moves all points, before any is read; None: there is no such one."""

@@ -12,6 +12,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.column_file import FLOATS, WHOLE, Made, Numbers
 from frametool.frames.stamps import BILLION
+from frametool.text.seconds import FURTHEST, nanoseconds_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from frametool.formats.column_file import Kind, OutColumn
     from frametool.text.array_types import Flags, Floats, Ints
 
-MOST_SECONDS = 2.0**63 / BILLION
 PIECE = 1 << 20  # bytes
 
 
@@ -73,20 +73,19 @@ def not_finite(values: Floats) -> Flags | None:
 def stamps_of_numbers(given: NDArray[Any], *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
     """Return numbers as nanoseconds, and why rows have none: integers of seconds or nanoseconds, floats of seconds.
 
-    A float64 of seconds is exact to about 0.2 us today; it is rounded to the nearest nanosecond.
+    A float of seconds counts as the decimal that it prints as, as it does in a table of text.
     """
     if given.dtype.kind in WHOLE:
         stamps = given.astype(np.int64)
-        return (stamps, {}) if in_ns else (stamps * BILLION, {})
+        return (stamps, {}) if in_ns else (stamps * BILLION, _beyond(abs(given) > FURTHEST))
     if in_ns:
         raise ValueInvalid(f"nanoseconds are integers, found {given.dtype}")
-    seconds = given.astype(np.float64)
-    with np.errstate(invalid="ignore"):
-        bad = ~(abs(seconds) < MOST_SECONDS)
-    seconds[bad] = 0.0
-    whole = np.floor(seconds)
-    stamps = whole.astype(np.int64) * BILLION + np.rint((seconds - whole) * BILLION).astype(np.int64)
-    return stamps, dict.fromkeys(np.flatnonzero(bad).tolist(), "not a time in seconds")
+    stamps, none = nanoseconds_of(given.astype(np.float64))
+    return stamps, _beyond(none)
+
+
+def _beyond(rows: Flags) -> dict[int, str]:
+    return dict.fromkeys(np.flatnonzero(rows).tolist(), "not a time in seconds")
 
 
 class StructuredWriter:
@@ -117,7 +116,7 @@ class StructuredWriter:
         """Return what stands behind the records."""
         return b""
 
-    def of_rows(self, batch: StructuredBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
+    def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
         """Return the records of a batch."""
         records = self.records(batch, rows, made)
         head = self.head(self.count) if self.count is not None and not self.written else b""

@@ -20,7 +20,7 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
 from frametool.stream.blocks import Plan, Run, State
-from frametool.stream.column_stream import ColumnRows
+from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.column_writer import ArrayWriter
 from frametool.stream.faults import NULL, STOP, Fault, Misused
 from frametool.stream.point_writer import PointWriter
@@ -180,6 +180,7 @@ class OtherForm:
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
         opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
         rows = ColumnRows(opened, self._turned(TABLE), self.source)
+        move_along(opened, self.request)
         self.shape = rows.shape
         self.placed = rows.plan.targets[0].unit is not None
         yield Step(_none(), Outcome(b""))

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, warn
-from frametool.formats.column_file import FLOATS, Made, OutColumn
+from frametool.errors import FormatError, listing, warn
+from frametool.formats.column_file import FLOATS, Made, MovesAlong, OutColumn
 from frametool.formats.structured import not_finite
 from frametool.stream.blocks import Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused
@@ -28,9 +28,9 @@ from frametool.text.cells import Cells
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Mapping, Sequence
+    from collections.abc import Generator, Iterator, Mapping, Sequence
 
-    from frametool.formats.column_file import Batch, ColumnFile, Kind
+    from frametool.formats.column_file import Batch, ColumnFile, ColumnWriter, Kind
     from frametool.grammar.result import Style
     from frametool.stream.request import Request
     from frametool.stream.table_names import BlockNames
@@ -76,6 +76,9 @@ class ColumnRows:
         except FormatError as error:
             error.line = 0  # the names of columns stand in no line here
             raise
+        for place in self.layout.places:
+            if file.kind(place) is None:
+                raise Misused(f"column {self.table.name(place)} holds no numbers", source=source)
         self.plan = self.plan._replace(pieces=())
         self.naming = Naming(self.table, self.layout, self.request.for_kind(self.shape.kind))
         self.state = State()
@@ -84,9 +87,6 @@ class ColumnRows:
         self.mended = 0
         self.narrow = self._narrow()
         self.numbers = sum(isinstance(column, New) for column in self.layout.columns)
-        for place in self.layout.places:
-            if file.kind(place) is None:
-                raise Misused(f"column {self.table.name(place)} holds no numbers", source=source)
 
     @property
     def shape(self) -> Shape:
@@ -104,6 +104,19 @@ class ColumnRows:
             else:
                 found.append(OutColumn(self._name(column.place), None))
         return found
+
+    def named_columns(self) -> list[OutColumn]:
+        """Return the columns of the output, each with a name: those of a file without names get the usual ones."""
+        if self.table.names:
+            return self.columns()
+        targets = self.plan.targets
+        names = [name for each in targets for name in (*XYZ[: 3 * (each.unit is not None)], *each.names)]
+        return [
+            column._replace(
+                name=names[given.number] if isinstance(given, New) and given.number < len(names) else f"column_{at}"
+            )
+            for at, (column, given) in enumerate(zip(self.columns(), self.layout.columns, strict=True), 1)
+        ]
 
     def _name(self, place: int) -> str:
         return self.table.names[place] if self.table.names else ""
@@ -156,8 +169,9 @@ class ColumnRows:
         results = self.of_batch(batch)
         rows = np.arange(batch.size) if results.rows is None else results.rows
         stamp_at = self.layout.time
-        if stamp_at is None and (found := stamp_column(self.table.names)) not in self.layout.frames:
-            stamp_at = found
+        found = stamp_column(self.table.names)
+        if stamp_at is None and found not in self.layout.frames and not self.file.vectors:
+            stamp_at = found  # `t` or `time` of a cloud is what its sensor counts, in whatever unit
         stamps = None
         if stamp_at is not None:
             name = self.table.name(stamp_at)
@@ -173,7 +187,11 @@ class ColumnRows:
         names: list[Sequence[str | None]] = [[name] for name in unnamed]
         for role, texts in results.names.items():
             names[role] = [text or None for text in texts]
-        return RowPoses(results.numbers, stamps, rows, names[PARENT], names[NAME], extras, results.given)
+        own = self.plan.targets[0].size if len(self.plan.shapes) > 1 else results.numbers.shape[1]
+        for column in self.layout.columns:
+            if isinstance(column, New) and column.number >= own:
+                extras[column.name] = results.numbers[:, column.number]
+        return RowPoses(results.numbers[:, :own], stamps, rows, names[PARENT], names[NAME], extras, results.given)
 
     # --- what is read ---
 
@@ -324,7 +342,7 @@ def _with_vectors(file: ColumnFile, request: Request) -> Request:
         return request
     columns = (",".join(XYZ), *(",".join(each) for each in there))
     kinds = (POINT, *[VECTOR] * len(there))
-    return request._replace(columns=columns, kinds=kinds, poses=len(columns))
+    return request._replace(columns=columns, kinds=kinds, poses=len(columns), notations=())
 
 
 def _chosen(block: Block, rows: Ints) -> Block:
@@ -356,15 +374,22 @@ def _either(first: Flags | None, second: Flags | None) -> Flags | None:
     return first | second
 
 
-def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str) -> Generator[Outcome]:
-    """Yield what becomes of a file's batches in a file of the same form."""
+def run_columns(
+    file: ColumnFile, request: Request, style: Style, *, source: str, into: Any = None
+) -> Generator[Outcome]:
+    """Yield what becomes of a file's batches in a file of the same form, or in that of a module, `into`."""
     rows = ColumnRows(file, request, source)
-    columns = rows.columns()
+    columns = rows.columns() if into is None else rows.named_columns()
+    move_along(file, request)
     if rows.narrow:
-        kinds = ", ".join(sorted({str(kind) for kind in rows.narrow.values()}))
+        kinds = ", ".join(sorted({kind.name for kind in rows.narrow.values()}))
         warn(f"{source}: {kinds} columns are computed as float64 and rounded once")
     drops = request.on_error == SKIP or request.operation.velocity
-    writer = None if request.gathered else file.rewriter(columns, style, drops=drops)
+    writer: ColumnWriter | None = None
+    if into is not None:
+        writer = _InOtherForm(columns, into, style)
+    elif not request.gathered:
+        writer = file.rewriter(columns, style, drops=drops)
     for batch in file.batches():
         results = rows.of_batch(batch)
         text: Any = b""
@@ -378,6 +403,45 @@ def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str
         ended = writer.end()
         for piece in (ended,) if isinstance(ended, bytes) else ended:
             yield Outcome(piece)
+
+
+class _InOtherForm:
+    """Write columns into a file of another form, with their types; those that it has no place for are left out."""
+
+    def __init__(self, columns: Sequence[OutColumn], into: Any, style: Style) -> None:
+        """Choose the columns."""
+        has_texts = getattr(into, "HOLDS_TEXTS", False)
+        self.columns = columns
+        self.kept = [column for column in columns if column.kind is not None or has_texts]
+        self.writer: ColumnWriter = into.create([column._replace(passed=None) for column in self.kept], None, style)
+        if len(self.kept) < len(columns):
+            left = listing(column.name for column in columns if column not in self.kept)
+            warn(f"{style.form}: {left} left out: it holds numbers")
+
+    def of_rows(self, batch: Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
+        """Return what is written of a batch."""
+        new = iter(made)
+        found = []
+        for column in self.columns:
+            if column.passed is None or batch is None:
+                found.append(next(new))
+                continue
+            given = batch.column(column.passed)
+            found.append(Made(given if rows is None else np.asarray(given)[rows]))
+        kept = [each for each, column in zip(found, self.columns, strict=True) if column in self.kept]
+        return self.writer.of_rows(None, None, kept)
+
+    def end(self) -> bytes | Iterator[bytes]:
+        """Return what comes behind the last batch."""
+        return self.writer.end()
+
+
+def move_along(file: ColumnFile, request: Request) -> None:
+    """Let what else has a place among the points of a file move with them."""
+    operation, timed = request.operation, request.timed
+    if isinstance(file, MovesAlong) and operation.moves and not request.keep and request.gathered is None:
+        by_row = request.edge_of is not None or (timed is not None and bool(timed.name))
+        file.moved_by(None if by_row else operation.left)
 
 
 def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults) -> list[Made]:

@@ -42,6 +42,7 @@ class ArrayWriter:
         self.kind = kind
         self.extras = tuple(extras)
         self.module: Any = import_module(FORMATS[style.form].writer)
+        self.has_texts = getattr(self.module, "HOLDS_TEXTS", False)
         forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
         whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
         self.target = Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
@@ -74,10 +75,9 @@ class ArrayWriter:
 
     def _begin(self, made: dict[str, Made]) -> None:
         """Choose the columns."""
-        has_texts = getattr(self.module, "HOLDS_TEXTS", False)
         for name, each in made.items():
             kind = each.values.dtype if isinstance(each.values, np.ndarray) else None
-            if kind is not None or has_texts:
+            if kind is not None or self.has_texts:
                 self.columns.append(OutColumn(name, kind))
             else:
                 self.left_out.append(name)
@@ -117,6 +117,8 @@ class ArrayWriter:
         """Return a column that is not ours: as it is, or of cells as numbers if all of the first block are."""
         if not isinstance(cells, Spans):
             return Made(cells)
+        if self.has_texts:  # it types them by itself
+            return Made(texts_of(cells))
         known = next((column.kind for column in self.columns if column.name == name), DOUBLE)
         if name in self.left_out or known is None:
             return Made(texts_of(cells))
