@@ -106,7 +106,9 @@ class Stream:
 
     def has_input(self) -> bool:
         """Tell whether something is piped in."""
-        return sys.stdin is not None and not sys.stdin.isatty() and bool(self.opened().peek(1))
+        if sys.stdin is None or sys.stdin.isatty() or not sys.stdin.readable():
+            return False
+        return bool(self.opened().peek(1))
 
     def is_wanted(self, argument: object) -> bool:
         """Tell whether standard input or -i FILE is to be read in this argument's place."""

@@ -63,6 +63,8 @@ def without_slashes(edge: Edge, reading: Reading) -> Edge:
 
 def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
+    if not notes:
+        return
     firsts: dict[str, Note] = {}
     for note in notes:
         firsts.setdefault(note.message, note)
