@@ -44,6 +44,8 @@ _MESSAGES = "frametool.ros.message_reader"
 _TABLE = "frametool.stream.table_samples"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
+_OPEN3D = rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
@@ -246,7 +248,7 @@ FORMATS = {
         writes=("poses", "trajectory"),
         writer="frametool.formats.open3d",
         signs=(
-            ("text", rf"\A\ufeff?\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"),
+            ("text", _OPEN3D),
             ("json path", "parameters/extrinsic"),
         ),
         states=".log holds world<-camera, .json camera<-world",

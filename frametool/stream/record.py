@@ -136,9 +136,9 @@ def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
 
 def _bare_numbers(value: list[Any]) -> Misfit:
     """Build the error for a list that may be anything."""
-    return Misfit(
-        f"a bare list of {len(value)} numbers does not say what it is; write {{rpy_deg: [..]}}, {{xyzw: [..]}}, .."
-    )
+    spellings = {4: "{xyzw: [..]} or {wxyz: [..]}, or give --from"}
+    write = spellings.get(len(value), "{rpy_deg: [..]}, {xyzw: [..]}, ..")
+    return Misfit(f"a bare list of {len(value)} numbers does not say what it is; write {write}")
 
 
 def _search(value: Any, path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[Path, tuple[Path, ...]]]:
