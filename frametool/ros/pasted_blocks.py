@@ -35,7 +35,7 @@ MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
 _TRANSLATION = re.compile(rf"(?m)^\s*-\s+Translation:\s*{_LIST}")
 _TIME = re.compile(rf"(?m)^\s*At time ({NUMBER})")
-_HEADING = re.compile(r"(?m)^(\S+) seen from (\S+) \(maps points")  # frametool's own block
+_HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _ROTATIONS = (
     ("xyzw", re.compile(rf"in Quaternion(?: \(xyzw\))?\s*{_LIST}")),
     ("rpy", re.compile(rf"in RPY \(radian\)\s*{_LIST}")),

@@ -90,7 +90,7 @@ def command(
     \b
       frametool convert --from rpy_deg 0 0 90
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
-      frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle --format json
+      frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle -f json
       frametool convert --axes optical --to rpy_deg
       frametool convert --from rpy_deg 10 20 30 --to euler:all
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
