@@ -44,6 +44,7 @@ _MESSAGES = "frametool.ros.message_reader"
 _TABLE = "frametool.stream.table_samples"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
 _NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
 _OPEN3D = rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"
 _MESSAGE_KEYS = (
@@ -96,7 +97,7 @@ FORMATS = {
         reader=_TABLE,
         writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.csv_format",
-        signs=(("header", r"[^\t]*,[^\t]*$"),),
+        signs=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
     ),
     "tsv": Format(
         "tab-separated values with a header",

@@ -96,7 +96,7 @@ def command(
         return stream.run(request, output)
     from frametool.cli.calc_output import value_texts
 
-    output.pieces(value_texts(list(_results(lines, scope)), output.style))
+    output.pieces(value_texts(_results(lines, scope), output.style))
     return 0
 
 
