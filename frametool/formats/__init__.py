@@ -44,6 +44,7 @@ _MESSAGES = "frametool.ros.message_reader"
 _TABLE = "frametool.stream.table_samples"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
 _ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
 _NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
 _OPEN3D = rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"
@@ -415,6 +416,21 @@ FORMATS = {
         "camera_info, the intrinsics of a camera",
         signs=(("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
         instead="there is no pose in it; its frame stands in the tree of the robot",
+    ),
+    "intrinsics": Format(
+        "cameras of Kalibr that were calibrated alone",
+        signs=(("yaml inner", r"distortion_coeffs|cam_overlaps"),),
+        instead="there is no pose in it; one would stand under T_cam_imu or T_cn_cnm1",
+    ),
+    "cameras": Format(
+        "cameras.txt of COLMAP, the intrinsics",
+        signs=(("text", rf"\A(?:\s*#[^\n]*\n)*\s*\d+ (?:{_COLMAP_MODELS}) \d+ \d+ "),),
+        instead="there is no pose in it; those of the cameras stand in images.txt beside it",
+    ),
+    "lio": Format(
+        "parameters of FAST-LIO or LIO-SAM",
+        signs=(("yaml inner", r"extrinsic_[TR]|extrinsic(?:Trans|Rot|RPY)|[RP]cl"), ("yaml key", r"extrinsic_[TR]")),
+        instead="extrinsic_T, R are imu<-lidar, extrinsicRot is lidar<-imu; write {xyz: .., matrix: ..} as a tree",
     ),
     "map": Format(
         "map.yaml of a map server",

@@ -68,3 +68,41 @@ def test_the_covariance_of_a_record_is_moved_with_it_or_refused(run: Run, record
         outcome = run("apply", ROBOT, "map", "lidar", "-f", "json", stdin=record % bad)
         assert (outcome.status, outcome.out) == (1, "")
         assert "expected 36 numbers" in outcome.err
+
+
+MANY_KEYS = ", ".join(f"quite_a_long_unknown_key_{number}: 1" for number in range(6))
+
+
+def test_an_error_about_many_keys_is_one_short_line(run: Run) -> None:
+    outcome = run("tree", "a.yaml", files={"a.yaml": f"frames: {{a: {{b: {{xyz: [1, 2, 3], {MANY_KEYS}}}}}}}"})
+    first = outcome.err.splitlines()[0]
+    assert len(first) <= 200
+    assert "unknown key 'quite_a_long_unknown_key_0'; and 5 more;" in first
+
+
+def test_names_with_a_slash_are_told_once_and_not_to_who_is_quiet(run: Run) -> None:
+    entries = "".join(f"- {{name: /f{number}, parent: /base, xyz: [{number}, 0, 0]}}\n" for number in range(12))
+    arguments = ["lookup", "a.yaml", "base", "f3", "-f", "json"]
+    outcome = run(*arguments, files={"a.yaml": entries})
+    assert outcome.err.count("\n") == 1
+    assert "'/f0': the leading / is no part of a name and was left out (23 more like it)" in outcome.err
+    assert run(*arguments, "--quiet").err == ""
+
+
+def test_a_pose_graph_of_edges_says_how_they_are_read(run: Run) -> None:
+    edge = "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1\n"
+    for command in ("tree", "convert"):
+        outcome = run(command, "a.g2o", files={"a.g2o": edge})
+        assert (outcome.status, outcome.out) == (1, "")
+        assert "only edges in it" in outcome.err
+        assert "--edges" in outcome.err
+    assert json.loads(run("convert", "a.g2o", "--edges", "-f", "json").out)["xyz"] == [1, 0, 0]
+
+
+def test_a_model_of_drake_may_leave_its_only_body_without_a_name(run: Run) -> None:
+    text = (
+        "directives:\n- add_model:\n    name: box\n    file: package://x/box.sdf\n    default_free_body_pose:\n"
+        '      "": {translation: [1, 2, 3], rotation: !Rpy {deg: [0, 0, 90]}}\n'
+    )
+    outcome = run("lookup", "a.yaml", "world", "box", "-f", "json", files={"a.yaml": text})
+    assert json.loads(outcome.out)["xyz"] == [1, 2, 3]
