@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 # an argument that begins like this is a number, whatever short options there are
-NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation|Rotation):)", re.IGNORECASE)
+NEGATIVE = re.compile(
+    r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)", re.IGNORECASE
+)
 STREAMED = ("records", "rows", "arrays")
 READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."

@@ -57,8 +57,16 @@ def say(text: str) -> None:
     tell(printable(f"frametool: {_place()}{text}"))
 
 
-def say_warning(message: str, _rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
-    """Write a warning; what tf2 would have logged stands there in its own words."""
+def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
+    """Write a warning; what tf2 would have logged stands there in its own words.
+
+    With --quiet nothing is said of names that lost their leading slash: their tree is as it was meant.
+    """
+    if rule == "slash":
+        from frametool.cli.trees import is_quiet
+
+        if is_quiet():
+            return
     tell(printable(message if kind is Tf2Warning else f"frametool: {_place()}warning: {message}"))
 
 

@@ -25,7 +25,7 @@ from frametool.cli.command import (
 from frametool.cli.completions import ColumnNames
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
-from frametool.errors import FileProblem
+from frametool.errors import FileProblem, FormatError
 from frametool.formats import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.formats.detect import by_sign, detect
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
@@ -138,12 +138,27 @@ class Stream:
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
         return form
 
-    def run(
-        self, request: Request, output: Output, *, tables_only: bool = False
-    ) -> int:
+    def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int:
         """Run the stream and return its exit status."""
         name = self.path or "stdin"
         with self.opened() as given:
+            head = given.peek()
+            if head.lstrip()[:1] == b"<":
+                from frametool.cli.tree_hint import refuse_robots
+
+                refuse_robots(head, name)
+            try:
+                return self._run_opened(given, name, request, output, tables_only=tables_only)
+            except FormatError as error:
+                from frametool.cli.tree_hint import with_hint
+
+                raise with_hint(error, head, name) from None
+
+    def _run_opened(
+        self, given: BufferedReader, name: str, request: Request, output: Output, *, tables_only: bool
+    ) -> int:
+        """Run the stream, of whatever form it is."""
+        with given:
             stream = given
             form, known_by = self.told_form(), ""
             signed = form or _signed(stream.peek(), name)

@@ -137,9 +137,9 @@ def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
 
 def _bare_numbers(value: list[Any]) -> Misfit:
     """Build the error for a list that may be anything."""
-    return Misfit(
-        f"a bare list of {len(value)} numbers does not say what it is; write {{rpy_deg: [..]}}, {{xyzw: [..]}}, .."
-    )
+    spellings = {4: "{xyzw: [..]} or {wxyz: [..]}, or give --from"}
+    write = spellings.get(len(value), "{rpy_deg: [..]}, {xyzw: [..]}, ..")
+    return Misfit(f"a bare list of {len(value)} numbers does not say what it is; write {write}")
 
 
 def _search(value: Any, path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[Path, tuple[Path, ...]]]:
@@ -523,9 +523,12 @@ def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
 
 
 def _with_covariance(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
-    """Add the 36 numbers that a message has beside a pose or a twist, if records are moved."""
-    beside = (*path[:-1], "covariance")
-    around = value_at(document, path[:-1]) if path[-1:] == (record.shape.kind,) else None
+    """Add the 36 numbers that a message has beside a pose or a twist, or a record in it, if records are moved."""
+    beside = (*path, "covariance")
+    around = value_at(document, path) if record.shape.kind in (POSE, TWIST) else None
+    if path[-1:] == (record.shape.kind,) and (type(around) is not dict or "covariance" not in around):
+        beside = (*path[:-1], "covariance")
+        around = value_at(document, path[:-1])
     if type(around) is not dict or "covariance" not in around or request.operation.changes_nothing:
         return record
     if request.operation.only_adds:

@@ -24,7 +24,7 @@ from frametool.grammar.result import Result
 from frametool.stream.memory import Memory
 from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, placed, value_at
 from frametool.stream.request import Request
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
+from frametool.stream.row_layout import COVARIANCE, POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
 from frametool.stream.stamp_source import in_nanoseconds, key_path, read_header_stamp, read_stamp, stamp_keys
 
@@ -276,6 +276,8 @@ def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Re
             position=pose.position if has_position else None, rotation=pose.rotation if has_rotation else None
         )
     extras: dict[str, Any] = dict(zip(request.operation.extras(POSE), answer.parts[7:], strict=False))
+    if shape.covariance:
+        extras["covariance"] = list(answer.parts[-COVARIANCE:])
     return Result(pose, extras | _rest(node, unit, answer.record))
 
 
