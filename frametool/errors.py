@@ -210,8 +210,11 @@ def overheard(
 ) -> tuple[Result, list[tuple[str, str]]]:
     """Return what a function returns, and its warnings as (rule, message), for a reader to add the place."""
     warned: list[tuple[str, str]] = []
-    with heard_by(lambda message, rule, _: warned.append((rule, message))):
+    _listeners.append(lambda message, rule, _: warned.append((rule, message)))
+    try:  # as `heard_by`, which would cost half a microsecond for each of a million rotations
         return call(*arguments, **options), warned
+    finally:
+        _listeners.pop()
 
 
 def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
