@@ -158,7 +158,8 @@ def json_events(text: str) -> Iterator[Event]:
         if word in _BRACKETS:
             yield _BRACKETS[word], "", token.start(), token.end(), word, 0
         elif word[0] == '"':
-            yield LEAF, loads(word, strict=False), token.start(), token.end(), '"', 0
+            text = loads(word, strict=False) if "\\" in word else word[1:-1]
+            yield LEAF, text, token.start(), token.end(), '"', 0
         else:
             yield LEAF, word, token.start(), token.end(), "", 0
 
