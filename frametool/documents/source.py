@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from io import BufferedReader
 from typing import NamedTuple
 
+from frametool.documents.limits import MOST_CHARACTERS, size_problem
 from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, shown
 
 TYPE_CHECKING = False
@@ -46,9 +47,6 @@ MAGIC = {
     b"PXR-USDC": "a USD scene",
 }
 _CONTROLS = bytes(code for code in range(32) if code not in b"\t\n\r\f\x1b")
-
-MOST_CHARACTERS = 3 << 24
-"""Longest text read as one file of documents, also in bytes: 400 000 frames in 0.7 GB, at worst 1.4 GB."""
 
 _LINE_END = "\r\n|[\r\n\x85\u2028\u2029]"
 _WIDEST_SNIPPET = 74  # and three dots on either side
@@ -198,9 +196,8 @@ def not_text(data: bytes) -> str:
 
 def check_text(source: Source) -> None:
     """Refuse a text that is too long or holds halves of surrogate pairs, which no encoding can write."""
-    if len(source.text) > MOST_CHARACTERS:
-        message = f"longer than {MOST_CHARACTERS} characters, the most in one file; split it"
-        raise FormatError(message, source=source.name)
+    if problem := size_problem(source.text):
+        raise FormatError(problem, source=source.name)
     try:
         source.text.encode()
     except UnicodeEncodeError as error:

@@ -11,7 +11,7 @@ import yaml
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as some
 
-from frametool.documents import json_reader, source, yaml_events
+from frametool.documents import json_reader, limits, source, yaml_events
 from frametool.documents.document import explain_scalar, format_error, locate, locate_many, parse_documents
 from frametool.documents.json_writer import dump
 from frametool.documents.nodes import parse_nodes
@@ -114,11 +114,29 @@ def test_lists_and_maps_are_counted(text: str, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_text_too_long_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(source, "MOST_CHARACTERS", 100)
+    for module in (source, limits):
+        monkeypatch.setattr(module, "MOST_CHARACTERS", 100)
     assert refusal("a" * 101) == "f: longer than 100 characters, the most in one file; split it"
     (tmp_path / "long.yaml").write_text("a" * 101)
     with pytest.raises(FormatError, match="longer than 100 bytes"):
         read_text(tmp_path / "long.yaml")
+
+
+@pytest.mark.parametrize("text", ["1," * 31, "- 1\n" * 31])
+def test_values_in_no_list_of_their_own_are_counted(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "MOST_VALUES", 30)
+    assert refusal(text) == "f: more than 30 commas and line ends, the most in one file; split it"
+
+
+def test_a_million_messages_are_within_the_limits() -> None:
+    stamp = {"sec": 1_700_000_000, "nanosec": 123_456_789}
+    moved, turned = (dict.fromkeys(names, -0.7071067811865476) for names in ("xyz", "xyzw"))
+    transform = {"translation": moved, "rotation": turned}
+    message = {"header": {"stamp": stamp, "frame_id": "f123456"}, "child_frame_id": "f123457", "transform": transform}
+    text = json.dumps(message, indent=4)
+    assert 1e6 * text.count("{") < limits.MOST_CONTAINERS
+    assert 1e6 * (text.count(",") + text.count("\n") + 2) < limits.MOST_VALUES
+    assert 1e6 * len(text) < limits.MOST_CHARACTERS
 
 
 def laughs(depth: int) -> str:
