@@ -6,7 +6,8 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.cli.shell_words import NAME, Words, split
-from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
+from frametool.documents.limits import MOST_CHARACTERS
+from frametool.documents.source import UTF16, decode
 from frametool.errors import FormatError
 
 if TYPE_CHECKING:

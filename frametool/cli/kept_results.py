@@ -9,7 +9,7 @@ from contextlib import contextmanager, redirect_stdout
 from io import BytesIO, TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.source import MOST_CHARACTERS
+from frametool.documents.limits import MOST_CHARACTERS
 from frametool.errors import ValueInvalid, alternatives
 from frametool.grammar.rotation import ROTATION_KEYS
 from frametool.stream.faults import Misused

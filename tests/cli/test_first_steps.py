@@ -62,7 +62,7 @@ def test_results_before_an_expression_without_one_are_kept(run: Run) -> None:
 def test_the_covariance_of_a_record_is_moved_with_it_or_refused(run: Run, record: str) -> None:
     for options in ({}, {"stdin": record % COVARIANCE}):
         argument = [] if options else [record % COVARIANCE]
-        outcome = run("apply", ROBOT, "map", "lidar", *argument, "-f", "json", **options)  # type: ignore[arg-type]
+        outcome = run("apply", ROBOT, "map", "lidar", *argument, "-f", "json", **options)
         assert json.loads(outcome.out)["covariance"] == pytest.approx(COVARIANCE)
     for bad in ("[1, 2, 3]", '"none"', "null"):
         outcome = run("apply", ROBOT, "map", "lidar", "-f", "json", stdin=record % bad)
