@@ -112,7 +112,8 @@ class _Scene:
         for body, pose in free.items():
             here = (*path, BODIES, body)
             with_base = within(here[-2:], as_mapping, pose, "a pose")
-            self._state(with_base.get("base_frame", WORLD), f"{name}::{body}", with_base, here, len(path))
+            child = f"{name}::{body}" if body else name  # "" is the only body that a model has
+            self._state(with_base.get("base_frame", WORLD), child, with_base, here, len(path))
 
     def _say_joints(self, found: Recording, positions: dict[str, Any], path: Path) -> None:
         """Tell the file of a model where its joints stand; `--joint` wins."""

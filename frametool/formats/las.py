@@ -115,7 +115,7 @@ class LasFile:
         laspy = _laspy(file.name)
         self.file = file
         if bytes_left(file.stream) is None:
-            file.stream = kept_in_file(file.stream)
+            file.stream = kept_in_file(file.stream, self)
         whole = bytes_left(file.stream) or 0
         with _whole(file.name):
             self.reader = laspy.open(file.stream, closefd=False)

@@ -223,7 +223,7 @@ class ColumnRows:
         """Return which rows cannot be computed: 0 is a point, but no rotation."""
         gone: Flags | None = None
         for shape, flags in zip(self.plan.shapes, absent, strict=False):
-            if shape.notation is not None or self.plan.operation.formula is not None:
+            if shape.notation is not None or self.plan.operation.formula is not None or self.plan.gathered is not None:
                 gone = _either(gone, flags)
         return gone
 
@@ -381,7 +381,7 @@ def run_columns(
     rows = ColumnRows(file, request, source)
     columns = rows.columns() if into is None else rows.named_columns()
     move_along(file, request)
-    if rows.narrow:
+    if rows.narrow and not request.gathered:
         kinds = ", ".join(sorted({kind.name for kind in rows.narrow.values()}))
         warn(f"{source}: {kinds} columns are computed as float64 and rounded once")
     drops = request.on_error == SKIP or request.operation.velocity

@@ -208,7 +208,7 @@ def test_rectification_projection_and_intrinsics_are_left_out_and_told(run: Call
 
 
 def test_a_file_without_a_pose_says_so(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"no pose in it: .*; LEFT.R \(rectification\)"):
+    with pytest.raises(FormatError, match=r"no pose in it; LEFT.R \(rectification\)"):
         read(tmp_path, f"%YAML:1.0\n---\n{stored('LEFT.R', np.eye(3))}")
 
 

@@ -286,3 +286,11 @@ def test_columns_that_stand_one_by_one_are_the_same_array(use: Use, array: Array
 
 def test_an_array_of_no_rows_stays_one(use: Use) -> None:
     assert loaded(use("apply", "--transform", POSE, "-f", "npy", data=npy(POINTS[:0]))).shape == (0, 3)
+
+
+def test_points_without_numbers_do_not_count_in_a_mean(use: Use) -> None:
+    points = POINTS.copy()
+    points[3] = np.nan
+    found = json.loads(use("mean", "-f", "json", data=npy(points)).out)
+    assert found["count"] == 49
+    assert np.allclose(found["xyz"], np.delete(POINTS, 3, axis=0).mean(axis=0))

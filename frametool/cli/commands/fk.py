@@ -34,7 +34,7 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
 
     \b
       frametool fk arm.urdf arm_base tool -i joints.csv
-      frametool fk arm.urdf tool right_finger -i joints.csv --to rpy_deg --prefix finger_
+      frametool fk arm.urdf tool right_finger -i joints.csv --prefix finger_
       printf 't,gripper_mm\\n0,12.5\\n' | frametool fk arm.urdf tool left_finger
       ros2 topic echo /joint_states | frametool fk arm.urdf arm_base tool -f csv
 
