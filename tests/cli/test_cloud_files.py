@@ -215,3 +215,11 @@ def test_a_file_that_is_there_is_not_replaced(run: Run, tmp_path: Path) -> None:
     done = run("apply", "--transform", "{xyz: [0, 0, 0]}", "-i", bag, "-o", "{number}.pcd")
     assert (done.status, (tmp_path / "000001.pcd").read_text()) == (5, "mine")
     assert run("apply", "--transform", "{xyz: [0, 0, 0]}", "-i", bag, "-o", "{number}.pcd", "--force").status == 0
+
+
+def test_the_name_of_a_frame_leads_into_no_other_folder(run: Run, tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", [("/points", cloud(frame="..")), ("/points", cloud(frame="../../x"))])
+    (tmp_path / "inner").mkdir()
+    done = run("apply", "--transform", "{xyz: [0, 0, 0]}", "-i", bag, "-o", "inner/{frame}{number}.pcd")
+    assert done.status == 0
+    assert sorted(path.name for path in (tmp_path / "inner").iterdir()) == ["_000001.pcd", "__.._x000002.pcd"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -148,3 +149,14 @@ def test_a_cut_scan_is_one_line(run: Run, tmp_path: Path) -> None:
         done = move(run, tmp_path, "las", data[:end], "--quiet")
         assert (done.data, done.status) == (None, 1)
         assert len(done.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("form", "library"), [("las", "laspy"), ("laz", "lazrs")])
+def test_what_is_not_installed_is_named(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str, library: str
+) -> None:
+    data = scan(form)
+    monkeypatch.setitem(sys.modules, library, None)
+    done = move(run, tmp_path, form, data)
+    message = f"in.{form}: LAS is read and written with an extra; install it: pip install 'frametool[las]'"
+    assert (done.data, done.status, done.err) == (None, 5, f"frametool: {message}\n")

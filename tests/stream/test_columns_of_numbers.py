@@ -294,3 +294,14 @@ def test_points_without_numbers_do_not_count_in_a_mean(use: Use) -> None:
     found = json.loads(use("mean", "-f", "json", data=npy(points)).out)
     assert found["count"] == 49
     assert np.allclose(found["xyz"], np.delete(POINTS, 3, axis=0).mean(axis=0))
+
+
+@pytest.mark.parametrize("precision", [(), ("--precision", "3")])
+def test_rows_of_csv_in_bulk_are_those_written_one_by_one(use: Use, precision: tuple[str, ...]) -> None:
+    power = (RNG.normal(size=50) * 1e6).astype("f4")
+    records = with_fields(POINTS, ring=np.arange(50, dtype="u2"), weight=RNG.normal(size=50), power=power)
+    apply = ("apply", "--transform", POSE, *precision, "-f", "csv")
+    rows = use(*apply, data=npy(records)).out.splitlines()
+    singly = [use(*apply, data=npy(records[at : at + 1])).out.splitlines()[1] for at in range(50)]
+    assert rows[1:] == singly
+    assert [float(row.split(",")[-1]) for row in rows[1:]] == [float(str(value)) for value in power]
