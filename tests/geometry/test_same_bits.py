@@ -195,8 +195,8 @@ SPECIAL: Any = np.array([0.0, -0.0, 1.5, -1.5, math.inf, -math.inf, math.nan, 5e
 @pytest.mark.parametrize("yes", [SPECIAL, 2.0, -0.0])
 @pytest.mark.parametrize("no", [SPECIAL[::-1], math.inf, 0.0])
 def test_choices_by_bits_are_those_of_numpy(yes: Any, no: Any) -> None:
-    whole: Any = True
-    for condition in (SPECIAL > 0.0, SPECIAL < 9.0, np.zeros(9, bool), np.ones(9, bool), np.bool_(whole), whole):
+    conditions: list[Any] = [SPECIAL > 0.0, SPECIAL < 9.0, np.zeros(9, bool), np.ones(9, bool), np.True_, True]
+    for condition in conditions:
         expected = np.broadcast_to(np.where(condition, yes, no), np.shape(arrays.where(condition, yes, no)))
         for found in (arrays.where(condition, yes, no), arrays.where(arrays.mask(condition), yes, no)):
             assert np.array_equal(np.array(found).view(np.int64), np.array(expected, np.float64).view(np.int64))
