@@ -196,11 +196,13 @@ def batch_shape(parts: Components) -> tuple[int, ...]:
     Raises:
         ValueInvalid: they do not.
     """
+    shapes: dict[tuple[int, ...], None] = dict.fromkeys(getattr(part, "shape", ()) for part in parts)
+    if len(shapes) == 1:
+        return next(iter(shapes))
     try:
-        return np.broadcast_shapes(*(np.shape(part) for part in parts))
+        return np.broadcast_shapes(*shapes)
     except ValueError:
-        shapes = " and ".join(dict.fromkeys(str(np.shape(part)) for part in parts))
-        raise ValueInvalid(f"batch shapes {shapes} do not broadcast") from None
+        raise ValueInvalid(f"batch shapes {' and '.join(map(str, shapes))} do not broadcast") from None
 
 
 def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *args: object) -> None:
@@ -239,9 +241,16 @@ def finite_throughout(parts: Components) -> bool:
 def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:
     """Cut components, flat, into blocks of contiguous float64 for a kernel that fills so many targets."""
     shape = batch_shape(parts)
-    columns = [part if isinstance(part, float) else np.broadcast_to(part, shape).reshape(-1) for part in parts]
+    columns = [part if isinstance(part, float) else _flat(part, shape) for part in parts]
     for start, stop in blocks(int(np.prod(shape)), len(parts) + targets):
         yield slice(start, stop), tuple(_cut(column, start, stop) for column in columns)
+
+
+def _flat(part: Array, shape: tuple[int, ...]) -> Array:
+    """Return a column of a shape as one axis; the calls that most columns need not cost microseconds each."""
+    if part.shape != shape:
+        part = np.broadcast_to(part, shape)
+    return part if part.ndim == 1 else part.reshape(-1)
 
 
 def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:

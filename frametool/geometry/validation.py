@@ -151,7 +151,7 @@ def copy_finite(given: Components, out: Array, name: str) -> None:
 
     from frametool.geometry import arrays
 
-    columns = tuple(np.broadcast_to(part, out.shape[1:]) for part in given)
+    columns = tuple(np.broadcast_to(part, out.shape[1:]) if np.shape(part) != out.shape[1:] else part for part in given)
     flat = out.reshape(len(columns), -1)
     for place, block in arrays.cut(columns, len(columns)):
         for target, part in zip(flat, block, strict=True):
