@@ -62,7 +62,7 @@ def test_results_before_an_expression_without_one_are_kept(run: Run) -> None:
 def test_the_covariance_of_a_record_is_moved_with_it_or_refused(run: Run, record: str) -> None:
     for options in ({}, {"stdin": record % COVARIANCE}):
         argument = [] if options else [record % COVARIANCE]
-        outcome = run("apply", ROBOT, "map", "lidar", *argument, "-f", "json", **options)  # type: ignore[arg-type]
+        outcome = run("apply", ROBOT, "map", "lidar", *argument, "-f", "json", **options)
         assert json.loads(outcome.out)["covariance"] == pytest.approx(COVARIANCE)
     for bad in ("[1, 2, 3]", '"none"', "null"):
         outcome = run("apply", ROBOT, "map", "lidar", "-f", "json", stdin=record % bad)
@@ -106,3 +106,20 @@ def test_a_model_of_drake_may_leave_its_only_body_without_a_name(run: Run) -> No
     )
     outcome = run("lookup", "a.yaml", "world", "box", "-f", "json", files={"a.yaml": text})
     assert json.loads(outcome.out)["xyz"] == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option", "form"),
+    [
+        (["lookup", "robot.yaml", "map", "lidar", "--frames", "a,b"], "--frames", "yaml"),
+        (["tree", "arm.urdf", "--dh", "modified"], "--dh", "urdf"),
+        (["convert", "walk.tum", "--stamps", "kitti_times.txt"], "--stamps", "tum"),
+        (["convert", "-i", "walk.tum", "--edges"], "--edges", "tum"),
+    ],
+)
+def test_an_option_that_answers_nothing_is_told_once(run: Run, arguments: list[str], option: str, form: str) -> None:
+    files: dict[str, str | bytes] = {name: (EXAMPLES / name).read_bytes() for name in ("robot.yaml", "arm.urdf", "walk.tum", "kitti_times.txt")}
+    outcome = run(*arguments, files=files)
+    assert outcome.status == 0
+    assert outcome.err.count(f"note: {option} changes nothing: {form} does not leave that open") == 1
+    assert "note:" not in run(*arguments, "--quiet").err
