@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from functools import lru_cache
 from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 INLINE = "argument"
+LONGEST_REMEMBERED = 4096  # characters
 # the grammar's own, or a header; compiled when first needed
 _PLAIN = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
 _NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*):\s*\["  # of a table; the last: GTSAM, Gazebo
@@ -50,6 +52,12 @@ def rewritten(
     source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
     """Return a text that was pasted as one of the grammar; None for one that is."""
+    if source.name == INLINE and len(source.text) <= LONGEST_REMEMBERED:
+        return _rewritten_argument(source, given, normalize=normalize, points=points)
+    return _rewritten(source, given, normalize=normalize, points=points)
+
+
+def _rewritten(source: Source, given: Notation | None, *, normalize: bool, points: bool) -> Source | None:
     if re.match(_PLAIN, source.text) and "\n" not in source.text.strip():
         return None
     from frametool.ros.pasted_blocks import in_grammar
@@ -60,6 +68,9 @@ def rewritten(
         if source.name == INLINE and not isinstance(error.__cause__, NotARotation):
             error.exit_code = 2  # misuse, where numbers in a file are bad data
         raise
+
+
+_rewritten_argument = lru_cache(8)(_rewritten)  # an argument is looked at before it is read
 
 
 def rejoined(values: Sequence[str]) -> tuple[str, ...]:

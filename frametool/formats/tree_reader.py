@@ -63,6 +63,8 @@ def without_slashes(edge: Edge, reading: Reading) -> Edge:
 
 def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
+    if not notes:
+        return
     firsts: dict[str, Note] = {}
     for note in notes:
         firsts.setdefault(_alike(note), note)
@@ -186,6 +188,7 @@ def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]
             yield from _messages(entry, here, reading)
         else:
             yield from _entry(entry, here, reading)
+        entries[index] = None  # a million of them need no room beside their edges
 
 
 def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
@@ -221,6 +224,7 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
             yield _message(message, here, reading)
         except Misfit as misfit:
             reading.refuse(misfit.below(*here))
+        message.clear()  # a million of them need no room beside their edges
 
 
 def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:

@@ -87,8 +87,11 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
 
     row = FORMATS[name]
     functions = {"poses": "write_poses", "points": "write_points", "tree": "write_tree", "report": "write_points"}
-    functions["trajectory"] = "write_poses"
+    functions |= {"trajectory": "write_poses", "arrays": "create"}
+    if "arrays" in row.writes:  # poses and points are columns there
+        functions |= {"poses": "create", "points": "create"}
     assert all(hasattr(import_module(row.writer), functions[what]) for what in row.writes)
+    assert "arrays" not in row.reads or hasattr(import_module(row.reader), "open_columns")
     assert "tree" not in row.reads or hasattr(import_module(row.reader), "read")
     assert row.summary
 
@@ -97,6 +100,7 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a tree in YAML": (b"# robot\nframes:\n  a:\n", "tree", "yaml"),
     "a tree in JSON": (b'{"angles": "deg",\n "frames": []}', "tree", "json"),
     "a tree in JSON on one line, with what messages have": (b'{"frames": [{"child_frame_id": 1}]}\n', "tree", "json"),
+    "an array of numpy": (b"\x93NUMPY\x01\x00v\x00{'descr'", "arrays", "npy"),
     "echo behind noise": (b"WARNING: topic [/tf] x\n\n---\ntransforms:\n- header:\n", "tree", "echo"),
     "echo in UTF-16": ("transforms:\n- header:\n".encode("utf-16"), "tree", "echo"),
     "echo in flow style": (b"transforms: [{header: ..", "tree", "echo"),

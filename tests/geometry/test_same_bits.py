@@ -177,6 +177,18 @@ def test_a_way_walked_at_many_fractions() -> None:
     assert_same(segment.along, joined(ways, within * 2))
 
 
+def test_a_way_prepared_once_is_the_slerp_of_its_ends() -> None:
+    prepare: Callable[..., Any] = segment.prepare
+    unit: Callable[..., Any] = quaternion.unit
+    slerp: Callable[..., Any] = quaternion.slerp
+    along: Callable[..., Any] = segment.along
+    for way, (fraction,) in zip(WAYS, MANY_FRACTIONS * 2, strict=False):
+        if 0.0 < fraction < 1.0:
+            pose: Any = (*way[:7], *prepare(*way, floats))
+            walked = along(*pose, fraction, floats)
+            assert unit(*walked[3:], floats) == slerp(*way[3:7], *way[10:], fraction, floats)
+
+
 def test_neighbours_that_are_no_angles_or_far_ones_change_nothing() -> None:
     alone = bits([trig.half_sincos(angle, floats) for angle in (0.3, -0.0)])
     for odd in (math.nan, math.inf, 1e30):
