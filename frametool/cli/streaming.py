@@ -12,6 +12,7 @@ import click
 
 from frametool.cli.command import (
     FILE,
+    READING,
     STREAMED,
     TREES_OPENED,
     UTF8,
@@ -172,6 +173,10 @@ class Stream:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
                 say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
+            if any(click.get_current_context().meta.get(READING, {}).values()):
+                from frametool.cli.trees import say_not_needed
+
+                say_not_needed((form,), "stamps", "edges")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             request = self._completed(request, output, form)

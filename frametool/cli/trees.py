@@ -19,7 +19,7 @@ from frametool.formats import FORMATS
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from typing import Any, TypeVar
 
     from click.shell_completion import CompletionItem
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from frametool.frames.tree import FrameTree
 
     Value = TypeVar("Value")
+
+OPEN_IN_TREES = ("frames", "direction", "camera_axes", "dh", "stamps")  # what forms of files of frames may leave open
 
 
 def load_tree(
@@ -80,6 +82,8 @@ def _loaded(
 
     tree = load_sources(files, rules, places)
     state(files)
+    if places is None:  # of one of two sides, the other may need what this one does not
+        say_not_needed([file.form for file in files], *OPEN_IN_TREES)
     return tree
 
 
@@ -109,10 +113,21 @@ def state(files: Sequence[Recording]) -> None:
             say(file.stated)
 
 
+def say_not_needed(forms: Collection[str], *asked: str) -> None:
+    """Say on stderr which options answer what none of these forms leaves open: they change nothing."""
+    if is_quiet():
+        return
+    for ask in asked:
+        told = _reading("named_frames" if ask == "frames" else ask)
+        if told and not any(ask in FORMATS[form].asks for form in forms):
+            option = f"--{ask.replace('_', '-')}"
+            say(f"note: {option} changes nothing: {' and '.join(dict.fromkeys(forms))} does not leave that open")
+
+
 def is_quiet() -> bool:
-    """Return whether the command was called with --quiet."""
-    context = click.get_current_context()
-    return bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
+    """Return whether the command was called with --quiet, or is only completed."""
+    context = click.get_current_context(silent=True)
+    return context is None or bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
 
 
 def opened(

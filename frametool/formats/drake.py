@@ -101,7 +101,7 @@ class _Scene:
             )
 
     def _model(self, model: dict[str, Any], path: Path) -> None:
-        """Give the file of a model its scope, the joints in it their values, and the model its free pose."""
+        """Take a model: put its scope on its file, tell its joints' values, and keep its free pose."""
         name = _named(model, "name")
         only(model, ("name", "file", JOINTS, BODIES))
         found = self._beside(_named(model, "file"), name)
@@ -128,7 +128,7 @@ class _Scene:
         found.answers = found.answers._replace(joints={**values, **found.answers.joints})
 
     def _include(self, include: dict[str, Any], _: Path) -> None:
-        """Give other directives beside this file their scope."""
+        """Put their scope on other directives beside this file."""
         only(include, ("file", "model_namespace"))
         self._beside(_named(include, "file"), read_name(include, "model_namespace") or "")
 
