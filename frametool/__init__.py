@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from frametool.sim.sweep import simulate_many as simulate_many
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
+    from frametool.stream.arrow_tables import apply_arrow as apply_arrow
+    from frametool.stream.engine_expressions import polars_exprs as polars_exprs
+    from frametool.stream.engine_expressions import sql as sql
 
 __version__ = "0.2.0"
 
@@ -50,13 +53,16 @@ _HOMES = {
     "TransformBuffer": "frametool.frames.buffer",
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
+    "apply_arrow": "frametool.stream.arrow_tables",
     "diff": "frametool.lint.tree_diff",
     "explain": "frametool.calc.explain.api",
     "follow_steps": "frametool.sim.followed",
     "load": "frametool.formats.load",
     "load_robot": "frametool.formats.robot",
+    "polars_exprs": "frametool.stream.engine_expressions",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
+    "sql": "frametool.stream.engine_expressions",
     "tutorial": "frametool.sim.scene",
 }
 __all__ = [
@@ -70,14 +76,17 @@ __all__ = [
     "Turtle",
     "Twist",
     "__version__",
+    "apply_arrow",
     "calc",
     "diff",
     "explain",
     "follow_steps",
     "load",
     "load_robot",
+    "polars_exprs",
     "simulate",
     "simulate_many",
+    "sql",
     "tutorial",
 ]
 

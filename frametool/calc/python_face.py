@@ -45,6 +45,10 @@ class Measure(float):
         made.unit = unit
         return made
 
+    def __reduce__(self) -> tuple[type[Self], tuple[float, str]]:
+        """Let it be copied and pickled with its unit."""
+        return type(self), (float(self), self.unit)
+
 
 class Framed:
     """A value with its frames: a pose `target<-source`, or a point, vector, twist or angles seen in `target`.

@@ -61,7 +61,7 @@ GROUPS = {
     ),
     "Result": ("format_name", "precision", "output", "force", "explain", "explain_full", "explain_step"),
     "What a form of file leaves open (help formats)": (
-        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges",
+        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array",
     ),
 }  # fmt: skip
 NAMES_ONLY = tuple(GROUPS)[-1]  # explained by the topic alone

@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from itertools import islice
+from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
 from frametool.cli.command import FULL
-from frametool.cli.sink import writing
+from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, printable, shown
-from frametool.formats import FORMATS, by_name, is_trajectory, writers
+from frametool.formats import FORMATS, by_name, holds_arrays, is_trajectory, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
@@ -49,9 +50,12 @@ class Output:
         """
         self.path = output
         self.force = force
-        self.told = format_name or by_name(output, writers(*what))
+        self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
         self.notations = notations or ()
+        self._form_is_default = not (self.told or otherwise)
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
+        if holds_arrays(form) and output is None and sys.stdout.isatty():
+            raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
         full = precision == FULL
@@ -67,20 +71,27 @@ class Output:
         """Write rotations in these notations."""
         self.style = self.style.in_notations(notations)
 
+    @property
+    def _holds_arrays(self) -> bool:
+        return holds_arrays(self.style.form)
+
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""
+        if self._holds_arrays:
+            self.pieces(self._blocks(iter(results)))
+            return
         self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))
 
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
         self.pieces(self._batches(results))
 
-    def _batches(self, results: Iterator[Result]) -> Iterator[str]:
+    def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
         """Yield the text of some results after the other, short batches first.
 
         In every form the text of several results begins with that of the first: what follows it is the batch's.
         """
-        if self.is_trajectory:
+        if self.is_trajectory or self._holds_arrays:
             yield from self._blocks(results)
             return
         write_poses = self._module("frametool.view.pose_text").write_poses
@@ -92,15 +103,18 @@ class Output:
             yield write_poses([begin[0], *batch], self.style)[known:]
             size = min(2 * size, BATCH)
 
-    def _blocks(self, results: Iterator[Result]) -> Iterator[str]:
-        """Yield the text of the poses of a trajectory, block after block."""
+    def _blocks(self, results: Iterator[Result]) -> Iterator[bytes]:
+        """Yield the poses of a trajectory, or columns of numbers, block after block."""
+        from frametool.stream.column_writer import ArrayWriter
         from frametool.stream.pose_values import block_of
         from frametool.stream.pose_writer import PoseWriter
+        from frametool.stream.row_layout import POSE
 
-        writer = PoseWriter(self.style)
+        writer = ArrayWriter(self.style, POSE) if self._holds_arrays else PoseWriter(self.style)
         while batch := list(islice(results, BLOCK)):
-            yield writer.of_block(block_of(batch)).decode()
-        yield writer.end().decode()
+            yield bytes(writer.of_block(block_of(batch)))
+        ended = writer.end()
+        yield from (ended,) if isinstance(ended, bytes) else ended
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
@@ -145,6 +159,13 @@ class Output:
         found = list(records)
         if self.style.form in FORMATS and "points" not in self._writes:
             raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
+        if self._holds_arrays:
+            from frametool.stream.column_writer import ArrayWriter
+            from frametool.stream.pose_values import block_of_points
+
+            writer = ArrayWriter(self.style, next((kind for kind in ("point", "vector") if kind in found[0]), "point"))
+            self.pieces([bytes(writer.of_block(block_of_points(found))), *writer.end()])
+            return
         is_plain = all(any(isinstance(value, list) for value in each.values()) for each in found)
         text_module = "frametool.view.pose_text" if is_plain else FORMATS["yaml"].writer
         self.text(self._module(text_module).write_points(found, self.style))
@@ -165,11 +186,21 @@ class Output:
     def _module(self, text_module: str) -> Any:
         return import_module(FORMATS[self.style.form].writer if self.style.form in FORMATS else text_module)
 
-    def pieces(self, pieces: Iterable[str]) -> None:
+    def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
+        is_plain = self.style.form == "text"
         with writing(self.path, force=self.force) as write:
             for piece in pieces:
-                write("\n".join(map(printable, piece.split("\n"))) if self.style.form == "text" else piece)
+                for_people = is_plain and isinstance(piece, str)
+                write("\n".join(map(printable, str(piece).split("\n"))) if for_people else piece)
+        self._tell_of_suffix()
+
+    def _tell_of_suffix(self) -> None:
+        """Say what a file holds whose suffix stands for no form, where none was told."""
+        suffix = splitext(self.path or "")[1]
+        if self._form_is_default and self.path and suffix and not is_special(self.path):
+            none = f"no form written here has the suffix {shown(suffix)}"
+            say(f"note: {self.path}: {none}; it holds {self.style.form}, -f says another")
 
     def text(self, text: str) -> None:
         """Write text."""

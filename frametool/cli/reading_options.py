@@ -41,6 +41,7 @@ _CAMERA_AXES = _option(
 _STAMPS = _option(
     "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
 )
+array_option = _option("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
 _EDGES = _option("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
 _READING_OPTIONS = (
     _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
@@ -61,4 +62,4 @@ _READING_OPTIONS = (
 
 def pose_reading_options(function: Function) -> Function:
     """Add to a command of streams the options about trajectories: the times of their poses, the axes of cameras."""
-    return decorated(function, [_CAMERA_AXES, _STAMPS, _EDGES])
+    return decorated(function, [_CAMERA_AXES, _STAMPS, _EDGES, array_option])

@@ -16,7 +16,7 @@ from frametool.errors import FileProblem, ValueInvalid, printable, shown
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    Write = Callable[[str | bytes], None]
+    Write = Callable[[str | bytes | memoryview], None]
 
 LONGEST_NAME = 255  # bytes, on nearly every file system
 _OWN_STREAM = re.compile(r"/dev/(?:(stdout)|(stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
@@ -66,7 +66,7 @@ def _own_stream(path: str) -> int | None:
 
 
 def _writer(stream: BinaryIO, name: str) -> Write:
-    def write(piece: str | bytes) -> None:
+    def write(piece: str | bytes | memoryview) -> None:
         view = memoryview(_encoded(piece) if isinstance(piece, str) else piece)
         with _problems_of(name), whole_lines():
             while view:  # an unbuffered stream may take a part

@@ -12,6 +12,7 @@ import click
 
 from frametool.cli.command import (
     FILE,
+    READING,
     STREAMED,
     TREES_OPENED,
     UTF8,
@@ -25,8 +26,8 @@ from frametool.cli.command import (
 from frametool.cli.completions import ColumnNames
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
-from frametool.errors import FileProblem
-from frametool.formats import FORMATS, is_trajectory, readers
+from frametool.errors import FileProblem, FormatError
+from frametool.formats import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.formats.detect import by_sign, detect
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
@@ -73,8 +74,8 @@ OPTIONS = {
         help="report at most N bad rows, count all",
     ),
     "jobs": click.option(
-        "--jobs", type=click.IntRange(1, MOST_JOBS), default=1, show_default=True, metavar="N",
-        help="processes for a large stream",
+        "--jobs", type=click.IntRange(0, MOST_JOBS), default=1, show_default=True, metavar="N",
+        help="processes for a stream; 0 is all cores",
     ),
     "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
 }  # fmt: skip
@@ -106,7 +107,9 @@ class Stream:
 
     def has_input(self) -> bool:
         """Tell whether something is piped in."""
-        return sys.stdin is not None and not sys.stdin.isatty() and bool(self.opened().peek(1))
+        if sys.stdin is None or sys.stdin.isatty() or not sys.stdin.readable():
+            return False
+        return bool(self.opened().peek(1))
 
     def is_wanted(self, argument: object) -> bool:
         """Tell whether standard input or -i FILE is to be read in this argument's place."""
@@ -136,15 +139,32 @@ class Stream:
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
         return form
 
-    def run(
-        self, request: Request, output: Output, *, tables_only: bool = False
-    ) -> int:
+    def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int:
         """Run the stream and return its exit status."""
         name = self.path or "stdin"
         with self.opened() as given:
+            head = given.peek()
+            if head.lstrip()[:1] == b"<":
+                from frametool.cli.tree_hint import refuse_robots
+
+                refuse_robots(head, name)
+            try:
+                return self._run_opened(given, name, request, output, tables_only=tables_only)
+            except FormatError as error:
+                from frametool.cli.tree_hint import with_hint
+
+                raise with_hint(error, head, name) from None
+
+    def _run_opened(
+        self, given: BufferedReader, name: str, request: Request, output: Output, *, tables_only: bool
+    ) -> int:
+        """Run the stream, of whatever form it is."""
+        with given:
             stream = given
             form, known_by = self.told_form(), ""
-            if not (form or tables_only or self._says_columns() or is_trajectory(_signed(stream.peek(), name))):
+            signed = form or _signed(stream.peek(), name)
+            is_listed = is_trajectory(signed) or holds_arrays(signed)
+            if not (form or tables_only or self._says_columns() or is_listed):
                 pasted, stream = self._pasted(stream, name, request)
                 if pasted is not None:
                     return self._run_pasted(pasted, request, output)
@@ -153,6 +173,10 @@ class Stream:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
                 say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
+            if any(click.get_current_context().meta.get(READING, {}).values()):
+                from frametool.cli.trees import say_not_needed
+
+                say_not_needed((form,), "stamps", "edges")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             request = self._completed(request, output, form)
@@ -160,8 +184,12 @@ class Stream:
                 request = request._replace(notations=())  # its rows stay what they are
             if form in RECORDS and (output.told or form) != form and request.gathered is None:
                 return self._run_as_values(stream, form, request, output)
+            stays = output.told is None or holds_arrays(output.told)
+            if holds_arrays(form) and (stays or request.gathered is not None):
+                return self._run_columns(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
             listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
+            listed |= holds_arrays(form)
             if request.gathered is not None and not listed:
                 return self._gather(stream, form, request._replace(notations=()), name)
             from frametool.stream.row_layout import POSE
@@ -171,6 +199,33 @@ class Stream:
             if form not in RECORDS and (listed or output.told not in (None, form)) and not kindred:
                 return self._run_as_poses(stream, form, request, output)
             return self._run(stream, form, request, output)
+
+    def _run_columns(self, stream: Any, form: str, request: Request, output: Output) -> int:
+        """Write columns of numbers in the form they came in, or in another that holds such."""
+        from importlib import import_module
+
+        from frametool.cli.trees import answers
+        from frametool.documents.input_file import InputFile
+        from frametool.grammar.edges import Options, Tally, Topics
+        from frametool.stream.column_stream import run_columns
+
+        self._jobs(f"one process is enough for {form}")
+        name = self.path or "stdin"
+        if output.path is None and request.gathered is None and sys.stdout.isatty():
+            raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
+        module: Any = import_module(FORMATS[form].reader)
+        file = InputFile(self.path or "-", stream)
+        opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
+        into: Any = module
+        if output.told is not None and request.gathered is None:
+            into = import_module(FORMATS[output.told].writer)
+        style = output.style.in_form(output.told or form)
+        outcomes = run_columns(opened, request, style, source=name, into=None if into is module else into)
+        status = self._write(outcomes, output, name, counted="row")
+        if (states := FORMATS[form].states) and not self.options["quiet"]:
+            told = f", now in {request.told}" if request.told and request.operation.moves else ""
+            say(f"{name}: {FORMATS[form].summary}{told}; {states}")
+        return status
 
     def _run_as_poses(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of rows, or of poses that no table holds, in another form."""
@@ -182,8 +237,10 @@ class Stream:
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         name = self.path or "stdin"
+        self._jobs(f"rows become {target} one after the other")
         converted = OtherForm(form, request, output.style.in_form(target), name, answers())
-        status = self._write(converted.outcomes(stream, header=self.options["header"]), output, name)
+        outcomes = converted.outcomes(stream, header=self.options["header"])
+        status = self._write(outcomes, output, name, counted="row" if holds_arrays(form) else "line")
         states = FORMATS[form].states
         if states and not self.options["quiet"]:
             about = converted.tally.about
@@ -217,13 +274,16 @@ class Stream:
         """Write the results of records in another form than theirs."""
         from frametool.stream.record_values import stream_results
 
+        self._jobs(f"records become {output.told} one after the other")
         bad = self.policy(self.path or "stdin")
         output.values(stream_results(stream, form, request, output.style, bad))
         return ROWS_SKIPPED if bad.count else 0
 
-    def policy(self, name: str) -> BadRows:
+    def policy(self, name: str, counted: str = "line") -> BadRows:
         """Return what reports and counts the bad rows of a source."""
-        return BadRows(name, self.options["on_error"], most=self.options["max_errors"], tell=self._tell)
+        return BadRows(
+            name, self.options["on_error"], most=self.options["max_errors"], tell=self._tell, counted=counted
+        )
 
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
@@ -248,7 +308,7 @@ class Stream:
         name = self.path or "stdin"
         return self._write(self._outcomes(stream, form, request, name), output, name)
 
-    def _write(self, outcomes: Generator[Outcome], output: Output, name: str) -> int:
+    def _write(self, outcomes: Generator[Outcome], output: Output, name: str, *, counted: str = "line") -> int:
         """Write what becomes of each block as it comes; return the exit status."""
         from contextlib import closing
 
@@ -261,7 +321,7 @@ class Stream:
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
             closing(outcomes),  # ends the processes of --jobs
         ):
-            return run(outcomes, write, self.policy(name), progress.advance)
+            return run(outcomes, write, self.policy(name, counted), progress.advance)
 
     def _gather(self, stream: Any, form: str, request: Request, name: str) -> int:
         """Let the request take all poses; nothing is written."""
@@ -277,13 +337,27 @@ class Stream:
             return run(outcomes, lambda _: None, self.policy(name), progress.advance)
 
     def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
+        jobs = self._jobs("each row needs those before it" if request.in_order else "")
         if form in RECORDS:
             from frametool.stream.record_stream import run_records
 
-            return run_records(stream, form, request, source=name, jobs=self.options["jobs"])
+            return run_records(stream, form, request, source=name, jobs=jobs)
         from frametool.stream.table_stream import run_table
 
-        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
+        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=jobs)
+
+    def _jobs(self, obstacle: str) -> int:
+        """Return how many processes do the work: one where something is in the way of more, which is said."""
+        if self.options["jobs"] == 1:
+            return 1
+        from frametool.stream.workers import can_spread, cores
+
+        jobs: int = min(self.options["jobs"] or cores(), MOST_JOBS)
+        obstacle = obstacle or ("" if can_spread() else "this system cannot fork processes")
+        if jobs == 1 or not obstacle:
+            return jobs
+        say(f"--jobs does not help here: {obstacle}; one process does the work")
+        return 1
 
 
 def _signed(begin: bytes, name: str) -> str:

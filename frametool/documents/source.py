@@ -6,9 +6,11 @@ the parser's own.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from bisect import bisect_right
+from contextlib import contextmanager
 from io import BufferedReader
 from typing import NamedTuple
 
@@ -17,7 +19,7 @@ from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from os import PathLike
     from typing import BinaryIO
 
@@ -57,8 +59,47 @@ class Source(NamedTuple):
     text: str
 
 
+class FileState(NamedTuple):
+    """What changes when a file does: of a folder, of one of the files in it."""
+
+    name: str
+    device: int
+    number: int
+    mode: int
+    size: int
+    mtime_ns: int
+    ctime_ns: int
+
+    @classmethod
+    def of(cls, found: os.stat_result, name: str = "") -> FileState:
+        """Take it out of what the system says."""
+        place = found.st_dev, found.st_ino, found.st_mode
+        return cls(name, *place, found.st_size, found.st_mtime_ns, found.st_ctime_ns)
+
+
+def states_of(path: str) -> list[FileState]:
+    """Return the state of a file, or of each file in a folder; raises OSError."""
+    if os.path.isdir(path):
+        return sorted(FileState.of(entry.stat(), entry.name) for entry in os.scandir(path))
+    return [FileState.of(os.stat(path))]
+
+
 class Pasted(Source):
     """A text made of one that somebody pasted, who knows nothing of places in it."""
+
+
+_noted: list[dict[str, list[FileState]]] = []
+
+
+@contextmanager
+def noting_files() -> Iterator[dict[str, list[FileState]]]:
+    """Yield what will hold the state of each file that is opened by `opened` in the block, as it was then."""
+    found: dict[str, list[FileState]] = {}
+    _noted.append(found)
+    try:
+        yield found
+    finally:
+        _noted.pop()
 
 
 def opened(path: str | PathLike[str]) -> BinaryIO:
@@ -73,6 +114,8 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
         stdin = sys.stdin.buffer
         return stdin if hasattr(stdin, "peek") else BufferedReader(stdin)  # type: ignore[type-var]
     try:
+        for noted in _noted:
+            noted[name] = states_of(name)
         return open(path, "rb", buffering=HEAD)
     except OSError as error:
         told = name if len(name) <= LONGEST_NAME else bare(name)

@@ -214,7 +214,7 @@ class _Builder:
 
     def _refuse_key(self, event: ScalarEvent, current: Any) -> None:
         """Raise for a key that is there already, is empty or asks for a merge; a quoted << is a name."""
-        if event.value == "":
+        if event.value == "" and not (event.style and self.tags):  # Drake's name of the only body
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
         if event.value in current:
             raise repeated_key(self.source, yaml_events(self.source.text))

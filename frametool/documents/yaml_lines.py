@@ -87,7 +87,7 @@ def split_brackets(text: str) -> tuple[str, list[Any]] | None:
 
 
 def _items(run: str, indent: str) -> list[Any] | None:
-    """Read a value in brackets a line as JSON; None where a key stands twice or there are too many, for the parser."""
+    """Read a value in brackets a line as JSON; None where a key stands twice or there are too many."""
     from json import JSONDecoder
 
     if run.count("{") + run.count("[") > MOST_CONTAINERS:

@@ -11,9 +11,10 @@ class Format(NamedTuple):
     summary: what it is, in a line
     suffixes: of files in this form; names: what files are called to which it is written
     reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
-        `records` and `rows` by the streams; `trajectory`: it holds one frame that moves
+        `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
+        holds one frame that moves
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
-        `write_points` (also for a `report`), `write_tree` of `writer`
+        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
     asks: the options that say what it leaves open
@@ -42,8 +43,13 @@ DH = ("standard", "modified")
 _TREE = "frametool.formats.tree_reader"
 _MESSAGES = "frametool.ros.message_reader"
 _TABLE = "frametool.stream.table_samples"
+_ARROW = "frametool.formats.arrow_files"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
+_ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
+_NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
+_OPEN3D = rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
@@ -58,6 +64,7 @@ _DH = (
     rf"(?im)\A(?!\s*<){_AT_HEAD}(?<![^\W_])(?:alpha|\u03b1|twist))"
     rf"{_AT_HEAD}(?:{_LENGTH % '[ar]'}|link_length)){_AT_HEAD}(?:{_LENGTH % 'd'}|link_offset))"
 )
+_PCD = rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "
 _KITTI = (
     r"\A(?:#[^\n]*\n)*(?:calib_time: *\d|"
     r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
@@ -94,7 +101,7 @@ FORMATS = {
         reader=_TABLE,
         writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.csv_format",
-        signs=(("header", r"[^\t]*,[^\t]*$"),),
+        signs=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
     ),
     "tsv": Format(
         "tab-separated values with a header",
@@ -246,7 +253,7 @@ FORMATS = {
         writes=("poses", "trajectory"),
         writer="frametool.formats.open3d",
         signs=(
-            ("text", rf"\A\ufeff?\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"),
+            ("text", _OPEN3D),
             ("json path", "parameters/extrinsic"),
         ),
         states=".log holds world<-camera, .json camera<-world",
@@ -395,6 +402,97 @@ FORMATS = {
         signs=(("xml child", f"robot/(?:{_SRDF})"),),
         states="virtual joints: parent_frame<-child_link; its states are values of joints (--joints FILE:STATE)",
     ),
+    "npy": Format(
+        "NPY of numpy: n x 3 points, n x 7 poses, records with fields",
+        suffixes=(".npy",),
+        reads=("arrays",),
+        reader="frametool.formats.npy",
+        writes=("poses", "points", "arrays"),
+        writer="frametool.formats.npy",
+        signs=(("magic", rb"\x93NUMPY"),),
+    ),
+    "npz": Format(
+        "NPZ of numpy, several arrays in a zip file",
+        suffixes=(".npz",),
+        reads=("arrays",),
+        reader="frametool.formats.npz",
+        writes=("poses", "points", "arrays"),
+        writer="frametool.formats.npz",
+        signs=(("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
+        asks=("array",),
+    ),
+    "pcd": Format(
+        "PCD point cloud",
+        suffixes=(".pcd",),
+        reads=("arrays",),
+        reader="frametool.formats.pcd",
+        writes=("points", "arrays"),
+        writer="frametool.formats.pcd",
+        signs=(("magic", _PCD),),
+        states="metres; VIEWPOINT: pose of the sensor among the points, w first",
+    ),
+    "ply": Format(
+        "PLY point cloud or mesh",
+        suffixes=(".ply",),
+        reads=("arrays",),
+        reader="frametool.formats.ply",
+        writes=("points", "arrays"),
+        writer="frametool.formats.ply",
+        signs=(("magic", rb"ply\r?\n"),),
+        states="metres",
+    ),
+    "las": Format(
+        "LAS laser scan",
+        suffixes=(".las",),
+        reads=("arrays",),
+        reader="frametool.formats.las",
+        writes=("points", "arrays"),
+        writer="frametool.formats.las",
+        signs=(("magic", rb"LASF.{100}[\x00-\x7f]"),),
+        states="metres",
+    ),
+    "laz": Format(
+        "LAZ laser scan",
+        suffixes=(".laz",),
+        reads=("arrays",),
+        reader="frametool.formats.las",
+        writes=("points", "arrays"),
+        writer="frametool.formats.las",
+        signs=(("magic", rb"LASF.{100}[\x80-\xff]"),),
+        states="metres",
+    ),
+    "parquet": Format(
+        "Parquet (pip install 'frametool[arrow]')",
+        suffixes=(".parquet", ".pq"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"PAR1"),),
+    ),
+    "arrow": Format(
+        "a file of Arrow, Feather (pip install 'frametool[arrow]')",
+        suffixes=(".arrow", ".feather", ".ipc"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"ARROW1"),),
+    ),
+    "arrows": Format(
+        "a stream of Arrow (pip install 'frametool[arrow]')",
+        suffixes=(".arrows",),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
+    ),
+    "feather1": Format(
+        "Feather of the first version",
+        signs=(("magic", rb"FEA1"),),
+        instead="write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)",
+    ),
     "xacro": Format(
         "xacro, from which URDF is made",
         suffixes=(".xacro",),
@@ -412,6 +510,21 @@ FORMATS = {
         "camera_info, the intrinsics of a camera",
         signs=(("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
         instead="there is no pose in it; its frame stands in the tree of the robot",
+    ),
+    "intrinsics": Format(
+        "cameras of Kalibr that were calibrated alone",
+        signs=(("yaml inner", r"distortion_coeffs|cam_overlaps"),),
+        instead="there is no pose in it; one would stand under T_cam_imu or T_cn_cnm1",
+    ),
+    "cameras": Format(
+        "cameras.txt of COLMAP, the intrinsics",
+        signs=(("text", rf"\A(?:\s*#[^\n]*\n)*\s*\d+ (?:{_COLMAP_MODELS}) \d+ \d+ "),),
+        instead="there is no pose in it; those of the cameras stand in images.txt beside it",
+    ),
+    "lio": Format(
+        "parameters of FAST-LIO or LIO-SAM",
+        signs=(("yaml inner", r"extrinsic_[TR]|extrinsic(?:Trans|Rot|RPY)|[RP]cl"), ("yaml key", r"extrinsic_[TR]")),
+        instead="extrinsic_T, R are imu<-lidar, extrinsicRot is lidar<-imu; write {xyz: .., matrix: ..} as a tree",
     ),
     "map": Format(
         "map.yaml of a map server",
@@ -463,6 +576,11 @@ def writers(*what: str) -> tuple[str, ...]:
 def is_trajectory(name: str) -> bool:
     """Tell whether a form is that of the poses of one frame over time, and of nothing else."""
     return name in FORMATS and "trajectory" in FORMATS[name].reads
+
+
+def holds_arrays(name: str) -> bool:
+    """Tell whether a form holds columns of numbers and no text."""
+    return name in FORMATS and not {"arrays"}.isdisjoint((*FORMATS[name].reads, *FORMATS[name].writes))
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:

@@ -5,45 +5,88 @@ The only module of the core that needs numpy at import.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numpy import any as some
-from numpy import copysign, fmod, frexp, ldexp, maximum, minimum, sqrt, where
+from numpy import fmod, frexp, ldexp, maximum, minimum, sqrt
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import far_angles, trig
+from frametool.geometry import far_angles, out_array, trig
 
 __all__ = [
-    "all_near_one", "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp",
-    "largest", "ldexp", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
+    "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
+    "ldexp", "least", "mask", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from typing import Any
 
-    from frametool.geometry.types import Array, Components, Four, Kernel, Number, Two
+    from frametool.geometry.types import Array, Components, Condition, Four, Indices, Kernel, Number, Two
 
 BLOCK = 16384  # rows: numpy's calls cost little beside their work, and the temporaries of a kernel stay in the cache
 WIDE = 12  # columns in and out: kernels with more have more temporaries, and get three quarters of the rows
+SIGN_BIT = np.int64(-(2**63))
 np.empty(2**21)  # 16 MiB given back untouched: from then on glibc reuses the memory of blocks instead of mapping anew
 
 
-def largest(x: Array) -> float:
-    """Return the largest magnitude, NaN if there is one."""
-    return float(np.abs(x).max(initial=0.0))
+def furthest(x: Array, centre: float = 0.0) -> float:
+    """Return how far the furthest value is from a number, NaN if one is NaN.
+
+    The guard of all kernels: a minimum and a maximum cost 0.13 ns a row each, half of `abs` and its maximum, and
+    say of finiteness, norm and magnitude at once all that a block needs where nothing is odd.
+    """
+    values = np.asarray(x)
+    least, most = values.min(initial=centre), values.max(initial=centre)
+    return float(max(most - centre, centre - least))
 
 
-def all_near_one(values: Array, tolerance: float) -> bool:
-    """Say whether all values are within a tolerance of 1; none, and NaN is not."""
-    least, most = np.min(values, initial=1.0), np.max(values, initial=1.0)
-    return bool(1.0 - tolerance <= least and most <= 1.0 + tolerance)
+def mask(condition: Condition) -> Any:
+    """Return what `where` needs of a condition, made once for several choices."""
+    return condition if isinstance(condition, bool) else -condition.astype(np.int64)
+
+
+def where(condition: Any, yes: Array | float, no: Array | float) -> Array:
+    """Choose element by element, by a condition or its `mask`.
+
+    By bits: `np.where` branches, which costs 4 ns where neighbours differ; this 0.9, or 0.5 by a mask.
+    """
+    if isinstance(condition, (bool, np.bool_)):
+        return np.where(condition, yes, no)
+    bits = condition if condition.dtype == np.int64 else mask(condition)
+    other = np.asarray(no, np.float64).view(np.int64)
+    chosen: Indices = (np.asarray(yes, np.float64).view(np.int64) ^ other) & bits
+    chosen ^= other
+    return chosen.view(np.float64)
+
+
+def least(x: Array) -> float:
+    """Return the least value, NaN if one is NaN."""
+    return float(np.asarray(x).min(initial=np.inf))
+
+
+def some(condition: Condition) -> bool:
+    """Tell whether a condition holds anywhere; the method of arrays costs half of `np.any`."""
+    return condition if isinstance(condition, bool) else bool(condition.any())
+
+
+def copysign(size: Array | float, sign: Array) -> Array:
+    """Return numbers of a size, which is not negative, and a sign; by bits it costs half of `np.copysign`."""
+    return (_sign_bits(sign) | np.asarray(size, np.float64).view(np.int64)).view(np.float64)
+
+
+def _sign_bits(x: Array | float) -> Indices:
+    """Return the sign bit of every number, all other bits 0."""
+    bits: Indices = np.asarray(x, np.float64).view(np.int64) & SIGN_BIT
+    return bits
 
 
 def first_nonzero(*values: Array) -> Array:
     """Return element by element the first value that is not zero, or the last."""
     found = values[0]
     for value in values[1:]:
-        if np.all(found):
+        if np.asarray(found).all():
             break
         found = where(found == 0.0, value, found)
     return found
@@ -52,10 +95,16 @@ def first_nonzero(*values: Array) -> Array:
 def canonical_sign(x: Array, y: Array, z: Array, w: Array) -> Four[Array]:
     """Return q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0.
 
-    A product with +-1 costs a quarter of `where`; only exact zeros need the longer way.
+    Flipping bits costs 0.2 ns a number, `where` 0.85.  The zero that is added is +0 where the sign was flipped, and
+    -0 elsewhere, which changes nothing.
     """
-    sign = copysign(1.0, first_nonzero(w, x, y, z))
-    signed = [part * sign if np.all(part) else where(sign < 0.0, 0.0 - part, part) for part in (x, y, z, w)]
+    flip = _sign_bits(first_nonzero(w, x, y, z))
+    zero = (flip ^ SIGN_BIT).view(np.float64)
+    signed = []
+    for part in (x, y, z, w):
+        turned = (np.asarray(part, np.float64).view(np.int64) ^ flip).view(np.float64)
+        turned += zero
+        signed.append(turned)
     return signed[0], signed[1], signed[2], signed[3]
 
 
@@ -90,7 +139,7 @@ def doubled_arctan(tangent: Array) -> Array:
     """Return 2 atan(t), |t| <= 1, at most 1 eps off; of 1 it is pi/2 to the bit."""
     squared = tangent * tangent
     rest = trig.polynomial(squared, trig.ARC_ABOVE)
-    rest /= trig.polynomial(squared, trig.ARC_BELOW)
+    rest /= trig.monic_polynomial(squared, trig.ARC_BELOW)
     rest *= squared
     rest *= tangent
     rest = tangent - rest
@@ -118,11 +167,26 @@ def run(kernel: Kernel, count: int, parts: Components, *args: object) -> Compone
     return tuple(out)
 
 
-def rows(kernel: Kernel, count: int, parts: Components, *args: object) -> Array:
-    """Apply a kernel to components; return an array (..., count) of rows."""
-    shape = batch_shape(parts)
-    out = np.empty((*shape, count))
-    walk(kernel, parts, out.reshape(-1, count).T, *args)
+def rows(
+    kernel: Kernel, inner: tuple[int, ...], parts: Components, *args: object, out: Array | None = None
+) -> Array:
+    """Apply a kernel to components; return rows (..., *inner), in `out` where the caller gives one.
+
+    Where rows are written over components that are still to be read, a fresh array is made first.
+    """
+    shape = (*batch_shape(parts), *inner)
+    if out is not None:
+        out_array.require_fitting(out, shape)
+        columns = out_array.flat_columns(out, len(inner))
+        touched = tuple(part for part in parts if out_array.shares_memory(out, (part,)))
+        if columns is not None and (not touched or out_array.in_step(out, len(inner), touched)):
+            walk(kernel, parts, columns, *args)
+            return out
+    fresh = np.empty(shape)
+    walk(kernel, parts, fresh.reshape(-1, int(np.prod(inner))).T, *args)
+    if out is None:
+        return fresh
+    out[...] = fresh
     return out
 
 
@@ -132,11 +196,13 @@ def batch_shape(parts: Components) -> tuple[int, ...]:
     Raises:
         ValueInvalid: they do not.
     """
+    shapes: dict[tuple[int, ...], None] = dict.fromkeys(getattr(part, "shape", ()) for part in parts)
+    if len(shapes) == 1:
+        return next(iter(shapes))
     try:
-        return np.broadcast_shapes(*(np.shape(part) for part in parts))
+        return np.broadcast_shapes(*shapes)
     except ValueError:
-        shapes = " and ".join(dict.fromkeys(str(np.shape(part)) for part in parts))
-        raise ValueInvalid(f"batch shapes {shapes} do not broadcast") from None
+        raise ValueInvalid(f"batch shapes {' and '.join(map(str, shapes))} do not broadcast") from None
 
 
 def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *args: object) -> None:
@@ -164,15 +230,27 @@ def guarded(kernel: Kernel, complain: Callable[[], object]) -> Kernel:
 
 def all_finite(results: Components) -> bool:
     """Tell whether all results are finite, by the first and the last: what goes wrong in a row shows in one of them."""
-    return bool(np.isfinite(np.sum(results[0]) + np.sum(results[-1])))
+    return math.isfinite(np.asarray(results[0]).sum() + np.asarray(results[-1]).sum())
+
+
+def finite_throughout(parts: Components) -> bool:
+    """Tell whether all components are finite."""
+    return all(np.isfinite(np.min(part)) and np.isfinite(np.max(part)) for _, block in cut(parts, 0) for part in block)
 
 
 def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:
     """Cut components, flat, into blocks of contiguous float64 for a kernel that fills so many targets."""
     shape = batch_shape(parts)
-    columns = [part if isinstance(part, float) else np.broadcast_to(part, shape).reshape(-1) for part in parts]
+    columns = [part if isinstance(part, float) else _flat(part, shape) for part in parts]
     for start, stop in blocks(int(np.prod(shape)), len(parts) + targets):
         yield slice(start, stop), tuple(_cut(column, start, stop) for column in columns)
+
+
+def _flat(part: Array, shape: tuple[int, ...]) -> Array:
+    """Return a column of a shape as one axis; the calls that most columns need not cost microseconds each."""
+    if part.shape != shape:
+        part = np.broadcast_to(part, shape)
+    return part if part.ndim == 1 else part.reshape(-1)
 
 
 def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:

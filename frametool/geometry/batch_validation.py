@@ -40,7 +40,9 @@ def read_rotations(
     notation: Notation, numbers: Sequence[Array], *, degrees: bool = False, normalize: bool = False
 ) -> Rotations:
     """Return the quaternions of rows of numbers in column order; the identity stands for rows that are no rotation."""
-    quaternions, off, worst = _converted(notation, tuple(numbers), degrees=degrees, normalize=normalize)
+    given = tuple(numbers)
+    quaternions = np.empty((4, int(np.prod(arrays.batch_shape(given)))))
+    off, worst = _convert(notation, given, quaternions, degrees=degrees, normalize=normalize)
     if off is None:
         return Rotations(tuple(quaternions), {}, NONE, worst)
     refused = np.flatnonzero(off == np.inf)
@@ -49,24 +51,28 @@ def read_rotations(
     return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)), worst)
 
 
-def require_rotations(notation: Notation, given: Components, name: str, *, normalize: bool = False) -> Components:
+def require_rotations(
+    notation: Notation, given: Components, name: str, *, normalize: bool = False, into: Array | None = None
+) -> Components:
     """Return the quaternions of columns of any shape; warn once for all rows that were normalised.
+
+    into: where they are to stand, (4, ...) of the shape of the columns, contiguous
 
     Raises:
         ValueInvalid: naming the first row that is no rotation, and how many there are.
     """
     shape = arrays.batch_shape(given)
-    quaternions, off, _ = _converted(notation, given, degrees=False, normalize=normalize)
+    made = np.empty((4, *shape)) if into is None else into
+    off, _ = _convert(notation, given, made.reshape(4, -1), degrees=False, normalize=normalize)
     if off is not None:
         _refuse_or_warn(notation, given, name, off.reshape(shape), normalize=normalize)
-    return tuple(quaternions.reshape(4, *shape))
+    return tuple(made)
 
 
-def _converted(
-    notation: Notation, given: Components, *, degrees: bool, normalize: bool
-) -> tuple[Array, Array | None, float]:
-    """Return quaternions (4, n), how far each row was off (inf if refused; None if no row needs a word), the worst."""
-    quaternions = np.empty((4, int(np.prod(arrays.batch_shape(given)))))
+def _convert(
+    notation: Notation, given: Components, quaternions: Array, *, degrees: bool, normalize: bool
+) -> tuple[Array | None, float]:
+    """Fill quaternions (4, n); return how far each row is off (inf: refused; None: no row needs a word), the worst."""
     off, worst = None, 0.0
     with np.errstate(all="ignore"):
         for place, block in arrays.cut(given, 4):
@@ -80,7 +86,7 @@ def _converted(
             if grades is not None:
                 off = np.zeros(quaternions.shape[1]) if off is None else off
                 off[place] = grades
-    return quaternions, off, worst
+    return off, worst
 
 
 def _repaired(
@@ -89,10 +95,11 @@ def _repaired(
     """Return how far the rows of a block are off, None if no row needs a word; the block made rotations; the worst."""
     if rule is None:
         return None, block, 0.0
-    off = rule.deviation(*block, arrays)
-    worst = float(arrays.largest(off))
+    worst = rule.furthest(*block, arrays)
     if worst <= min(rule.exact, SILENT):
         return None, block, worst
+    off = rule.deviation(*block, arrays)
+    worst = arrays.furthest(off)
     refused = ~(off < np.inf) if normalize else ~(off <= TOLERATED)
     rough = np.flatnonzero((off > rule.exact) & ~refused)
     grades = None if worst <= SILENT else np.where(refused, np.inf, 0.0 if normalize else off)

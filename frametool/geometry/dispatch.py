@@ -56,36 +56,67 @@ def number(kernel: Callable[..., Any], given: Components) -> Any:
     return run(lambda *parts: (kernel(*parts),), 1, given)[0]
 
 
-def rows(kernel: Kernel, count: int, given: Components, *args: object) -> Array:
-    """Run a kernel that needs functions; return its components as rows (..., count)."""
+def rows(
+    kernel: Kernel, inner: tuple[int, ...], given: Components, *args: object, out: Array | None = None
+) -> Array:
+    """Run a kernel that needs functions; return its components as rows (..., *inner), in `out` where it is given."""
     if single(given):
-        return stacked(kernel(*given, *args, floats))
+        return _one_row(kernel(*given, *args, floats), inner, out)
     from frametool.geometry import arrays
 
-    return arrays.rows(kernel, count, given, *args, arrays)
+    return arrays.rows(kernel, inner, given, *args, arrays, out=out)
 
 
-def moved(kernel: Kernel, mover: Components, given: Components, name: str, *, flatten: Kernel | None = None) -> Array:
-    """Move vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster."""
-    import numpy as np
+def moved(
+    kernel: Kernel, mover: Components, given: Components, name: str, *,
+    flatten: Kernel | None = None, out: Array | None = None,
+) -> Array:  # fmt: skip
+    """Move vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster.
 
+    Vectors that are overwritten are looked at before: where one is not finite, all stay as they were.
+    """
+    inner = (len(given),)
     if single(given) and single(mover):
-        return np.array(kernel(*mover, *given))
-    from frametool.geometry import arrays
+        return _one_row(kernel(*mover, *given), inner, out)
+    from frametool.geometry import arrays, out_array
 
     parts = (*mover, *given)
     if flatten and single(mover):
         kernel, parts = _matrix_kernel(flatten(*mover)), given
-    return arrays.rows(arrays.guarded(kernel, lambda: all_finite(given, name)), len(given), parts)
+    if out is None or not out_array.shares_memory(out, given):
+        kernel = arrays.guarded(kernel, lambda: all_finite(given, name))
+    elif not arrays.finite_throughout(given):
+        all_finite(given, name)
+    return arrays.rows(kernel, inner, parts, out=out)
+
+
+def _one_row(components: Components, inner: tuple[int, ...], out: Array | None) -> Array:
+    """Return the components of one item as an array, in `out` where it is given."""
+    row = stacked(components).reshape(inner)
+    if out is None:
+        return row
+    from frametool.geometry import out_array
+
+    out_array.require_fitting(out, inner)
+    out[...] = row
+    return out
 
 
 def _matrix_kernel(entries: Components) -> Kernel:
-    """Make the kernel of one matrix, three rows of three or of four."""
+    """Make the kernel of one matrix, three rows of three or of four; sums in place save it a tenth."""
     width = len(entries) // 3
-    a, b, c = entries[:width], entries[width : 2 * width], entries[2 * width :]
+    matrix = [entries[start : start + width] for start in range(0, len(entries), width)]
 
-    def kernel(x: Any, y: Any, z: Any) -> Components:
-        return tuple(sum(row[3:], row[0] * x + row[1] * y + row[2] * z) for row in (a, b, c))
+    def kernel(x: Array, y: Array, z: Array) -> Components:
+        moved = []
+        for a, b, c, *shift in matrix:
+            row = a * x
+            row += b * y
+            row += c * z
+            for distance in shift:
+                row += distance
+            moved.append(row)
+        return tuple(moved)
 
     return kernel
 

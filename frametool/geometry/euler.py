@@ -52,10 +52,10 @@ def to_quaternion(first: N, second: N, third: N, axes: str, xp: Functions[N], *,
         vector[j] = sb * (cosines + sines)
         vector[k] = sb * (mixed - turned) * parity
     else:
-        signed = sb * parity
+        signed, level = (sb, cb) if parity > 0.0 else (-sb, -cb)
         w = cb * cosines - signed * sines
         vector[i] = cb * mixed + signed * turned
-        vector[j] = sb * cosines - (cb * parity) * sines
+        vector[j] = sb * cosines - level * sines
         vector[k] = cb * turned + signed * mixed
     x, y, z = vector
     return settled(x, y, z, w) if degrees else (x, y, z, w)
@@ -78,7 +78,8 @@ def from_quaternion(x: N, y: N, z: N, w: N, axes: str, xp: Functions[N], *, degr
         middle = 2.0 * incline(xp.sqrt(squared_difference), xp.sqrt(squared_sum), xp)
     else:
         middle = incline(2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity), radius, xp)
-    if xp.some(xp.minimum(squared_sum, squared_difference) <= LOCK * (squared_sum + squared_difference)):
+    limit = LOCK * (xp.furthest(squared_sum) + xp.furthest(squared_difference))  # of the longest row: none is missed
+    if not (xp.least(squared_sum) > limit and xp.least(squared_difference) > limit):
         a, b, c, d, radius = _without_third(a, b, c, d, squared_sum, squared_difference, radius, static, xp)
     ac, bd, ad, bc = a * c, b * d, a * d, b * c
     outer, inner = bearing(bc + ad + 0.0, ac - bd, radius, xp), bearing(bc - ad + 0.0, ac + bd, radius, xp)

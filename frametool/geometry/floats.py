@@ -7,8 +7,8 @@ from math import copysign, fmod, frexp, ldexp, sqrt
 from frametool.geometry import trig
 
 __all__ = [
-    "all_near_one", "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp",
-    "largest", "ldexp", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
+    "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
+    "ldexp", "least", "mask", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
 ]  # fmt: skip
 
 TYPE_CHECKING = False
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 S1, S2, S3, S4, S5, S6 = trig.SINE
 A1, A2, A3, A4, A5, A6 = trig.ARC_ABOVE
-B1, B2, B3, B4, B5, B6, _ = trig.ARC_BELOW
+B1, B2, B3, B4, B5, B6 = trig.ARC_BELOW
 LEVEL, RIGHT_ANGLE, RIGHT_ANGLE_REST = trig.LEVEL, trig.RIGHT_ANGLE, trig.RIGHT_ANGLE_REST
 maximum, minimum = max, min
-largest = abs
-some = bool
+some = mask = bool
+least = float
 
 
 def where(condition: Condition, yes: float, no: float) -> float:
@@ -36,9 +36,9 @@ def canonical_sign(x: float, y: float, z: float, w: float) -> tuple[float, float
     return x, y, z, w
 
 
-def all_near_one(value: float, tolerance: float) -> bool:
-    """Say whether a number is within a tolerance of 1."""
-    return abs(value - 1.0) <= tolerance
+def furthest(value: float, centre: float = 0.0) -> float:
+    """Return how far a number is from another."""
+    return abs(value - centre)
 
 
 def first_nonzero(a: float, b: float, c: float, d: float) -> float:

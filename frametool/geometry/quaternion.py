@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from frametool.geometry.types import Condition, Four, Functions, N, Nine, Three, Two
+    from frametool.geometry.types import Condition, Five, Four, Functions, N, Nine, Three, Two
 
 EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: what lies within 4 is left alone, bit for bit
@@ -62,7 +62,7 @@ def conjugate(x: N, y: N, z: N, w: N) -> Four[N]:
 def unit(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     """Normalise a quaternion of moderate norm; what is unit to 4 eps keeps its bits."""
     squared = x * x + y * y + z * z + w * w
-    if xp.all_near_one(squared, UNIT):
+    if xp.furthest(squared, 1.0) <= UNIT:
         return x, y, z, w
     norm = xp.where(abs(squared - 1.0) > UNIT, xp.sqrt(squared), 1.0)
     return x / norm, y / norm, z / norm, w / norm
@@ -129,6 +129,24 @@ def distance(
     return 2.0 * arc(ax, ay, az, aw, bx, by, bz, bw, xp)
 
 
+def toward(
+    ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
+) -> Five[N]:  # fmt: skip
+    """Return the unit quaternion c at right angles to a, in the plane of a and b, and half the arc to b in radians.
+
+    The arc is the shorter one; at exactly half a turn both are, and the sign of b decides.
+    With s and c the sine and cosine of half the arc: (b - a) / 2sc + a s/c, which keeps its digits where b is near a.
+    """
+    apart, along = halves(ax, ay, az, aw, bx, by, bz, bw, xp)
+    apart = xp.maximum(apart, TINY)
+    sign = xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
+    ahead, beside = 0.5 / (apart * along), apart / along
+    return (
+        ahead * (sign * bx - ax) + beside * ax, ahead * (sign * by - ay) + beside * ay,
+        ahead * (sign * bz - az) + beside * az, ahead * (sign * bw - aw) + beside * aw, incline(apart, along, xp),
+    )  # fmt: skip
+
+
 def slerp(
     ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N,
     fraction: N, xp: Functions[N],
@@ -136,21 +154,14 @@ def slerp(
     """Interpolate two unit quaternions along the shorter arc.
 
     fraction: 0 gives a and 1 gives b to the bit; outside is extrapolated.
-    Returns x, y, z, w, unit.  At exactly half a turn both arcs are shortest; the sign of b decides.
-    Source: Shoemake 1985, from the middle: with s and c the sine and cosine of half the arc and g = fraction - 1/2,
-    cos(g arc) (a + b) / 2c + sin(g arc) (b - a) / 2s, which treats both ends alike.
+    Returns x, y, z, w, unit: a cos(fraction arc) + c sin(fraction arc), where c is what `toward` returns.
+    Source: Shoemake 1985, by the steps of `segment`, which prepares c once for many fractions.
     """
-    apart, along = halves(ax, ay, az, aw, bx, by, bz, bw, xp)
-    beyond = fraction - 0.5
-    sine, cosine = half_sincos(2.0 * (beyond * (2.0 * incline(apart, along, xp))), xp)
-    mean = 0.5 * (cosine / along)
-    across = xp.where(apart > TINY, 0.5 * (sine / xp.maximum(apart, TINY)), beyond)
-    sign = xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
-    sx, sy, sz, sw = sign * bx, sign * by, sign * bz, sign * bw
+    cx, cy, cz, cw, half_arc = toward(ax, ay, az, aw, bx, by, bz, bw, xp)
+    sine, cosine = half_sincos(4.0 * (fraction * half_arc), xp)
     x, y, z, w = unit(
-        mean * (ax + sx) + across * (sx - ax), mean * (ay + sy) + across * (sy - ay),
-        mean * (az + sz) + across * (sz - az), mean * (aw + sw) + across * (sw - aw), xp,
-    )  # fmt: skip
+        cosine * ax + sine * cx, cosine * ay + sine * cy, cosine * az + sine * cz, cosine * aw + sine * cw, xp
+    )
     at_start, at_end = fraction == 0.0, fraction == 1.0
     if not xp.some(at_start | at_end):
         return x, y, z, w
@@ -192,11 +203,16 @@ def deviation(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
     """Return how far the norm is from 1 (to first order below 1e-6); inf for what has no direction or is not finite."""
     squared = x * x + y * y + z * z + w * w
     off = abs(squared - 1.0)
-    if xp.largest(off) <= SILENT:
+    if xp.furthest(off) <= SILENT:
         return off
     size = largest_of((abs(x), abs(y), abs(z), abs(w)), xp)
     off = xp.where(off <= SILENT, off, xp.minimum(abs(xp.sqrt(squared) - 1.0), FARTHEST))
     return xp.where((size > 0.0) & (size < inf), off, inf)
+
+
+def furthest(x: N, y: N, z: N, w: N, xp: Functions[N]) -> float:
+    """Return how far the squared norm furthest from 1 is: the deviation where all are within 1e-6, more elsewhere."""
+    return xp.furthest(x * x + y * y + z * z + w * w, 1.0)
 
 
 def repaired(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:

@@ -50,16 +50,21 @@ class BatchRule:
 
     what: what the rows are, in the plural
     deviation: kernel (components, xp) of how far each row is from a rotation; inf where nothing can be made of it
+    furthest: function (components, xp) of how far the furthest row is, at least where none is beyond `exact`; else
+        anything beyond it, or NaN
     repair: kernel (components, xp) that makes rotations of rows
     exact: the deviation up to which a row keeps its bits
     """
 
-    __slots__ = ("deviation", "exact", "repair", "what")
+    __slots__ = ("deviation", "exact", "furthest", "repair", "what")
 
-    def __init__(self, what: str, deviation: Callable[..., Any], repair: Kernel, exact: float) -> None:
+    def __init__(
+        self, what: str, deviation: Callable[..., Any], furthest: Callable[..., float], repair: Kernel, exact: float
+    ) -> None:
         """Bind the kernels."""
         self.what = what
         self.deviation = deviation
+        self.furthest = furthest
         self.repair = repair
         self.exact = exact
 
@@ -200,8 +205,9 @@ def _as_wxyz(x: Any, y: Any, z: Any, w: Any, xp: Namespace) -> Components:
     return _wxyz(*quaternion.from_quaternion(x, y, z, w, xp))
 
 
-def _wxyz_deviation(w: Any, x: Any, y: Any, z: Any, xp: Namespace) -> Any:
-    return quaternion.deviation(x, y, z, w, xp)
+def _of_wxyz(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a function of x, y, z, w take w, x, y, z."""
+    return lambda w, x, y, z, xp: kernel(x, y, z, w, xp)
 
 
 def _check_mrp(*parameters: float, normalize: bool = False) -> Components:
@@ -225,7 +231,10 @@ LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 HOMOGENEOUS = Whole(
     "m11 m12 m13 m14 m21 m22 m23 m24 m31 m32 m33 m34 m41 m42 m43 m44", _homogeneous, _of_homogeneous, LAST_ROW
 )
-QUATERNIONS = BatchRule("quaternions", quaternion.deviation, quaternion.repaired, quaternion.UNIT)
+QUATERNIONS = BatchRule(
+    "quaternions", quaternion.deviation, quaternion.furthest, quaternion.repaired, quaternion.UNIT
+)
+MATRICES = BatchRule("matrices", matrix.deviation, matrix.furthest, matrix.nearest, matrix.ORTHONORMAL)
 
 REPRESENTATIONS: dict[str, Representation] = {
     "quaternion": Representation(
@@ -241,7 +250,10 @@ REPRESENTATIONS: dict[str, Representation] = {
     "wxyz": Representation(
         "qw qx qy qz", (), "unit quaternion, scalar first", names="w x y z", label="quaternion",
         forward=_arithmetic(_from_wxyz), backward=_plain(_as_wxyz), check=_in_wxyz(quaternion.check), kept=_wxyz,
-        batch=BatchRule("quaternions", _wxyz_deviation, _in_wxyz(quaternion.repaired), quaternion.UNIT),
+        batch=BatchRule(
+            "quaternions", _of_wxyz(quaternion.deviation), _of_wxyz(quaternion.furthest),
+            _in_wxyz(quaternion.repaired), quaternion.UNIT,
+        ),
     ),
     "rpy": Representation(
         "roll pitch yaw", (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
@@ -267,7 +279,7 @@ REPRESENTATIONS: dict[str, Representation] = {
         "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "rotation matrix, row by row",
         shape=ROWS, whole=HOMOGENEOUS, overview=("",),
         forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
-        batch=BatchRule("matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL),
+        batch=MATRICES,
     ),
     "mrp": Representation(
         "mrp_x mrp_y mrp_z", (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
@@ -277,7 +289,7 @@ REPRESENTATIONS: dict[str, Representation] = {
         "r11 r21 r31 r12 r22 r32", (), "first two columns of the matrix (Zhou's continuous 6D)", label="6d",
         searched=False,
         forward=_plain(six_d.to_quaternion), backward=_arithmetic(six_d.from_quaternion), check=six_d.check,
-        batch=BatchRule("pairs of columns", six_d.deviation, six_d.repaired, inf),
+        batch=BatchRule("pairs of columns", six_d.deviation, six_d.furthest, six_d.repaired, inf),
     ),
 }  # fmt: skip
 for _name, _row in REPRESENTATIONS.items():
@@ -365,7 +377,7 @@ def _upper_rows() -> Notation:
         "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "three rows of the matrix of a pose",
         shape=ROWS, whole=Whole(" ".join(HOMOGENEOUS.columns[:12]), _three_rows, _of_homogeneous),
         forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
-        batch=BatchRule("matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL),
+        batch=MATRICES,
     )  # fmt: skip
     row.name = "matrix"
     return Notation("matrix", row, None, degrees=None)

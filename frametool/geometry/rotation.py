@@ -29,6 +29,10 @@ class Rotation(Batched):
 
     Active, right-handed; quaternions are Hamilton's, x, y, z, w.  `@` composes (the right one acts first), `apply`
     turns vectors.  Every `from_X` takes leading axes (..., k), every `as_X` gives them; nothing given is changed.
+
+    `out=` of `as_X` and `apply`: a writable numpy array of float64 in native byte order, of the result's shape, with
+    any strides (a memmap too), which is filled and returned.  It may be, or overlap, what is read:
+    `r.apply(points, out=points)` turns points where they are, or raises and leaves them as they were.
     """
 
     __slots__ = ()
@@ -130,56 +134,61 @@ class Rotation(Batched):
         return cls._of_columns(made)
 
     @classmethod
-    def from_columns(cls, spec: str, given: Components, name: str, *, normalize: bool = False) -> Rotation:
-        """Check and convert the columns of a notation; errors call them `name`."""
+    def from_columns(
+        cls, spec: str, given: Components, name: str, *, normalize: bool = False, into: Array | None = None
+    ) -> Rotation:
+        """Check and convert the columns of a notation; errors call them `name`, `into` is where many come to stand."""
         form = _form(spec)
         if validation.single(given):
             return cls.of(*form.checked_quaternion(given, floats, normalize=normalize))
         from frametool.geometry.batch_validation import require_rotations
 
-        return cls._of_columns(require_rotations(form, given, name, normalize=normalize))
+        return cls._of_columns(require_rotations(form, given, name, normalize=normalize, into=into))
 
-    def _as(self, spec: str) -> Array:
-        """Return rows of the columns of a notation."""
+    def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
+        """Return rows of the columns of a notation, of another shape where one is told, in `out` if given."""
         form = _form(spec)
-        return dispatch.rows(form.from_quaternion, len(form.columns), self._components)
+        return dispatch.rows(form.from_quaternion, inner or (len(form.columns),), self._components, out=out)
 
-    def as_quaternion(self) -> Array:
+    def as_quaternion(self, *, out: Array | None = None) -> Array:
         """Return x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""
-        return self._as("xyzw")
+        return self._as("xyzw", out)
 
-    def as_matrix(self) -> Array:
+    def as_matrix(self, *, out: Array | None = None) -> Array:
         """Return matrices of shape (..., 3, 3); columns are the turned axes."""
-        return self._as("matrix").reshape(*self.shape, 3, 3)
+        return self._as("matrix", out, (3, 3))
 
-    def as_rotvec(self) -> Array:
+    def as_rotvec(self, *, out: Array | None = None) -> Array:
         """Return rotation vectors of shape (..., 3), radians, of length 0 to pi."""
-        return self._as("rotvec")
+        return self._as("rotvec", out)
 
-    def as_axis_angle(self) -> tuple[Array, Any]:
-        """Return unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x."""
-        four = self._as("axis_angle")
+    def as_axis_angle(self, *, out: Array | None = None) -> tuple[Array, Any]:
+        """Return unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x.
+
+        `out`, of shape (..., 4), takes axis and angle side by side; what is returned are views of it.
+        """
+        four = self._as("axis_angle", out)
         return four[..., :3], four[..., 3] if four.ndim > 1 else float(four[3])
 
-    def as_euler(self, axes: str) -> Array:
+    def as_euler(self, axes: str, *, out: Array | None = None) -> Array:
         """Return angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`.
 
         The middle one lies in [-pi/2, pi/2], or in [0, pi] where first and third axis are the same; at gimbal lock
         (see `gimbal_lock`) the third is 0.
         """
-        return self._as(f"euler:{axes}")
+        return self._as(f"euler:{axes}", out)
 
-    def as_rpy(self) -> Array:
+    def as_rpy(self, *, out: Array | None = None) -> Array:
         """Return roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
-        return self._as("rpy")
+        return self._as("rpy", out)
 
-    def as_mrp(self) -> Array:
+    def as_mrp(self, *, out: Array | None = None) -> Array:
         """Return modified Rodrigues parameters of shape (..., 3), of length 0 to 1."""
-        return self._as("mrp")
+        return self._as("mrp", out)
 
-    def as_six_d(self) -> Array:
+    def as_six_d(self, *, out: Array | None = None) -> Array:
         """Return the first two matrix columns, one after the other, of shape (..., 6)."""
-        return self._as("six_d")
+        return self._as("six_d", out)
 
     def gimbal_lock(self, axes: str) -> Any:
         """Say per element whether the angles of a convention are at gimbal lock, to 1 eps."""
@@ -205,10 +214,11 @@ class Rotation(Batched):
         """Return the same rotation, its quaternion with the canonical sign."""
         return self._of_columns(dispatch.run(quaternion.from_quaternion, 4, self._components))
 
-    def apply(self, vectors: Numbers) -> Array:
+    def apply(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
         given = validation.columns(vectors, 3, "vectors")
-        return dispatch.moved(quaternion.rotate, self._components, given, "vectors", flatten=quaternion.to_matrix)
+        parts = self._components
+        return dispatch.moved(quaternion.rotate, parts, given, "vectors", flatten=quaternion.to_matrix, out=out)
 
     def angle(self) -> Any:
         """Return the angle of rotation in [0, pi] radians."""

@@ -42,6 +42,11 @@ def deviation(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> N:
     return xp.where(sine > PARALLEL, 0.0, inf)
 
 
+def furthest(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> float:
+    """Return 0 where all pairs of columns span a plane, else inf."""
+    return xp.furthest(deviation(ax, ay, az, bx, by, bz, xp))
+
+
 def repaired(ax: N, ay: N, az: N, bx: N, by: N, bz: N, _xp: Functions[N]) -> Six[N]:
     """Return two columns as they are: `to_quaternion` takes any that span a plane."""
     return ax, ay, az, bx, by, bz

@@ -14,7 +14,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from frametool.geometry.types import Array, Numbers, Rigid
+    from frametool.geometry.types import Array, Components, Numbers, Rigid
 
 NEAR_BY = 1e-9  # metres: translations closer than this count as close
 _new = object.__new__
@@ -24,6 +24,9 @@ class Transform(Batched):
     """One rigid transform, or an array of them of any shape; frozen.
 
     `a_from_c = a_from_b @ b_from_c`; `point_in_a = a_from_b.apply(point_in_b)`.  Metres and radians.
+
+    `out=` of `as_matrix`, `log` and every `apply`: a writable numpy array of float64 of the result's shape, which is
+    filled and returned; it may be what is read.  `Rotation` says precisely what is taken.
     """
 
     __slots__ = ()
@@ -69,8 +72,7 @@ class Transform(Batched):
             ValueInvalid: wrong shapes, not finite, or no rotation; names the first such row.
         """
         shift = validation.columns(xyz, 3, "xyz")
-        rotation = Rotation.from_quaternion(xyzw, normalize=normalize)
-        return cls._of_columns(validation.joined((*shift, *rotation.components), "xyz"))
+        return cls._read(shift, "xyz", "xyzw", validation.columns(xyzw, 4, "xyzw"), "xyzw", normalize=normalize)
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Transform:
@@ -81,8 +83,24 @@ class Transform(Batched):
         """
         m = validation.matrices(matrices, 4, "matrix")
         validation.check_last_row(m, "matrix")
-        rotation = Rotation.from_columns("matrix", (*m[0:3], *m[4:7], *m[8:11]), "matrix", normalize=normalize)
-        return cls._of_columns(validation.joined((m[3], m[7], m[11], *rotation.components), "matrix"))
+        turn = *m[0:3], *m[4:7], *m[8:11]
+        return cls._read((m[3], m[7], m[11]), "matrix", "matrix", turn, "matrix", normalize=normalize)
+
+    @classmethod
+    def _read(
+        cls, shift: Components, shift_name: str, spec: str, turn: Components, turn_name: str, *, normalize: bool
+    ) -> Transform:
+        """Check and convert columns; rotations as many as translations are made where they stay, without a copy."""
+        shape = validation.batch_shape(shift)
+        if not shape or validation.batch_shape(turn) != shape:
+            rotation = Rotation.from_columns(spec, turn, turn_name, normalize=normalize)
+            return cls._of_columns(validation.joined((*shift, *rotation.components), shift_name))
+        import numpy as np
+
+        made = np.empty((7, *shape))
+        Rotation.from_columns(spec, turn, turn_name, normalize=normalize, into=made[3:])
+        validation.copy_finite(shift, made[:3], shift_name)
+        return cls._of_columns(tuple(made))
 
     @classmethod
     def exp(cls, twist: Numbers) -> Transform:
@@ -96,7 +114,7 @@ class Transform(Batched):
     @property
     def xyz(self) -> Array:
         """The translations, shape (..., 3), metres."""
-        return dispatch.stacked(self._components[:3])
+        return dispatch.rows(lambda x, y, z, _xp: (x, y, z), (3,), self._components[:3])
 
     @property
     def xyzw(self) -> Array:
@@ -108,13 +126,13 @@ class Transform(Batched):
         """The rotation."""
         return Rotation.of(*self._components[3:])
 
-    def as_matrix(self) -> Array:
+    def as_matrix(self, *, out: Array | None = None) -> Array:
         """Return homogeneous matrices of shape (..., 4, 4)."""
-        return dispatch.rows(rigid.to_homogeneous, 16, self._components).reshape(*self.shape, 4, 4)
+        return dispatch.rows(rigid.to_homogeneous, (4, 4), self._components, out=out)
 
-    def log(self) -> Array:
+    def log(self, *, out: Array | None = None) -> Array:
         """Return the twists (vx, vy, vz, wx, wy, wz), shape (..., 6), whose `exp` this is; angles up to pi."""
-        return dispatch.rows(rigid.log, 6, self._components)
+        return dispatch.rows(rigid.log, (6,), self._components, out=out)
 
     def __matmul__(self, other: Transform) -> Transform:
         """Compose: a_from_b @ b_from_c is a_from_c."""
@@ -137,24 +155,24 @@ class Transform(Batched):
             dispatch.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
         )
 
-    def apply(self, points: Numbers) -> Array:
+    def apply(self, points: Numbers, *, out: Array | None = None) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
         given = validation.columns(points, 3, "points")
-        return dispatch.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix)
+        return dispatch.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix, out=out)
 
-    def apply_vector(self, vectors: Numbers) -> Array:
+    def apply_vector(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
-        return self.rotation.apply(vectors)
+        return self.rotation.apply(vectors, out=out)
 
-    def apply_twist(self, twists: Numbers) -> Array:
+    def apply_twist(self, twists: Numbers, *, out: Array | None = None) -> Array:
         """Move velocities (vx, vy, vz, wx, wy, wz), shape (..., 6): that of the same body at this side's origin."""
         given = validation.columns(twists, 6, "twists")
-        return dispatch.moved(spatial.move_twist, self._components, given, "twists")
+        return dispatch.moved(spatial.move_twist, self._components, given, "twists", out=out)
 
-    def apply_wrench(self, wrenches: Numbers) -> Array:
+    def apply_wrench(self, wrenches: Numbers, *, out: Array | None = None) -> Array:
         """Move wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to this side's origin."""
         given = validation.columns(wrenches, 6, "wrenches")
-        return dispatch.moved(spatial.move_wrench, self._components, given, "wrenches")
+        return dispatch.moved(spatial.move_wrench, self._components, given, "wrenches", out=out)
 
     def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
         """Interpolate: translation along the line, rotation by slerp; fractions 0 and 1 give the ends to the bit.

@@ -20,13 +20,13 @@ SINE = (
     -0.16666666666666666, 0.008333333333330948, -0.0001984126983675857,
     2.755731610255057e-06, -2.5051131844614108e-08, 1.5918129266803394e-10,
 )  # fmt: skip
-# (1 - atan(t)/t)/t^2 as a quotient in t^2, 0 <= t <= 1, the divisor led by 1: relative error of the angle 2^-55
+# (1 - atan(t)/t)/t^2 as a quotient in t^2, 0 <= t <= 1, the divisor led by 1, which no product needs: relative error of
+# the angle 2^-55
 ARC_ABOVE = (
     404.44958201411697, 905.3726290655958, 709.2810809323058, 230.9790943899718, 28.6344514670043, 0.9024525862982413,
 )  # fmt: skip
 ARC_BELOW = (
     1213.3487460423516, 3444.127134821938, 3674.312918256491, 1825.9201295139483, 423.8789826719409, 39.96465648522898,
-    1.0,
 )  # fmt: skip
 # pi/2 in two parts, the first of 33 bits (fdlibm): its products with whole numbers below 2^20 are exact
 QUARTER_TURN, QUARTER_TURN_REST = 1.57079632673412561417, 6.07710050650619224932e-11
@@ -44,7 +44,7 @@ def half_sincos(angle: N, xp: Functions[N]) -> Two[N]:
     Cody & Waite 1980 do, and exactly beyond 2^20.
     """
     quarter = 0.25 * angle
-    bound = xp.largest(quarter)
+    bound = xp.furthest(quarter)
     if bound <= 0.25 * pi:
         return xp.doubled_sincos(quarter)
     quarter, turns = reduced(quarter) if bound < FAR else xp.reduced_exactly(quarter)
@@ -113,8 +113,19 @@ def bearing(y: N, x: N, radius: N, xp: Functions[N]) -> N:
 
 def polynomial(x: N, coefficients: tuple[float, ...]) -> N:
     """Evaluate a polynomial by Horner's rule, arrays in one of their own; lowest coefficient first."""
-    value = x * coefficients[-1]
-    for coefficient in coefficients[-2:0:-1]:
+    return horner(x * coefficients[-1], x, coefficients[:-1])
+
+
+def monic_polynomial(x: N, coefficients: tuple[float, ...]) -> N:
+    """Evaluate a polynomial led by a coefficient of 1, which is left out."""
+    value = x + coefficients[-1]
+    value *= x
+    return horner(value, x, coefficients[:-1])
+
+
+def horner(value: N, x: N, coefficients: tuple[float, ...]) -> N:
+    """Add the lower coefficients to the highest term, one power of x after the other, in place."""
+    for coefficient in coefficients[:0:-1]:
         value += coefficient
         value *= x
     value += coefficients[0]

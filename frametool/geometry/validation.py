@@ -11,6 +11,8 @@ from math import isfinite
 from frametool.errors import ValueInvalid
 from frametool.geometry.quaternion import SILENT
 
+LAST_ROW = (0.0, 0.0, 0.0, 1.0)  # of a homogeneous matrix
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
@@ -21,6 +23,11 @@ if TYPE_CHECKING:
 def single(components: Components) -> bool:
     """Say whether components are the floats of one item."""
     return all(type(part) is float for part in components)
+
+
+def batch_shape(parts: Components) -> tuple[int, ...]:
+    """Return the shape of components that have one shape; () for one item."""
+    return getattr(parts[-1], "shape", ())
 
 
 def columns(value: Any, width: int, name: str) -> Components:
@@ -132,22 +139,51 @@ def joined(given: Components, name: str) -> Components:
     from frametool.geometry import arrays
 
     out = np.empty((len(given), *arrays.batch_shape(given)))
-    for target, part in zip(out, given, strict=True):
+    for target, part in zip(out[3:], given[3:], strict=True):
         target[...] = part
-    if not np.isfinite(out[:3].sum()):
-        all_finite(tuple(out[:3]), name)
+    copy_finite(given[:3], out[:3], name)
     return tuple(out)
+
+
+def copy_finite(given: Components, out: Array, name: str) -> None:
+    """Copy columns into others, which they broadcast to; raise ValueInvalid for the first row that is not finite."""
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    columns = tuple(np.broadcast_to(part, out.shape[1:]) if np.shape(part) != out.shape[1:] else part for part in given)
+    flat = out.reshape(len(columns), -1)
+    for place, block in arrays.cut(columns, len(columns)):
+        for target, part in zip(flat, block, strict=True):
+            target[place] = part
+        if not all(isfinite(arrays.furthest(part)) for part in block):
+            all_finite(columns, name)
 
 
 def check_last_row(entries: Components, name: str) -> None:
     """Raise ValueInvalid unless the last rows of homogeneous matrices are 0 0 0 1, to 1e-6."""
-    off = sum(abs(entry - wanted) for entry, wanted in zip(entries[12:], (0.0, 0.0, 0.0, 1.0), strict=True))
-    bad = ~(off <= SILENT) if not isinstance(off, float) else not off <= SILENT
-    if bad if isinstance(bad, bool) else bad.any():
-        import numpy as np
+    last = entries[12:]
+    if _is_last_row(last):
+        return
+    import numpy as np
 
-        mask = np.asarray(bad)
-        raise ValueInvalid(f"{at_first(name, mask)}: last row {shown_row(entries[12:], mask)}; expected 0 0 0 1")
+    off = sum(abs(entry - wanted) for entry, wanted in zip(last, LAST_ROW, strict=True))
+    bad = ~(np.asarray(off) <= SILENT)
+    if bad.any():
+        raise ValueInvalid(f"{at_first(name, bad)}: last row {shown_row(last, bad)}; expected 0 0 0 1")
+
+
+def _is_last_row(last: Components) -> bool:
+    """Tell whether all are 0 0 0 1 to 1e-6, block by block; it may deny it of rows that nearly are not."""
+    if single(last):
+        return bool(sum(abs(entry - wanted) for entry, wanted in zip(last, LAST_ROW, strict=True)) <= SILENT)
+    from frametool.geometry import arrays
+
+    return all(
+        arrays.furthest(part, wanted) <= SILENT / len(LAST_ROW)
+        for _, block in arrays.cut(last, 0)
+        for part, wanted in zip(block, LAST_ROW, strict=True)
+    )
 
 
 def weights(value: Numbers, shape: tuple[int, ...]) -> Array:

@@ -215,6 +215,7 @@ class Answers(NamedTuple):
     edges: of a graph of poses the edges are wanted, not the vertices
     joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
     joint_files: files with values of joints, over time or for good
+    array: the one of several arrays that is read
     """
 
     frames: tuple[str, ...] = ()
@@ -225,6 +226,7 @@ class Answers(NamedTuple):
     edges: bool = False
     joints: Mapping[str, str] = MappingProxyType({})
     joint_files: tuple[str, ...] = ()
+    array: str = ""
 
     def names(self, *defaults: str) -> tuple[str, ...]:
         """Return the names of a form's frames: as told, then its own."""

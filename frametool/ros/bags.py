@@ -5,6 +5,7 @@ Every topic that holds transforms is read, with whatever namespace; what comes b
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown
@@ -42,7 +43,13 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _edges(path: str, options: Options) -> Iterator[Edge]:
-    """Open the bag; whatever the library raises for a broken one is one error."""
+    with opened_bag(path, options.tally) as reader:
+        yield from _transforms(reader, path, options)
+
+
+@contextmanager
+def opened_bag(path: str, tally: Tally) -> Iterator[Any]:
+    """Open a bag and yield its reader; whatever the library raises for a broken one is one error."""
     try:
         from rosbags.highlevel import AnyReader
     except ImportError:
@@ -54,10 +61,10 @@ def _edges(path: str, options: Options) -> Iterator[Edge]:
     if Path(path).is_file() and not Path(path).stat().st_size:
         raise FormatError("nothing in it: an empty file is no bag", source=path)
     try:
-        _check_whole(path, options.tally)
+        _check_whole(path, tally)
         with AnyReader([Path(path)]) as reader:
-            yield from _transforms(reader, path, options)
-    except FrametoolError:
+            yield reader
+    except (FrametoolError, BrokenPipeError):
         raise
     except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything, also MemoryError
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")

@@ -20,9 +20,11 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
 from frametool.stream.blocks import Plan, Run, State
+from frametool.stream.column_stream import ColumnRows, move_along
+from frametool.stream.column_writer import ArrayWriter
 from frametool.stream.faults import NULL, STOP, Fault, Misused
 from frametool.stream.point_writer import PointWriter
-from frametool.stream.pose_values import kept, spans_of
+from frametool.stream.pose_values import chosen_poses, kept, spans_of
 from frametool.stream.pose_writer import PoseWriter
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
 from frametool.stream.rows import Block
@@ -63,35 +65,50 @@ class OtherForm:
         self.source = source
         self.answers = answers
         self.tally = Tally()
-        self.module: Any = None if form in DELIMITERS else import_module(FORMATS[form].reader)
+        self.is_table = form in DELIMITERS
+        self.module: Any = None if self.is_table else import_module(FORMATS[form].reader)
         self.style = style.in_form(style.form)
         self.request = request._replace(whole=True, notations=(QUATERNION,), keep_sign=True)
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
+        self.to_arrays = "arrays" in FORMATS[style.form].writes
+        self.without = 0  # rows of an array that stand for no point or pose, and have no place in a text
 
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
-        writer: PoseWriter | PointWriter | None = None
-        for step in self._listed(stream) if self.module else self._rows(stream, header=header):
+        writer: PoseWriter | PointWriter | ArrayWriter | None = None
+        if self.is_table:
+            steps = self._rows(stream, header=header)
+        else:
+            steps = self._columns(stream) if "arrays" in FORMATS[self.form].reads else self._listed(stream)
+        for step in steps:
             poses, outcome = step
+            if self.request.gathered is not None:
+                yield outcome
+                continue
             if writer is None:
                 writer = self._writer()
             if self.request.on_error == STOP and outcome.faults:
                 before = int(np.searchsorted(poses.lines, outcome.faults[0].line))
                 poses = kept(poses, slice(0, before))
             yield outcome._replace(text=writer.of_block(poses))
-        if writer is None:
+        if writer is None and self.request.gathered is None:
             raise FormatError("nothing in it", source=self.source)
-        yield Outcome(writer.end())
+        if writer is not None:
+            ended = writer.end()
+            for piece in (ended,) if isinstance(ended, bytes) else ended:
+                yield Outcome(piece)
         for told in self.tally.told():
             warn(f"{self.source}:{told.line}: {told.message}")
 
-    def _writer(self) -> PoseWriter | PointWriter:
+    def _writer(self) -> PoseWriter | PointWriter | ArrayWriter:
         """Choose what writes the results, by what they are."""
         operation = self.request.operation
         kind = operation.result_kind(self.shape.kind)
         extras = [self.request.prefix + name for name in operation.extras(self.shape.kind)]
         if operation.only_adds or kind not in (POSE, POINT, VECTOR) or (extras and kind != POSE):
             raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
+        if self.to_arrays:
+            return ArrayWriter(self.style, kind, extras, placed=self.placed)
         return PointWriter(self.style, kind) if kind != POSE else PoseWriter(self.style, extras, placed=self.placed)
 
     def _turned(self, form: Poses) -> Request:
@@ -155,6 +172,30 @@ class OtherForm:
         rows = getattr(import_module(FORMATS[self.style.form].writer), "ROWS", None)
         counts = bool(form.counted) and self.stamps is None
         return None if counts and rows is not None and "stamps" not in rows.holds else stamps_ns
+
+    # --- columns of numbers ---
+
+    def _columns(self, stream: BufferedReader) -> Iterator[Step]:
+        """Yield the rows of columns of numbers."""
+        file = InputFile(self.source if self.source != "stdin" else "-", stream)
+        opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
+        rows = ColumnRows(opened, self._turned(TABLE), self.source)
+        move_along(opened, self.request)
+        self.shape = rows.shape
+        self.placed = rows.plan.targets[0].unit is not None
+        yield Step(_none(), Outcome(b""))
+        for batch in opened.batches():
+            poses = rows.poses(batch)
+            if not self.to_arrays:
+                there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
+                self.without += len(poses.numbers) - len(there)
+                poses = chosen_poses(poses, there)
+            yield Step(
+                poses, Outcome(b"", rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read)
+            )
+        if self.without:
+            count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
+            warn(f"{self.source}: {count} without numbers left out: {self.style.form} has no place for them")
 
     # --- forms that list poses ---
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from frametool.errors import FrametoolError
     from frametool.stream.rows import Block
     from frametool.text.array_types import Floats, Ints
+    from frametool.text.spans import Spans
 
     Blame = Callable[[int, str, str | FrametoolError], None]
 
@@ -65,13 +66,18 @@ def weights_of(block: Block, name: str, blame: Blame) -> Floats:
     """Return the weights of rows; a row with none, or a negative one, is bad."""
     if not len(block.places):
         return np.zeros(0)
-    spans = block.stamps[0][0]
-    weights, bad = parse_floats(spans)
-    for row in bad.tolist():
-        try:
-            weights[row] = parse_number(spans.text(row).decode("utf-8", "replace").strip(" \t\"'"))
-        except ValueInvalid as error:
-            blame(row, name, str(error))
+    weights = _parsed(block.stamps[0][0], name, blame) if block.weights is None else block.weights
     for row in np.flatnonzero(weights < 0.0).tolist():
         blame(row, name, f"weight {weights[row]:g} is negative")
     return weights
+
+
+def _parsed(cells: Spans, name: str, blame: Blame) -> Floats:
+    """Read cells as numbers; a row with another cell is bad."""
+    numbers, bad = parse_floats(cells)
+    for row in bad.tolist():
+        try:
+            numbers[row] = parse_number(cells.text(row).decode("utf-8", "replace").strip(" \t\"'"))
+        except ValueInvalid as error:
+            blame(row, name, str(error))
+    return numbers

@@ -209,6 +209,8 @@ class Run:
 
     def _times(self, at: int) -> Ints:
         """Read the stamps of the rows."""
+        if self.block.times is not None:
+            return self.block.times
         stamps, column = self.block.stamps[at], self.plan.timed.column if self.plan.timed else ""
         in_ns = self.plan.timed is not None and self.plan.timed.in_ns
         times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=in_ns)
@@ -296,6 +298,12 @@ class Run:
 
     def _keep(self, kept: Flags) -> None:
         self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
+
+    def refuse(self, rows: Sequence[int], reason: str) -> None:
+        """Take results back: these rows are bad."""
+        for row in rows:
+            self._blame(row, "", reason)
+        self._keep(~np.isin(self.rows, rows))
 
     def first_fault(self) -> int | None:
         """Return the place of the first bad row, if the run stops there."""

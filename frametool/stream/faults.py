@@ -46,12 +46,21 @@ class BadRow(FormatError):
     """Report a bad row; if it ended the run, the rows before it are out.
 
     fate: what became of it: `row skipped`, `no result`, or "" if the run ended
+    counted: what the number of its place counts: `line`, or `row` where there are no lines
     """
 
-    def __init__(self, fault: Fault, reason: str, *, source: str, fate: str = "") -> None:
+    def __init__(self, fault: Fault, reason: str, *, source: str, fate: str = "", counted: str = "line") -> None:
         """Take place and kind of a fault; `reason` is its long or its short one."""
         super().__init__(f"{reason} ({fate})" if fate else reason, source=source, line=fault.line)
         self.fault = fault
+        self.counted = counted
+
+    def __str__(self) -> str:
+        """Return `source:line:column: message`, or `source: row 17, column x: message`."""
+        if self.counted == "line":
+            return super().__str__()
+        column = f", column {self.fault.column}" if self.fault.column else ""
+        return f"{self.source}: {self.counted} {self.line}{column}: {self.message}"
 
     @property
     def kind(self) -> str:
@@ -61,7 +70,10 @@ class BadRow(FormatError):
     def details(self) -> dict[str, object]:
         """Return the place, whose column has a name or a number."""
         column = self.fault.column
-        return super().details() | ({"column": int(column) if column.isdecimal() else column} if column else {})
+        place = super().details()
+        if self.counted != "line":
+            place = {"source": self.source, self.counted: self.line}
+        return place | ({"column": int(column) if column.isdecimal() else column} if column else {})
 
 
 class RowsSkipped(FrametoolError):
@@ -83,16 +95,19 @@ class BadRows:
     on_error: STOP, SKIP or NULL
     most: how many are reported
     tell: what reports them
+    counted: what their numbers count: lines, or rows
     """
 
     def __init__(
-        self, source: str, on_error: str = STOP, *, most: int = MOST, tell: Callable[[FrametoolError], None]
-    ) -> None:
+        self, source: str, on_error: str = STOP, *, most: int = MOST, tell: Callable[[FrametoolError], None],
+        counted: str = "line",
+    ) -> None:  # fmt: skip
         """Create an empty count."""
         self.source = source
         self.on_error = on_error
         self.most = most
         self.tell = tell
+        self.counted = counted
         self.count = 0
         self._has_listed = False  # the list of what there is stands in the first message only
         self._fate = "row skipped" if on_error == SKIP else "no result"
@@ -102,9 +117,15 @@ class BadRows:
         for fault in faults:
             self.count += 1
             if self.on_error == STOP or fault.final:
-                raise BadRow(fault, self._reason(fault), source=self.source)
+                raise BadRow(fault, self._reason(fault), source=self.source, counted=self.counted)
             if self.count <= self.most:
-                self.tell(BadRow(fault, self._reason(fault), source=self.source, fate=self._fate))
+                self.tell(
+                    BadRow(fault, self._reason(fault), source=self.source, fate=self._fate, counted=self.counted)
+                )
+
+    def place(self, number: int) -> str:
+        """Name a line or a row."""
+        return f"{self.source}:{number}" if self.counted == "line" else f"{self.source}: {self.counted} {number}"
 
     def finish(self, rows: int) -> int:
         """Report the final count of a run of so many rows; return its exit status."""

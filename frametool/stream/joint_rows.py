@@ -101,7 +101,7 @@ class JointRows:
         if joint.lower is None or joint.upper is None or joint.lower > joint.upper or joint.name in self._beyond:
             return
         middle = 0.5 * (joint.lower + joint.upper)
-        if xp.largest(value.plain - middle) > joint.upper - middle + SLACK:
+        if xp.furthest(value.plain - middle) > joint.upper - middle + SLACK:
             self._beyond.add(joint.name)
             unit = "rad" if joint.kind in TURNING else "m"
             warn(f"joint {shown(joint.name)} goes beyond its limits {joint.lower:g} .. {joint.upper:g} {unit}")

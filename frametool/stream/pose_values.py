@@ -15,10 +15,17 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.table_poses import RowPoses
 from frametool.text.cells import without_quotes
+from frametool.text.shortest import shortest_spans
+from frametool.text.shortest_single import rounded_to_single
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from frametool.stream.table_poses import Cells
+    from frametool.text.array_types import Ints
 
 
 def first_of(block: RowPoses) -> RowPoses:
@@ -27,16 +34,41 @@ def first_of(block: RowPoses) -> RowPoses:
 
 
 def kept(block: RowPoses, rows: slice) -> RowPoses:
+    """Return some poses of a block that follow one another."""
+    size = len(block.numbers)
+    return _with_cells(
+        block, rows, *(each[rows] if len(each) == size else each for each in (block.parents, block.names))
+    )
+
+
+def chosen_poses(block: RowPoses, rows: Ints) -> RowPoses:
     """Return some poses of a block."""
     size = len(block.numbers)
+    if len(rows) == size:
+        return block
+    names = [
+        [each[row] for row in rows.tolist()] if len(each) == size else each for each in (block.parents, block.names)
+    ]
+    return _with_cells(block, rows, *names)
+
+
+def _with_cells(
+    block: RowPoses, rows: slice | Ints, parents: Sequence[str | None], names: Sequence[str | None]
+) -> RowPoses:
+    """Return some poses of a block with these names."""
     return block._replace(
         numbers=block.numbers[rows],
         stamps_ns=None if block.stamps_ns is None else block.stamps_ns[rows],
         lines=block.lines[rows],
-        parents=block.parents[rows] if len(block.parents) == size else block.parents,
-        names=block.names[rows] if len(block.names) == size else block.names,
-        extras={name: Spans(each.data, each.starts[rows], each.ends[rows]) for name, each in block.extras.items()},
+        parents=parents,
+        names=names,
+        extras={name: cells_at(each, rows) for name, each in block.extras.items()},
     )
+
+
+def cells_at(cells: Cells, rows: slice | Ints) -> Cells:
+    """Return some cells of a column."""
+    return Spans(cells.data, cells.starts[rows], cells.ends[rows]) if isinstance(cells, Spans) else cells[rows]
 
 
 def block_of(results: Sequence[Result]) -> RowPoses:
@@ -57,6 +89,34 @@ def block_of(results: Sequence[Result]) -> RowPoses:
         [name],
         {each: spans_of(images if each == IMAGE else blank) for each in sorted(others)},
     )
+
+
+def block_of_points(records: Sequence[dict[str, Any]]) -> RowPoses:
+    """Return mappings of points or vectors as a block; raises ValueInvalid for what is neither."""
+    kind = next((kind for kind in ("point", "vector") if records and kind in records[0]), "point")
+    rows = [_coordinates(record, kind) for record in records]
+    others = list(dict.fromkeys(key for record in records for key in record if key not in (kind, "frame", *"xyz")))
+    return RowPoses(
+        np.array(rows, np.float64).reshape(-1, 3),
+        None,
+        np.arange(len(rows)),
+        [record.get("frame") for record in records],
+        [None],
+        {each: spans_of([_cell(record.get(each)) for record in records]) for each in others},
+    )
+
+
+def _coordinates(record: dict[str, Any], kind: str) -> list[float]:
+    """Return the three numbers of a point, as a list, as a mapping, or under x, y, z."""
+    given = record.get(kind, record)
+    numbers = given if isinstance(given, list) else [given.get(name) for name in "xyz"] if given else []
+    if len(numbers) != 3 or not all(isinstance(number, float) for number in numbers):
+        raise ValueInvalid(f"columns hold points or poses, found {', '.join(record)}")
+    return numbers
+
+
+def _cell(value: Any) -> bytes:
+    return b"" if value is None else str(value).encode()
 
 
 def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
@@ -84,12 +144,24 @@ def spans_of(texts: list[bytes]) -> Spans:
     return Spans(framed(b"".join(texts)), ends - lengths, ends)
 
 
-def texts_of(cells: Spans) -> list[str]:
-    """Return the text of each cell, without its quotes."""
+def texts_of(cells: Cells) -> list[str]:
+    """Return the text of each cell, without its quotes; of numbers the shortest that reads back."""
+    if not isinstance(cells, Spans) and cells.dtype.kind != "f":
+        texts: list[str] = cells.astype(np.str_).tolist()
+        return [text.lower() for text in texts] if cells.dtype.kind == "b" else texts
+    if not isinstance(cells, Spans):
+        cells = float_spans(cells)
     bare = without_quotes(cells)
     data = bare.data.tobytes()
     places = zip(bare.starts.tolist(), bare.ends.tolist(), strict=True)
     return [data[start:end].decode("utf-8", "replace").strip().replace('""', '"') for start, end in places]
+
+
+def float_spans(values: NDArray[Any]) -> Spans:
+    """Write floats as the shortest text that reads back to the same float of their type."""
+    doubles = values.astype(np.float64) if values.dtype.itemsize > 4 else rounded_to_single(values.astype(np.float64))
+    spans = shortest_spans(doubles.reshape(-1, 1), b",")
+    return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
 
 
 def plain_cell(text: str) -> str | Verbatim | None:

@@ -5,6 +5,7 @@ Knows no syntax: what a format found is spans of text, what it wants written is 
 
 from __future__ import annotations
 
+from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -47,6 +48,7 @@ class Block(NamedTuple):
     bad: rows whose names do not fit: column and reason
     lost: the first row whose result cannot name a frame, and that frame
     values, times: (n, c) and (n,) the numbers and the stamps in nanoseconds themselves, where they are no text
+    weights: (n,) the numbers beside them, where they are no text
     """
 
     numbers: Spans
@@ -61,6 +63,7 @@ class Block(NamedTuple):
     lost: Sequence[tuple[int, str]] = ()
     values: Floats | None = None
     times: Ints | None = None
+    weights: Floats | None = None
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:
@@ -121,7 +124,8 @@ def chosen(spans: Spans, rows: Ints) -> Spans:
 
 
 def texts_as_rows(odd: Sequence[tuple[int, bytes]]) -> tuple[Ints, list[Spans]]:
-    """Return texts as rows at their places."""
+    """Return texts as rows in the order of their places."""
+    odd = sorted(odd, key=itemgetter(0))
     lengths = np.array([len(text) for _, text in odd], np.int64)
     ends = np.cumsum(lengths) + MARGIN
     data = framed(b"".join(text for _, text in odd))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import shown, warn
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
+from frametool.text.ranges import Range, content
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -68,7 +69,7 @@ class Outcome(NamedTuple):
     is_open: whether an array goes on behind the block; None for what is no array
     """
 
-    text: bytes
+    text: bytes | memoryview
     faults: Sequence[Fault] = ()
     rows: int = 0
     lines: int = 0
@@ -80,7 +81,10 @@ class Outcome(NamedTuple):
 
 
 def run(
-    outcomes: Iterable[Outcome], write: Callable[[bytes], None], bad: BadRows, advance: Callable[[int, int], None]
+    outcomes: Iterable[Outcome],
+    write: Callable[[bytes | memoryview], None],
+    bad: BadRows,
+    advance: Callable[[int, int], None],
 ) -> int:
     """Write what becomes of each block, report its faults, and return the exit status.
 
@@ -99,7 +103,7 @@ def run(
             told.add(note.about)
             bad.take(fault for fault in faults if fault.line < line + note.line)
             faults = [fault for fault in faults if fault.line >= line + note.line]
-            warn(f"{bad.source}:{line + note.line}: {note.sentence}")
+            warn(f"{bad.place(line + note.line)}: {note.sentence}")
         bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
     if mended > 1:
@@ -107,10 +111,10 @@ def run(
     return bad.finish(rows)
 
 
-def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:
+def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes | Range], jobs: int) -> Iterator[Outcome]:
     """Process blocks in order, over several processes if asked for."""
     if jobs < 2:
-        return map(process, blocks)
+        return map(process, map(content, blocks))
     from frametool.stream.workers import spread
 
     return spread(process, blocks, jobs)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,12 +23,16 @@ from frametool.text.cells import torn_record
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from frametool.stream.output_columns import Layout
     from frametool.stream.request import Request
     from frametool.stream.run import RowNote
     from frametool.stream.table_stream import Begun
     from frametool.text.array_types import Floats, Ints
     from frametool.text.spans import Spans
+
+    Cells: TypeAlias = Spans | NDArray[Any]
 
 
 class RowPoses(NamedTuple):
@@ -38,7 +42,7 @@ class RowPoses(NamedTuple):
     stamps_ns: (n,) or None where rows have none
     lines: (n,) from 0
     parents, names: one a row, one for all, or none
-    extras: columns that are not ours, by name
+    extras: columns that are not ours, by name: cells of text, or numbers as they are
     given: the frames that the rows of the input are given in
     """
 
@@ -47,7 +51,7 @@ class RowPoses(NamedTuple):
     lines: Ints
     parents: Sequence[str | None]
     names: Sequence[str | None]
-    extras: Mapping[str, Spans]
+    extras: Mapping[str, Cells]
     given: Sequence[str | None] = ()
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as some
 
 from frametool.documents import json_reader, limits, source, yaml_events
 from frametool.documents.document import explain_scalar, format_error, locate, locate_many, parse_documents
+from frametool.documents.json_writer import dump
 from frametool.documents.nodes import parse_nodes
 from frametool.documents.source import decode, read_text
 from frametool.errors import FileProblem, FormatError
@@ -369,3 +370,9 @@ def test_many_frames_are_read() -> None:
     line, column = locate(document.source.text, (0, "frames", 1999, "rpy_deg", 2))
     assert document.source.text.split("\n")[line - 1][column - 1 :] == "-4.9959]}"
     assert line == 2001
+
+
+@pytest.mark.parametrize("text", ["", "base_link", "-1.5", 'a"b', "a\\b", "a/b", "\u00e9", "\x7f", "\n", "\ud800", *map(chr, range(128))])
+def test_texts_are_written_as_json_writes_them(text: str) -> None:
+    assert json.loads(dump(text)) == text
+    assert dump(text) == json.dumps(text, ensure_ascii=not text.isprintable())

@@ -87,8 +87,11 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
 
     row = FORMATS[name]
     functions = {"poses": "write_poses", "points": "write_points", "tree": "write_tree", "report": "write_points"}
-    functions["trajectory"] = "write_poses"
+    functions |= {"trajectory": "write_poses", "arrays": "create"}
+    if "arrays" in row.writes:  # poses and points are columns there
+        functions |= {"poses": "create", "points": "create"}
     assert all(hasattr(import_module(row.writer), functions[what]) for what in row.writes)
+    assert "arrays" not in row.reads or hasattr(import_module(row.reader), "open_columns")
     assert "tree" not in row.reads or hasattr(import_module(row.reader), "read")
     assert row.summary
 
@@ -97,6 +100,7 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a tree in YAML": (b"# robot\nframes:\n  a:\n", "tree", "yaml"),
     "a tree in JSON": (b'{"angles": "deg",\n "frames": []}', "tree", "json"),
     "a tree in JSON on one line, with what messages have": (b'{"frames": [{"child_frame_id": 1}]}\n', "tree", "json"),
+    "an array of numpy": (b"\x93NUMPY\x01\x00v\x00{'descr'", "arrays", "npy"),
     "echo behind noise": (b"WARNING: topic [/tf] x\n\n---\ntransforms:\n- header:\n", "tree", "echo"),
     "echo in UTF-16": ("transforms:\n- header:\n".encode("utf-16"), "tree", "echo"),
     "echo in flow style": (b"transforms: [{header: ..", "tree", "echo"),
@@ -308,6 +312,11 @@ KNOWN: dict[str, tuple[bytes, str]] = {
     "camera_info": (b"image_width: 640\ncamera_matrix: {rows: 3}\nprojection_matrix: {rows: 3}\n", "camera_info"),
     "camera_info as echo prints it": (b"header:\n  frame_id: a\nheight: 4\ndistortion_model: plumb_bob\n---\n", "camera_info"),
     "camera_info as ini": (b"# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n", "camera_info"),
+    "Kalibr without places": (b"cam0:\n  camera_model: pinhole\n  distortion_coeffs: [0, 0, 0, 0]\n  rostopic: /a\n", "intrinsics"),
+    "COLMAP's cameras": (b"# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n1 SIMPLE_PINHOLE 3072 2304 2559.81 1536 1152\n", "cameras"),
+    "FAST-LIO": (b"mapping:\n  acc_cov: 0.1\n  extrinsic_T: [0, 0, 0]\n  extrinsic_R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n", "lio"),
+    "LIO-SAM": (b"lio_sam:\n  imuTopic: imu\n  extrinsicTrans: [0, 0, 0]\n  extrinsicRot: [-1, 0, 0, 0, 1, 0, 0, 0, -1]\n", "lio"),
+    "LIO-SAM of ROS 2": (b"/**:\n  ros__parameters:\n    extrinsicRot: [-1, 0, 0, 0, 1, 0, 0, 0, -1]\n", "lio"),
     "a map": (b"image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\n", "map"),
     "USD in ASCII": (b'#usda 1.0\n(\n)\ndef Xform "World"\n', "usd"),
     "USD in binary": (b"PXR-USDC" + bytes(80), "usd"),

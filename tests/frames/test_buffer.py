@@ -322,3 +322,16 @@ def test_tf2_follows_a_loop_as_far_as_it_does() -> None:
 def test_an_unknown_policy_names_the_known_ones() -> None:
     with pytest.raises(ValueInvalid, match="frametool, ros1, ros2"):
         TransformBuffer(policy="ros3")
+
+
+def test_a_rotation_looked_up_between_samples_is_their_slerp_to_the_bit() -> None:
+    samples = Transform.random(40, seed=3)
+    buffer = TransformBuffer()
+    for number, sample in enumerate(samples):
+        buffer.insert("map", "base", sample, EPOCH + 1000 * number)
+    for number in range(39):
+        start, end = samples[number].rotation, samples[number + 1].rotation
+        for after in (0, 1, 250, 500, 999, 1000):
+            at_ns = EPOCH + 1000 * number + after
+            expected = start.slerp(end, after / 1000).as_quaternion().tolist()
+            assert buffer.lookup("map", "base", at_ns).xyzw.tolist() == expected

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import pickle
 import subprocess
 import sys
 import tracemalloc
@@ -317,12 +315,6 @@ def test_one_axis_takes_many_angles_and_one_direction_many_others() -> None:
     assert np.allclose(turns.as_rpy(), [[0.0, 0.0, 0.1], [0.0, 0.0, 0.2]], rtol=0.0, atol=1e-16)
     ends = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     assert np.allclose(Rotation.between([1.0, 0.0, 0.0], ends).apply([1.0, 0.0, 0.0]), ends, rtol=0.0, atol=1e-15)
-
-
-def test_values_copy_and_pickle() -> None:
-    for value in (Transform.random(seed=1), Transform.random(3, seed=1)):
-        for again in (copy.copy(value), pickle.loads(pickle.dumps(value))):  # noqa: S301 - our own bytes
-            assert np.all(again.is_close(value, angle=0.0, distance=0.0))
 
 
 def test_axes_of_the_field_take_the_forward_direction_where_it_is() -> None:

@@ -177,6 +177,44 @@ def test_a_way_walked_at_many_fractions() -> None:
     assert_same(segment.along, joined(ways, within * 2))
 
 
+def test_a_way_prepared_once_is_the_slerp_of_its_ends() -> None:
+    prepare: Callable[..., Any] = segment.prepare
+    unit: Callable[..., Any] = quaternion.unit
+    slerp: Callable[..., Any] = quaternion.slerp
+    along: Callable[..., Any] = segment.along
+    for way, (fraction,) in zip(WAYS, MANY_FRACTIONS * 2, strict=False):
+        if 0.0 < fraction < 1.0:
+            pose: Any = (*way[:7], *prepare(*way, floats))
+            walked = along(*pose, fraction, floats)
+            assert unit(*walked[3:], floats) == slerp(*way[3:7], *way[10:], fraction, floats)
+
+
+SPECIAL: Any = np.array([0.0, -0.0, 1.5, -1.5, math.inf, -math.inf, math.nan, 5e-324, -1e308])
+
+
+@pytest.mark.parametrize("yes", [SPECIAL, 2.0, -0.0])
+@pytest.mark.parametrize("no", [SPECIAL[::-1], math.inf, 0.0])
+def test_choices_by_bits_are_those_of_numpy(yes: Any, no: Any) -> None:
+    conditions: list[Any] = [SPECIAL > 0.0, SPECIAL < 9.0, np.zeros(9, bool), np.ones(9, bool), np.True_, True]
+    for condition in conditions:
+        expected = np.broadcast_to(np.where(condition, yes, no), np.shape(arrays.where(condition, yes, no)))
+        for found in (arrays.where(condition, yes, no), arrays.where(arrays.mask(condition), yes, no)):
+            assert np.array_equal(np.array(found).view(np.int64), np.array(expected, np.float64).view(np.int64))
+
+
+def test_signs_and_guards_by_bits_are_those_of_floats() -> None:
+    for size in (0.0, 1.0, math.pi, math.inf):
+        assert bits(np.array([arrays.copysign(size, SPECIAL)])) == bits([[math.copysign(size, x) for x in SPECIAL]])
+        assert bits([arrays.copysign(np.full(9, size), SPECIAL)]) == bits([[math.copysign(size, x) for x in SPECIAL]])
+    finite = SPECIAL[np.isfinite(SPECIAL)]
+    for centre in (0.0, 1.0):
+        assert arrays.furthest(finite, centre) == max(floats.furthest(x, centre) for x in finite.tolist())
+        assert math.isnan(arrays.furthest(SPECIAL, centre))
+        assert arrays.furthest(np.empty(0), centre) == 0.0
+    assert arrays.least(finite) == -1e308
+    assert math.isnan(arrays.least(SPECIAL))
+
+
 def test_neighbours_that_are_no_angles_or_far_ones_change_nothing() -> None:
     alone = bits([trig.half_sincos(angle, floats) for angle in (0.3, -0.0)])
     for odd in (math.nan, math.inf, 1e30):

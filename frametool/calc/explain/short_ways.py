@@ -100,7 +100,7 @@ def matrix_to_axis_angle(
     sheet: Sheet, numbers: Sequence[float], _axes: str, _degrees: bool, wanted: bool  # noqa: FBT001
 ) -> Sequence[float] | None:
     """Read the angle off the trace and the axis off the differences; None beside half a turn, where both vanish."""
-    if _near_half_turn(*numbers):
+    if _near_half_turn(rows(numbers)):
         return None
     values = dict(zip(ENTRIES, nearest_rotation(sheet, numbers), strict=True))
     sheet.heading("Matrix to axis and angle, by the trace")
@@ -118,9 +118,8 @@ def matrix_to_axis_angle(
     return values["vx"], values["vy"], values["vz"], found
 
 
-def _near_half_turn(
-    r11: float, r12: float, r13: float, r21: float, r22: float, r23: float, r31: float, r32: float, r33: float
-) -> bool:
+def _near_half_turn(matrix: Matrix) -> bool:
+    (r11, r12, r13), (r21, r22, r23), (r31, r32, r33) = matrix
     return r11 + r22 + r33 < 1.0 and max(abs(r32 - r23), abs(r13 - r31), abs(r21 - r12)) < NEAR_HALF_TURN
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from frametool.cli.cloud_files import clouds_of
 from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.completions import ColumnNames
 from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options
@@ -13,7 +14,7 @@ from frametool.cli.explaining import given as given_as_written
 from frametool.cli.output import Output
 from frametool.cli.pasted_input import is_inline, is_pasted
 from frametool.cli.poses import one_pose, pose_source, usage_if_inline, values_of
-from frametool.cli.reading_options import reading_options
+from frametool.cli.reading_options import array_option, reading_options
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
@@ -65,6 +66,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
 @reading_options(streams=True)
+@array_option
 @stream_options
 def command(
     arguments: tuple[str, ...],
@@ -89,13 +91,13 @@ def command(
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
       ros2 topic echo /clicked_point | frametool apply tf.txt map
 
-    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point; ROS messages go
-    by their headers (frametool help records). Without SOURCE each record says its own frame; without records standard
-    input is read.
+    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point (help records).
+    Without SOURCE records say their own frame. Without records -i FILE, also a cloud's, or stdin is read.
     """
     stream, explaining = Stream(options), Explaining(options)
     output = Output("points", "trajectory", deg=deg, **options)
     plan = explaining.plan(output, stream) if explaining else None
+    clouds = clouds_of(stream, output) if stream.path else None
     if pose is None:
         way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize), at)
     elif time_column is not None or at is not None:
@@ -104,6 +106,10 @@ def command(
         way, rest = _way_by_pose(pose, stream.given, degrees=deg, normalize=normalize), arguments
     if time_column is not None:
         _check_timed(rest, at)
+    if clouds is not None:
+        if rest not in ((), ("-",)) or time_column or frame_column or kinds or plan is not None:
+            raise click.UsageError("the clouds of a bag move at their own stamps, from their own frames; no records")
+        return clouds.run(way.from_frame, way.target)
     kind = _kind(kinds, stream)
     if plan is not None:
         records = list(_sources(rest, kind))

@@ -25,7 +25,7 @@ function doubled_sincos(y) {
   return [Math.sqrt(1 - squared_sine) * 2 * sine, cosine];
 }
 
-function half_sincos(angle) {  // here |angle| <= pi: the arcs of slerp are not longer
+function half_sincos(angle) {  // here |angle| <= pi: whole turns of a joint are taken off
   return doubled_sincos(0.25 * angle);
 }
 
@@ -103,16 +103,14 @@ function inverse(pose) {
   return [0 - x, 0 - y, 0 - z, ...q];
 }
 
-function along(a, b, fraction) {  // from sample a to sample b: `prepare`, then `along`
-  const lengths = [-1, 1].map((k) => Math.sqrt(squared_norm(...[3, 4, 5, 6].map((part) => b[part] + k * a[part]))));
-  const apart = 0.5 * Math.min(...lengths), near = 0.5 * Math.max(...lengths);
-  const dot = a[3] * b[3] + a[4] * b[4] + a[5] * b[5] + a[6] * b[6];
-  const theta = 2 * incline(apart, near), arc = 2 * theta;
-  const scale = apart === 0 ? 0 : 1 / (2 * apart * near);
-  const to = (dot < 0 ? -1 : 1) * scale, back = (near - apart) * (near + apart) * scale;
-  const [sine, cosine] = half_sincos(fraction * arc);
+function along(a, b, fraction) {  // from sample a to sample b: `toward`, then `along`
+  const q = rotation(a), to = rotation(b), dot = q[0] * to[0] + q[1] * to[1] + q[2] * to[2] + q[3] * to[3];
+  const lengths = [-1, 1].map((k) => Math.sqrt(squared_norm(...to.map((part, at) => part + k * q[at]))));
+  const apart = Math.max(0.5 * Math.min(...lengths), TINY), near = 0.5 * Math.max(...lengths);
+  const sign = dot < 0 ? -1 : 1, ahead = 0.5 / (apart * near), beside = apart / near;
+  const [sine, cosine] = doubled_sincos(fraction * incline(apart, near));
   return [0, 1, 2].map((k) => a[k] + fraction * (b[k] - a[k]))
-    .concat([3, 4, 5, 6].map((k) => cosine * a[k] + sine * (to * b[k] - back * a[k])));
+    .concat(q.map((part, at) => cosine * part + sine * (ahead * (sign * to[at] - part) + beside * part)));
 }
 
 // ---- euler.py (sxyz), axis_angle.py, rotvec.py

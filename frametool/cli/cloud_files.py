@@ -1,0 +1,174 @@
+"""`apply` on the clouds of a bag: each message moved at its stamp, and written into a file of its own."""
+
+from __future__ import annotations
+
+import os
+import re
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.command import READING
+from frametool.cli.sink import writing
+from frametool.cli.stderr import say, say_warning
+from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
+from frametool.formats import BAG, FORMATS, by_suffix, holds_arrays, writers
+from frametool.formats.detect import of_folder
+from frametool.stream.faults import Fault
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frametool.cli.output import Output
+    from frametool.cli.streaming import Stream
+    from frametool.geometry.types import Rigid
+    from frametool.ros.point_clouds import PointCloud
+    from frametool.stream.faults import BadRows
+
+PLACES = ("stamp_ns", "stamp", "number", "topic", "frame")
+_HEAD = 64
+_UNUSED = {"columns": "--columns", "keep": "--keep", "prefix": "--prefix", "given": "--from"}
+
+
+class BagOfClouds:
+    """The clouds of a bag that -i names, and the files that they become."""
+
+    def __init__(self, path: str, output: Output, stream: Stream) -> None:
+        """Open the bag and choose its topics; of --topic, what names no clouds is left to the tree."""
+        from frametool.grammar.edges import Tally
+        from frametool.ros.bags import opened_bag
+        from frametool.ros.point_clouds import cloud_topics
+
+        self.path = path
+        self.output = output
+        self.stream = stream
+        if unused := [option for name, option in _UNUSED.items() if stream.options.get(name)]:
+            raise click.UsageError(f"{', '.join(unused)}: clouds say themselves what their columns are")
+        if output.path in (None, "-") or not holds_arrays(output.told or ""):
+            forms = ", ".join(writers("arrays"))
+            raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; forms: {forms}")
+        self.pattern = str(output.path)
+        _check(self.pattern)
+        self.tally = Tally()
+        self.kept = ExitStack()
+        self.reader = self.kept.enter_context(opened_bag(path, self.tally))
+        context = click.get_current_context()
+        reading = context.meta.setdefault(READING, {})
+        chosen = reading.get("topics", ())
+        try:
+            self.topics = cloud_topics(self.reader, chosen, path)
+        except BaseException:
+            self.kept.close()
+            raise
+        ours = {topic.strip("/") for topic in self.topics}
+        reading["topics"] = tuple(topic for topic in chosen if topic.strip("/") not in ours)
+        self.names: dict[str, int] = {}
+
+    def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None) -> int:
+        """Move and write cloud after cloud; return the exit status.
+
+        pose_of: the pose that moves what is given in a frame at a time
+        """
+        from frametool.ros.point_clouds import read_clouds
+
+        bad = self.stream.policy(self.path, "message")
+        count = points = 0
+        said: set[str] = set()
+
+        def once(message: str, rule: str, kind: type[FrametoolWarning]) -> None:
+            if message not in said:
+                said.add(message)
+                say_warning(message, rule, kind)
+
+        with self.kept, heard_by(once):
+            for cloud in read_clouds(self.reader, self.topics, self.path, self.tally):
+                count += 1
+                if isinstance(cloud, FormatError):
+                    bad.take([Fault(cloud.line, "", cloud.message)])
+                    continue
+                points += self._write(cloud, pose_of, bad)
+            for told in self.tally.told():
+                once(f"{self.path}: {told.message}", told.rule, FrametoolWarning)
+        if not count:
+            raise FormatError(f"no messages on {', '.join(self.topics)}", source=self.path)
+        if not self.stream.options["quiet"]:
+            files = f"{len(self.names)} {'file' if len(self.names) == 1 else 'files'}"
+            where = f" in {target}" if target else ""
+            say(f"{self.path}: {points} points{where}, metres, in {files} ({', '.join(self.topics)})")
+        return bad.finish(count)
+
+    def _write(self, cloud: PointCloud, pose_of: Callable[[str | None, int | None], Rigid], bad: BadRows) -> int:
+        """Write one cloud; return how many points it has, 0 where the message is bad."""
+        from frametool.stream.cloud_messages import moved_cloud
+
+        try:
+            pose = pose_of(cloud.frame or None, cloud.stamp_ns)
+        except FrametoolError as error:
+            bad.take([Fault.of(cloud.number, "", error)])
+            return 0
+        name = self._name(cloud)
+        style = self.output.style.in_form(self.output.told or "")
+        faults: list[Fault] = []
+        with writing(name, force=self.output.force) as write:
+            for outcome in moved_cloud(cloud, pose, style, self.path):
+                faults += outcome.faults
+                if faults:
+                    break
+                write(outcome.text)
+            if faults:
+                reason = f"point {faults[0].line + 1}: {faults[0].reason}"
+                raise FormatError(f"message {cloud.number}: {reason}", source=self.path)
+        self.names[name] = cloud.number
+        return len(cloud.rows)
+
+    def _name(self, cloud: PointCloud) -> str:
+        """Return the name of a cloud's file; raises FormatError for one that another has."""
+        name = re.sub(r"\{(\w+)\}", lambda found: _filled(found[1], cloud), self.pattern)
+        if name in self.names:
+            first, remedy = self.names[name], "{number}" if "{" in self.pattern else "{stamp_ns}"
+            raise FormatError(
+                f"messages {first} and {cloud.number} would both become {shown(name)}; put {remedy} into its name",
+                source=self.path,
+            )
+        return name
+
+
+def _filled(place: str, cloud: PointCloud) -> str:
+    """Return what stands in a place of a pattern; a slash or two dots would be another folder."""
+    seconds, below = divmod(cloud.stamp_ns, 1_000_000_000)
+    values = {
+        "stamp_ns": str(cloud.stamp_ns), "stamp": f"{seconds}.{below:09d}", "number": f"{cloud.number:06d}",
+        "topic": cloud.topic.strip("/"), "frame": cloud.frame,
+    }  # fmt: skip
+    return re.sub(r"[/\0]|^\.+", "_", values[place])
+
+
+def _check(pattern: str) -> None:
+    """Refuse places that have no meaning."""
+    for place in re.findall(r"\{(\w*)\}", pattern):
+        if place not in PLACES:
+            known = ", ".join(f"{{{each}}}" for each in PLACES)
+            raise click.UsageError(f"-o {pattern}: {{{place}}} has no meaning; there are {known}")
+
+
+def clouds_of(stream: Stream, output: Output) -> BagOfClouds | None:
+    """Return the clouds of a bag if -i names one."""
+    path = stream.path
+    return BagOfClouds(path, output, stream) if path is not None and _is_bag(path) else None
+
+
+def _is_bag(path: str) -> bool:
+    """Tell a bag by its first bytes, or as a folder."""
+    rows = [row for row in FORMATS.values() if row.reader == BAG]
+    if os.path.isdir(path):
+        form = of_folder(path)
+        return form is not None and FORMATS[form].reader == BAG
+    if not os.path.isfile(path):
+        return False
+    with open(path, "rb") as file:
+        head = file.read(_HEAD)
+    magics: list[Any] = [what for row in rows for kind, what in row.signs if kind == "magic"]
+    return any(re.match(magic, head, re.DOTALL) for magic in magics) or (
+        not head and by_suffix(path, tuple(name for name, row in FORMATS.items() if row.reader == BAG)) is not None
+    )

@@ -1,0 +1,469 @@
+"""Files of columns of numbers as streams: planned as tables are, evaluated in the same blocks, no text in between."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from frametool.errors import FormatError, ValueInvalid, listing, warn
+from frametool.formats.column_file import FLOATS, Made, MovesAlong, OutColumn
+from frametool.formats.structured import not_finite
+from frametool.stream.blocks import Run, State
+from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused
+from frametool.stream.header import XYZ
+from frametool.stream.output_columns import NAME, PARENT, Kept, New, quoted
+from frametool.stream.pose_values import spans_of, texts_of
+from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
+from frametool.stream.rows import Block
+from frametool.stream.run import Outcome, RowNote, notes_of
+from frametool.stream.stamp_source import in_nanoseconds
+from frametool.stream.table import Table
+from frametool.stream.table_names import Naming, rename_of
+from frametool.stream.table_plan import plan_table
+from frametool.stream.table_poses import RowPoses
+from frametool.stream.table_stream import moves_in_time, settle_stamps
+from frametool.stream.trajectory_columns import stamp_column
+from frametool.text.cells import Cells
+from frametool.text.spans import Spans, framed
+
+if TYPE_CHECKING:
+    from collections.abc import Generator, Iterator, Mapping, Sequence
+
+    from frametool.formats.column_file import Batch, ColumnFile, ColumnWriter, Kind
+    from frametool.grammar.result import Style
+    from frametool.stream.request import Request
+    from frametool.stream.table_names import BlockNames
+    from frametool.text.array_types import Flags, Floats, Ints
+
+NOTHING = np.zeros((0, 0), np.int64)
+DOUBLE = np.dtype(np.float64)
+
+
+class RowResults(NamedTuple):
+    """What became of a batch: the rows that are written, in their order.
+
+    rows: (n,) which of the batch's rows they are; None for all
+    numbers: (n, k) the results, nan where there is none
+    absent: (n,) for each shape, rows that have no numbers on purpose; None where all have
+    names: by role, the names of the results, one a row, where a column holds them
+    given: the frames that the rows are given in
+    """
+
+    rows: Ints | None
+    numbers: Floats
+    absent: Sequence[Flags | None]
+    names: Mapping[int, Sequence[str]]
+    given: Sequence[str | None]
+
+
+class ColumnRows:
+    """Turn the rows of one batch after the other into results; the bad ones are listed in `faults`.
+
+    faults, notes: of the last batch, rows from 0
+    """
+
+    def __init__(self, file: ColumnFile, request: Request, source: str) -> None:
+        """Plan the rows; raises FormatError or Misused as for a table of the same columns."""
+        self.file = file
+        self.source = source
+        names = file.names
+        self.table = Table(b",", names, file.width, header=tuple(quoted(name, b",") for name in names or ()))
+        request = _with_vectors(file, request)
+        try:
+            self.request, self.unasked = settle_stamps(self.table, request, source)
+            self.plan, self.layout = plan_table(self.table, self.request, source)
+        except FormatError as error:
+            error.line = 0  # the names of columns stand in no line here
+            raise
+        for place in self.layout.places:
+            if file.kind(place) is None:
+                raise Misused(f"column {self.table.name(place)} holds no numbers", source=source)
+        self.plan = self.plan._replace(pieces=())
+        self.naming = Naming(self.table, self.layout, self.request.for_kind(self.shape.kind))
+        self.state = State()
+        self.faults: list[Fault] = []
+        self.notes: list[RowNote] = []
+        self.mended = 0
+        self.narrow = self._narrow()
+        self.numbers = sum(isinstance(column, New) for column in self.layout.columns)
+
+    @property
+    def shape(self) -> Shape:
+        """Return what a row is, the first of several."""
+        return self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
+
+    def columns(self) -> list[OutColumn]:
+        """Return the columns of the output; what is read as float32 is written so, what is new is a double."""
+        found = []
+        for column in self.layout.columns:
+            if isinstance(column, Kept):
+                found.append(OutColumn(self._name(column.place), self.file.kind(column.place), column.place))
+            elif isinstance(column, New):
+                found.append(OutColumn(column.name if self.table.names else "", self._kind_of(column)))
+            else:
+                found.append(OutColumn(self._name(column.place), None))
+        return found
+
+    def named_columns(self) -> list[OutColumn]:
+        """Return the columns of the output, each with a name: those of a file without names get the usual ones."""
+        if self.table.names:
+            return self.columns()
+        targets = self.plan.targets
+        names = [name for each in targets for name in (*XYZ[: 3 * (each.unit is not None)], *each.names)]
+        return [
+            column._replace(
+                name=names[given.number] if isinstance(given, New) and given.number < len(names) else f"column_{at}"
+            )
+            for at, (column, given) in enumerate(zip(self.columns(), self.layout.columns, strict=True), 1)
+        ]
+
+    def _name(self, place: int) -> str:
+        return self.table.names[place] if self.table.names else ""
+
+    def _kind_of(self, column: New) -> Kind:
+        """Return the type of a result's numbers: that of the column it replaces; raises Misused for integers."""
+        place = self._replaced(column)
+        kind = DOUBLE if place is None else self.file.kind(place)
+        if kind is None or kind.kind not in FLOATS:
+            whole = f"column {column.name} holds {kind}, where the result would be rounded"
+            raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.source)
+        return kind
+
+    def _replaced(self, column: New) -> int | None:
+        """Return the place of the input's column whose numbers a result's replace."""
+        names = self.table.names
+        if names is None:  # an array of one type
+            return 0 if getattr(self.file.kind(0), "kind", "") in FLOATS else None
+        return names.index(column.name) if column.name in names else None
+
+    def _narrow(self) -> dict[int, Kind]:
+        """Return which numbers of the result are rounded to fewer digits than they are computed with."""
+        news = [column for column in self.layout.columns if isinstance(column, New)]
+        kinds = {column.number: self._kind_of(column) for column in news}
+        return {number: kind for number, kind in kinds.items() if kind.itemsize < DOUBLE.itemsize}
+
+    def of_batch(self, batch: Batch) -> RowResults:
+        """Return the results of a batch, and leave what is wrong with other rows in `faults`."""
+        size = batch.size
+        values, absent, bad = self._read(batch)
+        gone = self._without_pose(absent)
+        present = None if gone is None else np.flatnonzero(~gone)
+        names = self._names(batch)
+        times, late = self._times(batch)
+        weights = self._weights(batch, late)
+        block = Block(
+            Spans(framed(b""), NOTHING, NOTHING), (), np.arange(size), lambda row: row,
+            bad={**late, **names.bad, **bad}, frames=names.frames, lost=names.lost, values=values, times=times,
+            weights=weights,
+        )  # fmt: skip
+        run = Run(self.plan, block if present is None else _chosen(block, present), self.state)
+        self._round(run)
+        self.faults = run.faults()
+        self.notes = self._noted(run, block)
+        self.mended += len(run.mended)
+        return self._settled(run, size, present, absent, names)
+
+    def poses(self, batch: Batch) -> RowPoses:
+        """Return the results of a batch for another form, with what else its rows hold."""
+        results = self.of_batch(batch)
+        rows = np.arange(batch.size) if results.rows is None else results.rows
+        stamp_at = self.layout.time
+        found = stamp_column(self.table.names)
+        if stamp_at is None and found not in self.layout.frames and not self.file.vectors:
+            stamp_at = found  # `t` or `time` of a cloud is what its sensor counts, in whatever unit
+        stamps = None
+        if stamp_at is not None:
+            name = self.table.name(stamp_at)
+            stamps = batch.stamps(stamp_at, in_ns=in_nanoseconds(name))[0][rows]
+        used = {stamp_at, *self.layout.places, *self.naming.places}
+        extras = {
+            self.table.name(place): _cells(batch.column(place), rows)
+            for place in range(self.table.width)
+            if place not in used and self.table.names
+        }
+        rename = rename_of(self.request.for_kind(self.shape.kind))
+        unnamed = (None, None) if rename is None else rename(None, None)
+        names: list[Sequence[str | None]] = [[name] for name in unnamed]
+        for role, texts in results.names.items():
+            names[role] = [text or None for text in texts]
+        own = self.plan.targets[0].size if len(self.plan.shapes) > 1 else results.numbers.shape[1]
+        for column in self.layout.columns:
+            if isinstance(column, New) and column.number >= own:
+                extras[column.name] = results.numbers[:, column.number]
+        return RowPoses(results.numbers[:, :own], stamps, rows, names[PARENT], names[NAME], extras, results.given)
+
+    # --- what is read ---
+
+    def _read(self, batch: Batch) -> tuple[Floats, list[Flags | None], dict[int, tuple[str, str]]]:
+        """Return our numbers (n, c); for each shape which rows have none, which count as 0; and rows that are bad."""
+        places = self.layout.places
+        columns = np.empty((len(places), batch.size))
+        absent: list[Flags | None] = []
+        bad: dict[int, tuple[str, str]] = {}
+        first = 0
+        for shape in self.plan.shapes:
+            flags: Flags | None = None
+            for at in range(first, first + shape.size):
+                columns[at], missing = batch.numbers(places[at])
+                odd = not_finite(columns[at])
+                if odd is not None and not self.file.gaps:
+                    wrong = odd if missing is None else odd & ~missing
+                    bad |= dict.fromkeys(np.flatnonzero(wrong).tolist(), (self.plan.names[at], "not finite"))
+                else:
+                    missing = _either(missing, odd)
+                flags = _either(flags, missing)
+            if flags is not None:
+                columns[first : first + shape.size, flags] = 0.0
+            absent.append(flags)
+            first += shape.size
+        return columns.T, absent or [None], bad
+
+    def _without_pose(self, absent: Sequence[Flags | None]) -> Flags | None:
+        """Return which rows cannot be computed: 0 is a point, but no rotation."""
+        gone: Flags | None = None
+        for shape, flags in zip(self.plan.shapes, absent, strict=False):
+            if shape.notation is not None or self.plan.operation.formula is not None or self.plan.gathered is not None:
+                gone = _either(gone, flags)
+        return gone
+
+    def _names(self, batch: Batch) -> BlockNames:
+        """Read the names of rows, as the cells of a table."""
+        places = sorted({place for place in (*self.naming.places, *self.layout.frames) if place is not None})
+        texts = [[quoted(text, b",") for text in batch.texts(place)] for place in places]
+        spans = spans_of([text for each in texts for text in each])
+        starts = np.zeros((batch.size, self.table.width if places else 0), np.int64)
+        ends = starts.copy()
+        for at, place in enumerate(places):
+            rows = slice(at * batch.size, (at + 1) * batch.size)
+            starts[:, place], ends[:, place] = spans.starts[rows], spans.ends[rows]
+        none = np.zeros(0, np.int64)
+        return self.naming.of_block(Cells(spans.data, none, none, none, np.arange(batch.size), starts, ends))
+
+    def _times(self, batch: Batch) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
+        """Read the stamps of rows, and which of them have none."""
+        if self.layout.time is None or self._weighs:
+            return None, {}
+        name = self.table.name(self.layout.time)
+        times, reasons = batch.stamps(self.layout.time, in_ns=in_nanoseconds(name))
+        return times, {row: (name, reason) for row, reason in reasons.items()}
+
+    @property
+    def _weighs(self) -> bool:
+        return self.plan.gathered is not None and bool(self.plan.beside)
+
+    def _weights(self, batch: Batch, bad: dict[int, tuple[str, str]]) -> Floats | None:
+        """Read the weights of rows; those that are none are bad."""
+        if self.layout.time is None or not self._weighs:
+            return None
+        weights, nulls = batch.numbers(self.layout.time)
+        odd = _either(nulls, not_finite(weights))
+        if odd is not None:
+            name = self.table.name(self.layout.time)
+            bad |= dict.fromkeys(np.flatnonzero(odd).tolist(), (name, "not finite"))
+            weights[odd] = 0.0
+        return weights
+
+    # --- what becomes of it ---
+
+    def _round(self, run: Run) -> None:
+        """Find results that are too large for the type of their column: bad rows, no infinities."""
+        for number, kind in self.narrow.items():
+            with np.errstate(over="ignore"):
+                beyond = ~np.isfinite(run.results[:, number].astype(kind))
+            if beyond.any():
+                run.refuse(run.rows[beyond].tolist(), f"the result is too large for {kind}")
+
+    def _noted(self, run: Run, block: Block) -> list[RowNote]:
+        notes = notes_of(run, run.block)
+        if self.unasked is not None and len(block.places) and moves_in_time(self.unasked, set(block.frames) or {None}):
+            notes.append(RowNote.of_latest(0, self.unasked.name))
+            self.unasked = None
+        return sorted(notes)
+
+    def _settled(
+        self, run: Run, size: int, present: Ints | None, absent: Sequence[Flags | None], names: BlockNames
+    ) -> RowResults:
+        """Put the results of the rows that could be computed at their places among all that are written."""
+        computed = run.rows if present is None else present[run.rows]
+        bad = np.array([run.block.line_of(row) for row in run.reasons], np.int64)
+        written = np.ones(size, np.bool_)
+        if run.lone is not None:
+            written[run.block.line_of(run.lone)] = False
+        if self.plan.on_error == STOP and len(bad):
+            written[int(bad.min()) :] = False
+        elif self.plan.on_error == NULL and len(bad):
+            absent = [_either(flags, np.isin(np.arange(size), bad)) for flags in absent]
+        else:
+            written[bad] = False
+        numbers, rows = run.results, None
+        if len(computed) < size:
+            numbers = np.full((size, run.results.shape[1]), np.nan)
+            numbers[computed] = run.results
+        for flags, span in zip(absent, self._spans(), strict=True):
+            if flags is not None:
+                numbers[flags, span.start : span.stop] = np.nan
+        if not written.all():
+            rows = np.flatnonzero(written)
+            numbers = numbers[rows]
+            absent = [flags if flags is None else flags[rows] for flags in absent]
+        return RowResults(rows, numbers, absent, self._texts(names, rows), names.frames)
+
+    def _spans(self) -> list[range]:
+        """Return which numbers of the result come from each shape: all of one, if there is one result."""
+        targets = self.plan.targets
+        ends = np.cumsum([target.size for target in targets]).tolist()
+        if len(targets) == 1:
+            return [range(self.numbers)] * max(len(self.plan.shapes), 1)
+        return [range(end - target.size, end) for target, end in zip(targets, ends, strict=True)]
+
+    def absent_in(self, number: int, results: RowResults) -> Flags | None:
+        """Return which rows have no number in a column of the result."""
+        found: Flags | None = None
+        for flags, span in zip(results.absent, self._spans(), strict=True):
+            if number in span:
+                found = _either(found, flags)
+        return found
+
+    def _texts(self, names: BlockNames, rows: Ints | None) -> dict[int, list[str]]:
+        """Return the names of the results by role."""
+        found = {}
+        for role in (PARENT, NAME):
+            if self.naming.places[role] is not None and names.spans:
+                texts = texts_of(names.spans[role])
+                found[role] = texts if rows is None else [texts[row] for row in rows.tolist()]
+        return found
+
+
+def _with_vectors(file: ColumnFile, request: Request) -> Request:
+    """Ask for the vectors that turn with the points of a file, where its points are not named otherwise."""
+    there = [columns for columns in file.vectors if file.names and set(columns) <= set(file.names)]
+    if not there or not request.operation.moves or request.columns or request.kind not in ("", POINT):
+        return request
+    columns = (",".join(XYZ), *(",".join(each) for each in there))
+    kinds = (POINT, *[VECTOR] * len(there))
+    return request._replace(columns=columns, kinds=kinds, poses=len(columns), notations=())
+
+
+def _chosen(block: Block, rows: Ints) -> Block:
+    """Keep some rows of a block, which count on as they did."""
+    numbers = rows.tolist()
+    at = {row: place for place, row in enumerate(numbers)}
+    return block._replace(
+        values=None if block.values is None else block.values[rows],
+        places=np.arange(len(rows)),
+        line_of=numbers.__getitem__,
+        bad={at[row]: why for row, why in block.bad.items() if row in at},
+        frames=[block.frames[row] for row in numbers] if block.frames else (),
+        lost=[(at[row], name) for row, name in block.lost if row in at],
+        times=None if block.times is None else block.times[rows],
+        weights=None if block.weights is None else block.weights[rows],
+    )
+
+
+def _cells(column: Any, rows: Ints) -> Any:
+    """Return some of a column as it is, of texts as cells."""
+    if isinstance(column, np.ndarray) and column.dtype.kind not in "USO":
+        return column[rows]
+    return spans_of([str(column[row]).encode() for row in rows.tolist()])
+
+
+def _either(first: Flags | None, second: Flags | None) -> Flags | None:
+    if first is None or second is None:
+        return first if second is None else second
+    return first | second
+
+
+def run_columns(
+    file: ColumnFile, request: Request, style: Style, *, source: str, into: Any = None
+) -> Generator[Outcome]:
+    """Yield what becomes of a file's batches in a file of the same form, or in that of a module, `into`."""
+    rows = ColumnRows(file, request, source)
+    columns = rows.columns() if into is None else rows.named_columns()
+    move_along(file, request)
+    if rows.narrow and not request.gathered:
+        kinds = ", ".join(sorted({kind.name for kind in rows.narrow.values()}))
+        warn(f"{source}: {kinds} columns are computed as float64 and rounded once")
+    drops = request.on_error == SKIP or request.operation.velocity
+    writer: ColumnWriter | None = None
+    if into is not None:
+        writer = _InOtherForm(columns, into, style)
+    elif not request.gathered:
+        writer = file.rewriter(columns, style, drops=drops)
+    for batch in file.batches():
+        results = rows.of_batch(batch)
+        text: Any = b""
+        if writer is not None:
+            text = writer.of_rows(batch, results.rows, made_of(columns, rows, results))
+        yield Outcome(
+            text, rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read,
+        )  # fmt: skip
+        rows.mended = 0
+    if writer is not None:
+        ended = writer.end()
+        for piece in (ended,) if isinstance(ended, bytes) else ended:
+            yield Outcome(piece)
+
+
+class _InOtherForm:
+    """Write columns into a file of another form, with their types; those that it has no place for are left out."""
+
+    def __init__(self, columns: Sequence[OutColumn], into: Any, style: Style) -> None:
+        """Choose the columns."""
+        has_texts = getattr(into, "HOLDS_TEXTS", False)
+        self.columns = columns
+        self.kept = [column for column in columns if column.kind is not None or has_texts]
+        self.writer: ColumnWriter = into.create([column._replace(passed=None) for column in self.kept], None, style)
+        if len(self.kept) < len(columns):
+            left = listing(column.name for column in columns if column not in self.kept)
+            warn(f"{style.form}: {left} left out: it holds numbers")
+
+    def of_rows(self, batch: Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
+        """Return what is written of a batch."""
+        new = iter(made)
+        found = []
+        for column in self.columns:
+            if column.passed is None or batch is None:
+                found.append(next(new))
+                continue
+            given, nulls = batch.column(column.passed), None
+            if column.kind is not None and not isinstance(given, np.ndarray):
+                given, nulls = self._with_nulls(batch, column)
+            if rows is not None:
+                given, nulls = np.asarray(given)[rows], None if nulls is None else nulls[rows]
+            found.append(Made(given, nulls))
+        kept = [each for each, column in zip(found, self.columns, strict=True) if column in self.kept]
+        return self.writer.of_rows(None, None, kept)
+
+    def _with_nulls(self, batch: Batch, column: OutColumn) -> tuple[Floats, Flags | None]:
+        """Return numbers some of which are nulls, nan in their place; raises ValueInvalid where none can stand."""
+        if column.kind is None or column.kind.kind not in FLOATS:
+            name = f"column {column.name}"
+            raise ValueInvalid(f"{name} holds nulls, and {column.kind} has none; -f csv leaves them empty")
+        values, nulls = batch.numbers(column.passed or 0)
+        return values.astype(column.kind), nulls
+
+    def end(self) -> bytes | Iterator[bytes]:
+        """Return what comes behind the last batch."""
+        return self.writer.end()
+
+
+def move_along(file: ColumnFile, request: Request) -> None:
+    """Let what else has a place among the points of a file move with them."""
+    operation, timed = request.operation, request.timed
+    if isinstance(file, MovesAlong) and operation.moves and not request.keep and request.gathered is None:
+        by_row = request.edge_of is not None or (timed is not None and bool(timed.name))
+        file.moved_by(None if by_row else operation.left)
+
+
+def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults) -> list[Made]:
+    """Return what stands in the columns that are made, in their order."""
+    made = []
+    for column, given in zip(columns, rows.layout.columns, strict=True):
+        if isinstance(given, New):
+            with np.errstate(invalid="ignore"):
+                values = results.numbers[:, given.number].astype(column.kind or DOUBLE)
+            made.append(Made(values, rows.absent_in(given.number, results)))
+        elif not isinstance(given, Kept):
+            made.append(Made(results.names.get(given.role, ())))
+    return made
