@@ -5,6 +5,7 @@ Nothing is imported here that takes time: from the first moment on Ctrl-C ends t
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from io import TextIOWrapper
@@ -39,12 +40,14 @@ COMMANDS = {
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 IN_OUT, INTERRUPTED = 5, 130  # exit codes
+COLLECTED_EVERY = (50_000, 20, 100)  # objects, and rounds of them: a tree is no garbage, and walking it takes longest
 TROUBLE = {"diff": 2}  # command -> its one exit code for whatever goes wrong, as that of diff(1)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line as a program of its own and exit with its status."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads that nothing here uses cost memory
+    gc.set_threshold(*COLLECTED_EVERY)
     try:
         from frametool.cli.signals import with_signals
 
