@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 SHOWN = 60  # characters of the input that a message quotes at most
 LONGEST_NAME = 200  # characters of a name that is compared with others
 MOST_COMPARED = 500  # names
+USUAL_NAME = 20  # characters
 
 
 class FrametoolError(Exception):
@@ -210,8 +211,11 @@ def overheard(
 ) -> tuple[Result, list[tuple[str, str]]]:
     """Return what a function returns, and its warnings as (rule, message), for a reader to add the place."""
     warned: list[tuple[str, str]] = []
-    with heard_by(lambda message, rule, _: warned.append((rule, message))):
+    _listeners.append(lambda message, rule, _: warned.append((rule, message)))
+    try:  # as `heard_by`, which would cost half a microsecond for each of a million rotations
         return call(*arguments, **options), warned
+    finally:
+        _listeners.pop()
 
 
 def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
@@ -235,30 +239,37 @@ def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6, slack: floa
 def _likely(name: str, known: list[str]) -> list[str]:
     """Return the names worth comparing: of many those with the same first or second half that share the most beyond it.
 
-    A typing error leaves one half of a name as it was.
+    A typing error leaves one half of a name as it was.  The longer the name, the dearer a comparison, the fewer.
     """
     if len(known) <= MOST_COMPARED:
         return known
-    size = len(name)
-
-    def begins(each: str, count: int) -> bool:
-        return each.startswith(name[:count])
-
-    def ends(each: str, count: int) -> bool:
-        return each.endswith(name[size - count :])
-
-    first = [each for each in known if begins(each, size // 2)]
-    second = [each for each in known if ends(each, size // 2)]
-    found = (_sharing_most(*way, size) for way in ((first, begins), (first, ends), (second, begins), (second, ends)))
-    return [each for part in found for each in part[: MOST_COMPARED // 4]]
+    half = len(name) // 2
+    first, second = _beginning(known, name, half), _ending(known, name, half)
+    ways = (first, _beginning, half), (first, _ending, 0), (second, _beginning, 0), (second, _ending, half)
+    most = max(MOST_COMPARED // 4 * USUAL_NAME**2 // max(len(name), USUAL_NAME) ** 2, 4)
+    return [each for names, sharing, least in ways for each in _sharing_most(names, sharing, name, least)[:most]]
 
 
-def _sharing_most(names: list[str], shares: Callable[[str, int], bool], most: int) -> list[str]:
-    """Return the names that share as many characters as any of them does."""
-    least = 0
+def _beginning(names: list[str], name: str, count: int) -> list[str]:
+    """Return the names that begin with the first characters of one."""
+    start = name[:count]
+    return [each for each in names if each.startswith(start)]
+
+
+def _ending(names: list[str], name: str, count: int) -> list[str]:
+    """Return the names that end with the last characters of one."""
+    end = name[len(name) - count :]
+    return [each for each in names if each.endswith(end)]
+
+
+def _sharing_most(
+    names: list[str], sharing: Callable[[list[str], str, int], list[str]], name: str, least: int
+) -> list[str]:
+    """Return the names that share as many characters with one as any of them does; all share the `least`."""
+    most = len(name)
     while least < most:
         middle = (least + most + 1) // 2
-        if some := [each for each in names if shares(each, middle)]:
+        if some := sharing(names, name, middle):
             least, names = middle, some
         else:
             most = middle - 1

@@ -278,7 +278,7 @@ def _no_power(base: float, exponent: float) -> str:
 
 
 def as_frames(term: Term, target: str | None, source: str | None) -> Term:
-    """Give a pose both its frames."""
+    """Return a pose with both its frames."""
     type_ = term.type
     if type_.kind != POSE:
         raise CalcError(f"only a pose has two frames; found {type_.named}")

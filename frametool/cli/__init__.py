@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import click
-
 # name -> (module, what it does); help, completion and the README's check are derived from this table
 COMMANDS = {
     "convert": ("frametool.cli.commands.convert", "one rotation or pose in other representations"),
@@ -35,6 +33,7 @@ COMMANDS = {
     "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
     "check": ("frametool.cli.commands.check", "what is wrong or odd in trees and recordings"),
     "diff": ("frametool.cli.commands.diff", "what differs between two trees, calibrations or recordings"),
+    "batch": ("frametool.cli.commands.batch", "many commands, one a line, in one process"),
     "formats": ("frametool.cli.commands.formats", "the forms of files that are read and written, and what they mean"),
     "help": ("frametool.cli.commands.help", "a subject on one screen: pose, euler, axes, time, streams and more"),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
@@ -59,6 +58,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
     from frametool.cli.signals import die_of
     from frametool.cli.stderr import discard, say, say_warning
+    from frametool.cli.troubles import TROUBLES, words_of
     from frametool.documents.limits import DEEPEST
     from frametool.errors import heard_by
 
@@ -78,58 +78,27 @@ def run(arguments: list[str]) -> int:
         from signal import SIGPIPE
 
         status = die_of(SIGPIPE)  # as `cat` does when its reader is gone
-    except MemoryError:
-        say("out of memory")
-        status = in_out
-    except ImportError as error:  # numpy's tells of missing memory and files in many lines, the cause in the last one
-        say(f"a library cannot be loaded: {str(error).strip().splitlines()[-1]}")
-        status = in_out
-    except OSError as error:
-        if status != in_out:  # else it was told, and what is still in the buffer fails again
-            say((error.strerror or str(error)).lower())
-        discard(sys.stdout)
+    except TROUBLES as error:
+        if status != in_out or not isinstance(error, OSError):  # else it was told, and the buffer fails again
+            say(words_of(error))
+        if isinstance(error, OSError):
+            discard(sys.stdout)
         status = in_out
     return status
 
 
 def _run(arguments: list[str]) -> int:
     """Run one command; closed pipes and other trouble with stdout are the caller's."""
-    import click
-
     from frametool.cli.error_json import wants_json
     from frametool.cli.group import called
-    from frametool.cli.help_page import show_help
+    from frametool.cli.misuse import answered
     from frametool.cli.stderr import say_error
     from frametool.errors import FrametoolError
-    from frametool.stream.faults import Misused
 
-    problem: FrametoolError
     try:
-        return called(arguments)
-    except click.exceptions.NoArgsIsHelpError as error:
-        show_help(error.ctx)
-        return 0
+        return answered(lambda: called(arguments), arguments)
     except KeyboardInterrupt:
         return INTERRUPTED
-    except click.ClickException as error:
-        problem = Misused(_usage(error, arguments))
     except FrametoolError as error:
-        problem = error
-    say_error(problem, in_json=wants_json(arguments))
-    return TROUBLE.get(arguments[0] if arguments else "", problem.exit_code)
-
-
-def _usage(error: click.ClickException, arguments: list[str]) -> str:
-    """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
-    from frametool.errors import SHOWN, shown
-
-    ctx = getattr(error, "ctx", None)
-    message = error.format_message().replace("\n", " ").rstrip(".")
-    for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
-        message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
-    if message[1:2].islower():
-        message = message[0].lower() + message[1:]
-    if ctx is None or ctx.parent is None:
-        return message
-    pieces = " ".join(ctx.command.collect_usage_pieces(ctx))
-    return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
+        say_error(error, in_json=wants_json(arguments))
+        return TROUBLE.get(arguments[0] if arguments else "", error.exit_code)

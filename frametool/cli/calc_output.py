@@ -13,17 +13,20 @@ from frametool.formats import FORMATS
 from frametool.grammar.result import Result
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.calc.values import Term
     from frametool.grammar.result import Style
 
 
-def value_texts(terms: Sequence[Term], style: Style) -> Iterator[str]:
-    """Yield the text of each value in the form of a style, what parts it from the one before included."""
-    values = [item for term in terms for item in (term.items if term.type.kind == LIST else (wanted(term),))]
+def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
+    """Yield the text of each value in the form of a style, what parts it from the one before included.
+
+    Each is written before the next one is looked at, but for the rows of a table, which share their columns.
+    """
+    values = (item for term in terms for item in (term.items if term.type.kind == LIST else (wanted(term),)))
     if style.form == "csv":
-        yield _csv(values, style)
+        yield _csv(list(values), style)
         return
     before = ""
     for value in values:

@@ -28,7 +28,7 @@ def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
     """
     pipe = PipedExpressions(stream, scope)
     if output.style.form == "csv":
-        output.pieces(value_texts(list(pipe.values()), output.style))
+        output.pieces(value_texts(pipe.values(), output.style))
     else:
         output.pieces(_parted(pipe, output))
     return pipe.finish()

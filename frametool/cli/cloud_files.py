@@ -135,13 +135,13 @@ class BagOfClouds:
 
 
 def _filled(place: str, cloud: PointCloud) -> str:
-    """Return what stands in a place of a pattern; a slash would be a folder."""
+    """Return what stands in a place of a pattern; a slash or two dots would be another folder."""
     seconds, below = divmod(cloud.stamp_ns, 1_000_000_000)
     values = {
         "stamp_ns": str(cloud.stamp_ns), "stamp": f"{seconds}.{below:09d}", "number": f"{cloud.number:06d}",
         "topic": cloud.topic.strip("/"), "frame": cloud.frame,
     }  # fmt: skip
-    return re.sub(r"[/\0]", "_", values[place])
+    return re.sub(r"[/\0]|^\.+", "_", values[place])
 
 
 def _check(pattern: str) -> None:

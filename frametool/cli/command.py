@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from frametool.cli.help_page import WithHelp
+from frametool.cli.reuse import Reused
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.formats import FORMATS, readers, writers
@@ -23,13 +24,15 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 # an argument that begins like this is a number, whatever short options there are
-NEGATIVE = re.compile(r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation|Rotation):)", re.IGNORECASE)
+NEGATIVE = re.compile(
+    r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)", re.IGNORECASE
+)
 STREAMED = ("records", "rows", "arrays")
 READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 
-class Command(WithHelp):
+class Command(WithHelp, Reused):
     """A command whose arguments may be negative numbers.
 
     click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
@@ -40,9 +43,10 @@ class Command(WithHelp):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers (-j is an option where joints are), give a bare --explain its form, then parse."""
-        options = {name for each in self.get_params(ctx) for name in each.opts}
-        shielded = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
-        return super().parse_args(ctx, _with_form(shielded) if "--explain" in shielded else shielded)
+        if any(map(NEGATIVE.match, args)):
+            options = {name for each in self.get_params(ctx) for name in each.opts}
+            args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
+        return super().parse_args(ctx, _with_form(args) if "--explain" in args else args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """End every help with the exit codes."""

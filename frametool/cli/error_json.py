@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.stderr import BatchLine
     from frametool.errors import FrametoolError
+
+PLACE = ("source", "line", "column")
 
 
 def wants_json(arguments: Sequence[str]) -> bool:
@@ -18,8 +21,18 @@ def wants_json(arguments: Sequence[str]) -> bool:
     return any(option in ("-f", "--format") and value == "json" for option, value in pairwise(arguments))
 
 
-def as_json(error: FrametoolError) -> str:
-    """Return the error's kind, its message and its fields."""
+def as_json(error: FrametoolError, line: BatchLine | None = None, fate: str = "") -> str:
+    """Return the error's kind, its message and its fields.
+
+    line: of the batch in which it is; the object's place is then that one, and its own place stands under `input`
+    fate: what became of that line
+    """
     from frametool.documents.json_writer import dump
 
-    return dump({"error": error.kind, "message": str(error), **error.details()})
+    message, details = str(error), error.details()
+    if line is not None:
+        own = {key: value for key, value in details.items() if key in PLACE}
+        rest = {key: value for key, value in details.items() if key not in PLACE}
+        message = f"{line}{message}"
+        details = {**line._asdict(), **({"input": own} if own else {}), **rest}
+    return dump({"error": error.kind, "message": f"{message} ({fate})" if fate else message, **details})

@@ -15,6 +15,8 @@ from frametool.cli.sink import writing
 from frametool.errors import alternatives, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from click.shell_completion import CompletionItem
 
 HELP = """The calculator for rigid-body frames.
@@ -120,9 +122,24 @@ def called(arguments: list[str]) -> int:
         from click.shell_completion import shell_complete
 
         return shell_complete(group, {}, "frametool", COMPLETION, instruction)
-    try:
-        with group.make_context("frametool", arguments) as ctx:
-            status = group.invoke(ctx)
-    except click.exceptions.Exit as end:
-        status = end.exit_code
-    return status if isinstance(status, int) else 0
+    with group.make_context("frametool", arguments) as ctx:
+        return _status(group.invoke(ctx))
+
+
+def called_in(parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None]) -> int:
+    """Call the command that words begin with and return its status, as `called` does without making a group's context.
+
+    parent: context of the group
+    prepare: is shown the command's context before it runs
+    """
+    name, command, rest = group.resolve_command(parent, list(words))
+    if name is None or command is None:
+        raise click.UsageError("no command", parent)
+    with command.make_context(name, rest, parent=parent) as ctx:
+        prepare(ctx)
+        return _status(command.invoke(ctx))
+
+
+def _status(result: object) -> int:
+    """Return the status that a command's result stands for."""
+    return result if isinstance(result, int) else 0

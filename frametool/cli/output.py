@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from itertools import islice
+from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
 from frametool.cli.command import FULL
-from frametool.cli.sink import writing
+from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, printable, shown
 from frametool.formats import FORMATS, by_name, holds_arrays, is_trajectory, writers
@@ -49,8 +50,9 @@ class Output:
         """
         self.path = output
         self.force = force
-        self.told = format_name or by_name(output, writers(*what))
+        self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
         self.notations = notations or ()
+        self._form_is_default = not (self.told or otherwise)
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
         if holds_arrays(form) and output is None and sys.stdout.isatty():
             raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
@@ -191,6 +193,14 @@ class Output:
             for piece in pieces:
                 for_people = is_plain and isinstance(piece, str)
                 write("\n".join(map(printable, str(piece).split("\n"))) if for_people else piece)
+        self._tell_of_suffix()
+
+    def _tell_of_suffix(self) -> None:
+        """Say what a file holds whose suffix stands for no form, where none was told."""
+        suffix = splitext(self.path or "")[1]
+        if self._form_is_default and self.path and suffix and not is_special(self.path):
+            none = f"no form written here has the suffix {shown(suffix)}"
+            say(f"note: {self.path}: {none}; it holds {self.style.form}, -f says another")
 
     def text(self, text: str) -> None:
         """Write text."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from functools import lru_cache
 from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,11 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 INLINE = "argument"
+LONGEST_REMEMBERED = 4096  # characters
 # the grammar's own, or a header; compiled when first needed
-_PLAIN = r"""\s*(?![ijk]\s*$)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
+_PLAIN = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
+_NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*):\s*\["  # of a table; the last: GTSAM, Gazebo
+_NO_JSON = r"\d\.(?=[\s,\]])|;"
 
 _ROW = r"\[(?:[^\[\],]*,){%s}[^\[\],]*\]\s*,?\s*"
 _LISTED_ROWS = rf"\s*(?:\[\s*(?:{_ROW % 3}){{3}}\]|(?:{_ROW % '2,3'}){{3,4}}\Z)"
@@ -48,6 +52,12 @@ def rewritten(
     source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
     """Return a text that was pasted as one of the grammar; None for one that is."""
+    if source.name == INLINE and len(source.text) <= LONGEST_REMEMBERED:
+        return _rewritten_argument(source, given, normalize=normalize, points=points)
+    return _rewritten(source, given, normalize=normalize, points=points)
+
+
+def _rewritten(source: Source, given: Notation | None, *, normalize: bool, points: bool) -> Source | None:
     if re.match(_PLAIN, source.text) and "\n" not in source.text.strip():
         return None
     from frametool.ros.pasted_blocks import in_grammar
@@ -58,6 +68,9 @@ def rewritten(
         if source.name == INLINE and not isinstance(error.__cause__, NotARotation):
             error.exit_code = 2  # misuse, where numbers in a file are bad data
         raise
+
+
+_rewritten_argument = lru_cache(8)(_rewritten)  # an argument is looked at before it is read
 
 
 def rejoined(values: Sequence[str]) -> tuple[str, ...]:
@@ -77,7 +90,7 @@ def pasted_stream(stream: BufferedReader, name: str, request: Request) -> tuple[
     Only a beginning with which no stream of rows or records has a result is read to its end.
     """
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
-    if re.match(_PLAIN, head) and not re.match(r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=", head):
+    if re.match(_PLAIN, head) and not re.match(_NO_HEADER, head):
         return None, stream
     from frametool.ros.pasted_blocks import MOST_PASTED, in_grammar
 
@@ -101,18 +114,26 @@ def _is_free(head: str, given: Notation | None, request: Request) -> bool:
     lines = [line.strip() for line in head.splitlines() if line.strip()]
     first = lines[0]
     if first[0] in "[({" and re.match(r"[\[\s]*[-+.\d]\S*\s*,", first):
-        return not request.operation.moves and (given is not None or _is_long(head))
+        return not request.operation.moves and (given is not None or _is_long(head) or bool(re.search(_NO_JSON, head)))
     cells = first.split()
     if not all(re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", cell) for cell in cells):
         return True
     if request.operation.moves:
         return False
+    if _is_counted([line.split() for line in lines[:2]]):
+        return True
     matrix = given is None or given.representation.whole is not None
     if (len(cells), len(lines)) == (3, 3) and matrix:
         return given is not None or _only_a_matrix(lines, request)
     if matrix:
         return (len(cells), len(lines)) in ((4, 3), (4, 4)) or (given is None and (len(cells), len(lines)) == (12, 1))
     return len(cells) == 1 and len(lines) > 1
+
+
+def _is_counted(rows: list[list[str]]) -> bool:
+    """Tell the heading of a print of pandas, which counts its columns, before a row that begins with its own count."""
+    counts = [str(at) for at in range(len(rows[0]))]
+    return len(rows) > 1 and rows[0] == counts and rows[1][0] == "0" and len(rows[1]) == len(counts) + 1
 
 
 def _is_long(head: str) -> bool:

@@ -51,6 +51,10 @@ def pose_source(
     if not isinstance(argument, Source) and is_pasted(argument, given):
         argument = Source(INLINE, argument)
     source = source_of(argument)
+    if source.name != INLINE and source.text.lstrip().startswith("<"):
+        from frametool.cli.tree_hint import refuse_robots
+
+        refuse_robots(source.text.encode(), source.name)
     return rewritten(source, given, normalize=normalize, points=points) or source
 
 
@@ -63,10 +67,12 @@ def poses_from(
     """
     from frametool.stream.record_values import read_poses
 
+    source = None
     try:
-        return read_poses(pose_source(argument, given, normalize=normalize), degrees=degrees, normalize=normalize)
+        source = pose_source(argument, given, normalize=normalize)
+        return read_poses(source, degrees=degrees, normalize=normalize)
     except FormatError as error:
-        raise usage_if_inline(error) from None
+        raise usage_if_inline(_hinting(error, source)) from None
 
 
 def write_results(argument: str, stream: Stream, request: Request, output: Output) -> int:
@@ -83,12 +89,22 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
 
     request = request._replace(notations=request.notations or output.notations)
     for argument in arguments:
+        source = None
         try:
             points = request.operation.moves
             source = pose_source(argument, request.given, normalize=request.normalize, points=points)
             yield from results(source, request, output.style)
         except FormatError as error:
-            raise usage_if_inline(error) from None
+            raise usage_if_inline(_hinting(error, source)) from None
+
+
+def _hinting(error: FormatError, source: Source | None) -> FormatError:
+    """Return the error to raise for a source; that for a file of frames points to lookup."""
+    if source is None or source.name == INLINE:
+        return error
+    from frametool.cli.tree_hint import with_hint
+
+    return with_hint(error, source.text.encode(), source.name)
 
 
 def usage_if_inline(error: FormatError) -> FormatError:

@@ -4,13 +4,42 @@ from __future__ import annotations
 
 import os
 import sys
-from contextlib import suppress
-from typing import TYPE_CHECKING
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, printable
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from typing import TextIO
+
+
+class BatchLine(NamedTuple):
+    """A line of a batch, and the file it stands in."""
+
+    source: str
+    line: int
+
+    def __str__(self) -> str:
+        """Return what begins each message of its command."""
+        return f"{self.source}:{self.line}: "
+
+
+_lines: list[BatchLine] = []
+
+
+@contextmanager
+def telling_of(line: BatchLine) -> Iterator[None]:
+    """Name a line of a batch in all that is told while its command runs."""
+    _lines.append(line)
+    try:
+        yield
+    finally:
+        _lines.pop()
+
+
+def _place() -> str:
+    return str(_lines[-1]) if _lines else ""
 
 
 def tell(text: str) -> None:
@@ -25,23 +54,34 @@ def tell(text: str) -> None:
 
 def say(text: str) -> None:
     """Write one line about the work, under the program's name."""
-    tell(printable(f"frametool: {text}"))
+    tell(printable(f"frametool: {_place()}{text}"))
 
 
-def say_warning(message: str, _rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
-    """Write a warning; what tf2 would have logged stands there in its own words."""
-    tell(printable(message if kind is Tf2Warning else f"frametool: warning: {message}"))
+def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
+    """Write a warning; what tf2 would have logged stands there in its own words.
+
+    With --quiet nothing is said of names that lost their leading slash: their tree is as it was meant.
+    """
+    if rule == "slash":
+        from frametool.cli.trees import is_quiet
+
+        if is_quiet():
+            return
+    tell(printable(message if kind is Tf2Warning else f"frametool: {_place()}warning: {message}"))
 
 
-def say_error(error: FrametoolError, *, in_json: bool) -> None:
-    """Write an error: as a sentence with the source line, or as one object with the fields it is made of."""
+def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
+    """Write an error: as a sentence with the source line, or as one object with the fields it is made of.
+
+    fate: what became of the line of a batch in which it is
+    """
     if in_json:
         from frametool.cli.error_json import as_json
 
-        tell(as_json(error))
+        tell(as_json(error, _lines[-1] if _lines else None, fate))
         return
     first, *rest = str(error).split("\n") if error.many_lines else [str(error)]
-    say(first)
+    say(f"{first} ({fate})" if fate else first)
     for line in rest:
         tell(printable(line))
     if snippet := getattr(error, "snippet", ""):

@@ -12,6 +12,7 @@ import click
 
 from frametool.cli.command import (
     FILE,
+    READING,
     STREAMED,
     TREES_OPENED,
     UTF8,
@@ -25,7 +26,7 @@ from frametool.cli.command import (
 from frametool.cli.completions import ColumnNames
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
-from frametool.errors import FileProblem
+from frametool.errors import FileProblem, FormatError
 from frametool.formats import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.formats.detect import by_sign, detect
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
@@ -73,8 +74,8 @@ OPTIONS = {
         help="report at most N bad rows, count all",
     ),
     "jobs": click.option(
-        "--jobs", type=click.IntRange(1, MOST_JOBS), default=1, show_default=True, metavar="N",
-        help="processes for a large stream",
+        "--jobs", type=click.IntRange(0, MOST_JOBS), default=1, show_default=True, metavar="N",
+        help="processes for a stream; 0 is all cores",
     ),
     "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
 }  # fmt: skip
@@ -106,7 +107,9 @@ class Stream:
 
     def has_input(self) -> bool:
         """Tell whether something is piped in."""
-        return sys.stdin is not None and not sys.stdin.isatty() and bool(self.opened().peek(1))
+        if sys.stdin is None or sys.stdin.isatty() or not sys.stdin.readable():
+            return False
+        return bool(self.opened().peek(1))
 
     def is_wanted(self, argument: object) -> bool:
         """Tell whether standard input or -i FILE is to be read in this argument's place."""
@@ -136,12 +139,27 @@ class Stream:
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
         return form
 
-    def run(
-        self, request: Request, output: Output, *, tables_only: bool = False
-    ) -> int:
+    def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int:
         """Run the stream and return its exit status."""
         name = self.path or "stdin"
         with self.opened() as given:
+            head = given.peek()
+            if head.lstrip()[:1] == b"<":
+                from frametool.cli.tree_hint import refuse_robots
+
+                refuse_robots(head, name)
+            try:
+                return self._run_opened(given, name, request, output, tables_only=tables_only)
+            except FormatError as error:
+                from frametool.cli.tree_hint import with_hint
+
+                raise with_hint(error, head, name) from None
+
+    def _run_opened(
+        self, given: BufferedReader, name: str, request: Request, output: Output, *, tables_only: bool
+    ) -> int:
+        """Run the stream, of whatever form it is."""
+        with given:
             stream = given
             form, known_by = self.told_form(), ""
             signed = form or _signed(stream.peek(), name)
@@ -155,6 +173,10 @@ class Stream:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
                 say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
+            if any(click.get_current_context().meta.get(READING, {}).values()):
+                from frametool.cli.trees import say_not_needed
+
+                say_not_needed((form,), "stamps", "edges")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             request = self._completed(request, output, form)
@@ -187,6 +209,7 @@ class Stream:
         from frametool.grammar.edges import Options, Tally, Topics
         from frametool.stream.column_stream import run_columns
 
+        self._jobs(f"one process is enough for {form}")
         name = self.path or "stdin"
         if output.path is None and request.gathered is None and sys.stdout.isatty():
             raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
@@ -214,6 +237,7 @@ class Stream:
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         name = self.path or "stdin"
+        self._jobs(f"rows become {target} one after the other")
         converted = OtherForm(form, request, output.style.in_form(target), name, answers())
         outcomes = converted.outcomes(stream, header=self.options["header"])
         status = self._write(outcomes, output, name, counted="row" if holds_arrays(form) else "line")
@@ -250,6 +274,7 @@ class Stream:
         """Write the results of records in another form than theirs."""
         from frametool.stream.record_values import stream_results
 
+        self._jobs(f"records become {output.told} one after the other")
         bad = self.policy(self.path or "stdin")
         output.values(stream_results(stream, form, request, output.style, bad))
         return ROWS_SKIPPED if bad.count else 0
@@ -312,13 +337,27 @@ class Stream:
             return run(outcomes, lambda _: None, self.policy(name), progress.advance)
 
     def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
+        jobs = self._jobs("each row needs those before it" if request.in_order else "")
         if form in RECORDS:
             from frametool.stream.record_stream import run_records
 
-            return run_records(stream, form, request, source=name, jobs=self.options["jobs"])
+            return run_records(stream, form, request, source=name, jobs=jobs)
         from frametool.stream.table_stream import run_table
 
-        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=self.options["jobs"])
+        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=jobs)
+
+    def _jobs(self, obstacle: str) -> int:
+        """Return how many processes do the work: one where something is in the way of more, which is said."""
+        if self.options["jobs"] == 1:
+            return 1
+        from frametool.stream.workers import can_spread, cores
+
+        jobs: int = min(self.options["jobs"] or cores(), MOST_JOBS)
+        obstacle = obstacle or ("" if can_spread() else "this system cannot fork processes")
+        if jobs == 1 or not obstacle:
+            return jobs
+        say(f"--jobs does not help here: {obstacle}; one process does the work")
+        return 1
 
 
 def _signed(begin: bytes, name: str) -> str:

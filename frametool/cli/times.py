@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -9,7 +11,7 @@ import click
 from frametool.cli.command import TEXT, Text, decorated
 from frametool.cli.error_json import as_json
 from frametool.cli.stderr import say_error, tell
-from frametool.errors import FormatError, FrametoolError, ValueInvalid
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown
 from frametool.formats.assembly import Rules
 from frametool.frames.stamps import NotATime, parse_stamp, whole_stamp
 
@@ -125,7 +127,7 @@ def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool =
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:
-    """Read START:STOP:STEP (seconds; STOP counts if a step meets it), or the lines of a file or `-`, in order.
+    """Read START:STOP:STEP (seconds; STOP counts if a step meets it), T,T,.., or the lines of a file or `-`, in order.
 
     Empty lines and those that begin with `#` are passed over.
     report: takes the errors of lines that are no time.
@@ -134,6 +136,8 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 
     if text.count(":") == 2:
         return _range(text)
+    if re.match(r"[-+]?\.?\d", text) and not os.path.exists(text):
+        return _listed(text)
     source = source_of(text)
     times: list[int] = []
     bad = 0
@@ -147,6 +151,15 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
     if not times and not bad:
         raise FormatError("no times in it; write one a line", source=source.name)
     return times
+
+
+def _listed(text: str) -> list[int]:
+    """Read times between commas."""
+    try:
+        return [whole_stamp(parse_stamp(part.strip())) for part in text.split(",")]
+    except ValueInvalid as error:
+        hint = "times are T,T,.. in seconds, START:STOP:STEP, or a file"
+        raise click.UsageError(f"--times {shown(text)}: {error}; {hint}") from None
 
 
 def _range(text: str) -> range:
@@ -164,5 +177,5 @@ def _range(text: str) -> range:
 
 times_option = click.option(
     "--times", type=TEXT, metavar="TIMES",
-    help="many: FILE, one a line, or START:STOP:STEP, seconds",
+    help="many: T,T,.., START:STOP:STEP, or FILE, one a line",
 )  # fmt: skip

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import READING, TREES_OPENED, VERBOSE, Text, forms_told
+from frametool.cli.command import FORMS, READING, TREES_OPENED, VERBOSE, Text, forms_told
 from frametool.cli.pasted_input import is_inline
 from frametool.cli.poses import source_of
 from frametool.cli.stderr import say
+from frametool.cli.tree_cache import TreeCache
 from frametool.errors import shown, warn
 from frametool.formats import FORMATS
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from typing import Any
+    from collections.abc import Callable, Collection, Sequence
+    from typing import Any, TypeVar
 
     from click.shell_completion import CompletionItem
 
@@ -28,6 +30,11 @@ if TYPE_CHECKING:
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.tree import FrameTree
 
+    Value = TypeVar("Value")
+
+OPEN_IN_TREES = ("frames", "direction", "camera_axes", "dh", "stamps")  # what forms of files of frames may leave open
+
+
 def load_tree(
     argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False
 ) -> FrameTree | TransformBuffer:
@@ -35,12 +42,11 @@ def load_tree(
 
     streams: `--in` is about what is streamed wherever that can be
     """
-    from frametool.formats.load import load_sources  # not every command that may read trees does
 
-    files = opened((argument, *more), streams=streams)
-    tree = load_sources(files, rules)
-    state(files)
-    return tree
+    def read() -> FrameTree | TransformBuffer:
+        return _loaded(opened((argument, *more), streams=streams), rules)
+
+    return _read_once((argument, *more), f"{rules!r} {streams}", read)
 
 
 def load_sides(
@@ -51,16 +57,48 @@ def load_sides(
     places: are filled with where each frame of the one and the other was said to be
     """
     refuse_two_readers((*a, *b))
-    from frametool.formats.assembly import Rules
-    from frametool.formats.load import load_sources
+    count = len(a) + len(b)
 
-    rules = Rules(normalize=normalize)
+    def side(arguments: Sequence[str], behind: int) -> tuple[FrameTree | TransformBuffer, dict[str, Place]]:
+        from frametool.formats.assembly import Rules
+
+        where: dict[str, Place] = {}
+        return _loaded(opened(arguments, behind=behind, of=count), Rules(normalize=normalize), where), where
+
     trees = []
-    for arguments, behind, found in ((a, 0, places[0]), (b, len(a), places[1])):
-        files = opened(arguments, behind=behind, of=len(a) + len(b))
-        trees.append(load_sources(files, rules, found))
-        state(files)
+    for arguments, behind, found in zip((a, b), (0, len(a)), places, strict=True):
+        options = f"{normalize} {behind} of {count}"
+        tree, where = _read_once(arguments, options, partial(side, arguments, behind))
+        trees.append(tree)
+        found.update(where)
     return trees
+
+
+def _loaded(
+    files: Sequence[Recording], rules: Rules | None, places: dict[str, Place] | None = None
+) -> FrameTree | TransformBuffer:
+    """Merge files that are open, and say what they were taken for."""
+    from frametool.formats.load import load_sources  # not every command that may read trees does
+
+    tree = load_sources(files, rules, places)
+    state(files)
+    if places is None:  # of one of two sides, the other may need what this one does not
+        say_not_needed([file.form for file in files], *OPEN_IN_TREES)
+    return tree
+
+
+def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]) -> Value:
+    """Return what is read from files; in a batch, what was read from them before as long as they have not changed.
+
+    options: what says how, beside the options that the context keeps
+    """
+    context = click.get_current_context(silent=True)
+    cache = None if context is None else context.find_object(TreeCache)
+    if context is None or cache is None:
+        return read()
+    context.meta[TREES_OPENED] = True
+    named = [each if is_inline(each) else tree_file(each) for each in arguments]
+    return cache.read(named, f"{options} {context.meta.get(FORMS)} {context.meta.get(READING)}", read)
 
 
 def state(files: Sequence[Recording]) -> None:
@@ -75,10 +113,21 @@ def state(files: Sequence[Recording]) -> None:
             say(file.stated)
 
 
+def say_not_needed(forms: Collection[str], *asked: str) -> None:
+    """Say on stderr which options answer what none of these forms leaves open: they change nothing."""
+    if is_quiet():
+        return
+    for ask in asked:
+        told = _reading("named_frames" if ask == "frames" else ask)
+        if told and not any(ask in FORMATS[form].asks for form in forms):
+            option = f"--{ask.replace('_', '-')}"
+            say(f"note: {option} changes nothing: {' and '.join(dict.fromkeys(forms))} does not leave that open")
+
+
 def is_quiet() -> bool:
-    """Return whether the command was called with --quiet."""
-    context = click.get_current_context()
-    return bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
+    """Return whether the command was called with --quiet, or is only completed."""
+    context = click.get_current_context(silent=True)
+    return context is None or bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
 
 
 def opened(
@@ -150,7 +199,17 @@ def answers() -> Answers:
     """Return what the options say about all files whose form leaves it open."""
     named = {name: _reading(name) for name in Answers._fields if name not in ("joints", "frames")}
     given = {name: value for name, value in named.items() if value}
-    return Answers(joints=dict(map(_joint, _reading("joints"))), **given)
+    return Answers(joints=_joints(_reading("joints")), **given)
+
+
+def _joints(texts: Sequence[str]) -> dict[str, str]:
+    """Return the values of joints by name; raise a usage error for a joint that has two."""
+    values: dict[str, str] = {}
+    for name, value in map(_joint, texts):
+        if name in values:
+            raise click.UsageError(f"--joint {shown(name)} is given twice, {values[name]} and {value}; leave one out")
+        values[name] = value
+    return values
 
 
 def _joint(text: str) -> tuple[str, str]:

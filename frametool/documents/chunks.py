@@ -5,7 +5,8 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
+from frametool.documents.limits import MOST_CHARACTERS
+from frametool.documents.source import UTF16, decode
 from frametool.errors import FormatError
 
 if TYPE_CHECKING:
@@ -57,8 +58,9 @@ def _pieces(stream: BinaryIO, name: str, end_of: Callable[[bytearray, int], int]
             yield piece
             line += piece.text.count("\n")
             del waiting[:whole]
-        if len(waiting) > 4 * MOST_CHARACTERS:
-            raise FormatError("no end of a document or line within 256 MiB", source=name, line=line)
+        if len(waiting) > MOST_CHARACTERS:
+            message = f"no end of a document or line within {MOST_CHARACTERS >> 20} MiB"
+            raise FormatError(message, source=name, line=line)
     if waiting:
         yield _piece(bytes(waiting), name, line)
 

@@ -75,7 +75,7 @@ def strict_json(source: Source) -> list[Any]:
     at = re.match(_WHOLE, source.text).end() if "\\u" in source.text else len(source.text)  # type: ignore[union-attr]
     if at < len(source.text):
         raise error_at(source, at, f"{source.text[at:at + 6]} is half a character; its other half is missing")
-    if not _settle(values):
+    if not _settle(values, source.text):
         raise _too_deep(source)
     return values
 
@@ -123,22 +123,30 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return made
 
 
-def _settle(values: list[Any]) -> bool:
+def _settle(values: list[Any], text: str) -> bool:
     """Turn truth values into text, level by level; say whether there are at most DEEPEST levels."""
+    has_words = "true" in text or "false" in text
     level: list[Any] = [values]
     for _ in range(DEEPEST + 1):
-        level = [inner for outer in level for inner in _inner(outer)]
+        if has_words:
+            for outer in level:
+                _spell_words(outer)
+        level = [
+            inner
+            for outer in level
+            for inner in (outer.values() if type(outer) is dict else outer)
+            if type(inner) is dict or type(inner) is list
+        ]
         if not level:
             return True
     return False
 
 
-def _inner(outer: Any) -> list[Any]:
-    """Return the containers inside a container, whose truth values become text."""
+def _spell_words(outer: Any) -> None:
+    """Turn the truth values in a container into text."""
     pairs = outer.items() if type(outer) is dict else enumerate(outer)
     for key in [key for key, value in pairs if value is True or value is False]:
         outer[key] = "true" if outer[key] else "false"
-    return [value for value in (outer.values() if type(outer) is dict else outer) if type(value) in {dict, list}]
 
 
 def json_events(text: str) -> Iterator[Event]:
@@ -150,7 +158,8 @@ def json_events(text: str) -> Iterator[Event]:
         if word in _BRACKETS:
             yield _BRACKETS[word], "", token.start(), token.end(), word, 0
         elif word[0] == '"':
-            yield LEAF, loads(word, strict=False), token.start(), token.end(), '"', 0
+            text = loads(word, strict=False) if "\\" in word else word[1:-1]
+            yield LEAF, text, token.start(), token.end(), '"', 0
         else:
             yield LEAF, word, token.start(), token.end(), "", 0
 

@@ -25,8 +25,8 @@ def dump(value: Any, number: Callable[[float], str] = repr) -> str:
         return "{" + ", ".join(f"{dump(key)}: {dump(each, number)}" for key, each in value.items()) + "}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(dump(each, number) for each in value) + "]"
-    if isinstance(value, str) and value.isascii() and value.isidentifier():
-        return f'"{value}"'  # keys and most names, without importing json
+    if isinstance(value, str) and value.isascii() and value.isprintable() and '"' not in value and "\\" not in value:
+        return f'"{value}"'  # most texts, without importing json
     import json
 
     is_plain = not isinstance(value, str) or value.isprintable()

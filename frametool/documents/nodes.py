@@ -50,6 +50,10 @@ class Node(NamedTuple):
                 yield node
 
 
+NOTHING = Node(0, 0, {})
+"""A mapping without keys."""
+
+
 class _Opened:
     """A list or map whose end has not come yet."""
 

@@ -6,17 +6,20 @@ the parser's own.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from bisect import bisect_right
+from contextlib import contextmanager
 from io import BufferedReader
 from typing import NamedTuple
 
+from frametool.documents.limits import MOST_CHARACTERS, size_problem
 from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, shown
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from os import PathLike
     from typing import BinaryIO
 
@@ -45,9 +48,6 @@ MAGIC = {
 }
 _CONTROLS = bytes(code for code in range(32) if code not in b"\t\n\r\f\x1b")
 
-MOST_CHARACTERS = 3 << 24
-"""Longest text read as one file of documents, also in bytes: 400 000 frames in 0.7 GB, at worst 1.4 GB."""
-
 _LINE_END = "\r\n|[\r\n\x85\u2028\u2029]"
 _WIDEST_SNIPPET = 74  # and three dots on either side
 
@@ -59,8 +59,47 @@ class Source(NamedTuple):
     text: str
 
 
+class FileState(NamedTuple):
+    """What changes when a file does: of a folder, of one of the files in it."""
+
+    name: str
+    device: int
+    number: int
+    mode: int
+    size: int
+    mtime_ns: int
+    ctime_ns: int
+
+    @classmethod
+    def of(cls, found: os.stat_result, name: str = "") -> FileState:
+        """Take it out of what the system says."""
+        place = found.st_dev, found.st_ino, found.st_mode
+        return cls(name, *place, found.st_size, found.st_mtime_ns, found.st_ctime_ns)
+
+
+def states_of(path: str) -> list[FileState]:
+    """Return the state of a file, or of each file in a folder; raises OSError."""
+    if os.path.isdir(path):
+        return sorted(FileState.of(entry.stat(), entry.name) for entry in os.scandir(path))
+    return [FileState.of(os.stat(path))]
+
+
 class Pasted(Source):
     """A text made of one that somebody pasted, who knows nothing of places in it."""
+
+
+_noted: list[dict[str, list[FileState]]] = []
+
+
+@contextmanager
+def noting_files() -> Iterator[dict[str, list[FileState]]]:
+    """Yield what will hold the state of each file that is opened by `opened` in the block, as it was then."""
+    found: dict[str, list[FileState]] = {}
+    _noted.append(found)
+    try:
+        yield found
+    finally:
+        _noted.pop()
 
 
 def opened(path: str | PathLike[str]) -> BinaryIO:
@@ -75,6 +114,8 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
         stdin = sys.stdin.buffer
         return stdin if hasattr(stdin, "peek") else BufferedReader(stdin)  # type: ignore[type-var]
     try:
+        for noted in _noted:
+            noted[name] = states_of(name)
         return open(path, "rb", buffering=HEAD)
     except OSError as error:
         told = name if len(name) <= LONGEST_NAME else bare(name)
@@ -155,9 +196,8 @@ def not_text(data: bytes) -> str:
 
 def check_text(source: Source) -> None:
     """Refuse a text that is too long or holds halves of surrogate pairs, which no encoding can write."""
-    if len(source.text) > MOST_CHARACTERS:
-        message = f"longer than {MOST_CHARACTERS} characters, the most in one file; split it"
-        raise FormatError(message, source=source.name)
+    if problem := size_problem(source.text):
+        raise FormatError(problem, source=source.name)
     try:
         source.text.encode()
     except UnicodeEncodeError as error:

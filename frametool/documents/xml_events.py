@@ -12,7 +12,8 @@ from math import inf, isfinite
 from typing import NamedTuple
 from xml.parsers import expat
 
-from frametool.documents.source import MOST_CHARACTERS, Source, line_of, not_text, pointer
+from frametool.documents.limits import MOST_CHARACTERS
+from frametool.documents.source import Source, line_of, not_text, pointer
 from frametool.errors import FileProblem, FormatError, shown
 from frametool.text.numbers import parse_number
 

@@ -22,7 +22,7 @@ from frametool.documents.limits import DEEPEST, MOST_CONTAINERS, too_much
 from frametool.documents.marks import END, LEAF, LIST, MAP, repeated_key
 from frametool.documents.source import Source, error_at
 from frametool.documents.yaml_errors import translated
-from frametool.documents.yaml_lines import put_back, split_run
+from frametool.documents.yaml_lines import BRACKETS, put_back, split_brackets, split_run
 from frametool.errors import FormatError
 
 TYPE_CHECKING = False
@@ -64,7 +64,7 @@ def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
     if source.text.count("\n%TAG") > _MOST_DIRECTIVES:
         raise error_at(source, source.text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
     with paused_collector():
-        return _read_by_lines(source, tags) or _Builder(source, tags).build()
+        return _read_by_lines(source, tags) or _read_without_brackets(source) or _Builder(source, tags).build()
 
 
 def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
@@ -77,6 +77,20 @@ def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
     except FormatError:
         return None
     return values if put_back(values, split[1]) else None
+
+
+def _read_without_brackets(source: Source) -> list[Value] | None:
+    """Read a plain text whose values in brackets are read aside; None for others and for mistakes."""
+    split = split_brackets(source.text)
+    if split is None:
+        return None
+    builder = _Builder(Source(source.name, split[0]), ())
+    builder.aside = iter(split[1])
+    try:
+        values = builder.build()
+    except FormatError:
+        return None
+    return values if next(builder.aside, None) is None else None
 
 
 def yaml_events(text: str) -> Iterator[Event]:
@@ -102,7 +116,7 @@ def yaml_events(text: str) -> Iterator[Event]:
 class _Builder:
     """Build the values of one text; holds what the rare events need beside the loop."""
 
-    __slots__ = ("aliases", "anchors", "copies", "documents", "open", "source", "tags")
+    __slots__ = ("aliases", "anchors", "aside", "copies", "documents", "open", "source", "tags")
 
     def __init__(self, source: Source, tags: Collection[str]) -> None:
         """Start with an empty list of documents, the tags that are read, and the budget for aliases."""
@@ -111,6 +125,7 @@ class _Builder:
         self.anchors: dict[str, Value] = {}
         self.aliases = MOST_ALIASES
         self.copies = SPARE_COPIES + len(source.text)
+        self.aside: Iterator[Value] | None = None  # what BRACKETS stand for, if they stand for anything
         self.documents: list[Value] = []
         self.open: list[tuple[dict[str, Value] | list[Value], object]] = []
 
@@ -130,7 +145,7 @@ class _Builder:
         `current` is the dict or list being filled and `key` the key waiting for its value: None where a key comes
         next, _ITEM in a list.  One function, because two million events pass through it for 100 000 frames.
         """
-        stack, nulls, odd_keys, item = self.open, _NULLS, _ODD_KEYS, _ITEM
+        stack, nulls, odd_keys, item, brackets = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside and BRACKETS
         current: Any = self.documents
         key: Any = item
         room = MOST_CONTAINERS
@@ -149,6 +164,8 @@ class _Builder:
                     continue
                 if value in nulls and not event.style:
                     value = None
+                elif value == brackets:
+                    value = self._from_aside(event)
             elif kind is MappingStartEvent or kind is SequenceStartEvent:
                 value = {} if kind is MappingStartEvent else []
                 if key is None:
@@ -179,6 +196,12 @@ class _Builder:
                 current = value
                 key = None if kind is MappingStartEvent else item
 
+    def _from_aside(self, event: ScalarEvent) -> Value:
+        """Return the next value that was read aside: a list or a map of lists."""
+        if len(self.open) + 2 > DEEPEST:
+            raise self._error(event, too_much(DEEPEST))
+        return next(self.aside or iter(()), None)
+
     def _note(self, event: NodeEvent, value: Value) -> None:
         """Keep the tag of a mapping if it is one that is read, refuse others; remember what an anchor names."""
         if event.tag is not None:
@@ -191,7 +214,7 @@ class _Builder:
 
     def _refuse_key(self, event: ScalarEvent, current: Any) -> None:
         """Raise for a key that is there already, is empty or asks for a merge; a quoted << is a name."""
-        if event.value == "":
+        if event.value == "" and not (event.style and self.tags):  # Drake's name of the only body
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
         if event.value in current:
             raise repeated_key(self.source, yaml_events(self.source.text))

@@ -46,6 +46,10 @@ _TABLE = "frametool.stream.table_samples"
 _ARROW = "frametool.formats.arrow_files"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
+_ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
+_NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
+_OPEN3D = rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
@@ -60,6 +64,7 @@ _DH = (
     rf"(?im)\A(?!\s*<){_AT_HEAD}(?<![^\W_])(?:alpha|\u03b1|twist))"
     rf"{_AT_HEAD}(?:{_LENGTH % '[ar]'}|link_length)){_AT_HEAD}(?:{_LENGTH % 'd'}|link_offset))"
 )
+_PCD = rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "
 _KITTI = (
     r"\A(?:#[^\n]*\n)*(?:calib_time: *\d|"
     r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
@@ -96,7 +101,7 @@ FORMATS = {
         reader=_TABLE,
         writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.csv_format",
-        signs=(("header", r"[^\t]*,[^\t]*$"),),
+        signs=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
     ),
     "tsv": Format(
         "tab-separated values with a header",
@@ -248,7 +253,7 @@ FORMATS = {
         writes=("poses", "trajectory"),
         writer="frametool.formats.open3d",
         signs=(
-            ("text", rf"\A\ufeff?\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"),
+            ("text", _OPEN3D),
             ("json path", "parameters/extrinsic"),
         ),
         states=".log holds world<-camera, .json camera<-world",
@@ -423,8 +428,8 @@ FORMATS = {
         reader="frametool.formats.pcd",
         writes=("points", "arrays"),
         writer="frametool.formats.pcd",
-        signs=(("magic", rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "),),
-        states="metres; VIEWPOINT, the pose of the sensor, moves along",
+        signs=(("magic", _PCD),),
+        states="metres; VIEWPOINT: pose of the sensor among the points, w first",
     ),
     "ply": Format(
         "PLY point cloud or mesh",
@@ -474,7 +479,7 @@ FORMATS = {
         writer=_ARROW,
         signs=(("magic", rb"ARROW1"),),
     ),
-    "arrow-stream": Format(
+    "arrows": Format(
         "a stream of Arrow (pip install 'frametool[arrow]')",
         suffixes=(".arrows",),
         reads=("arrays",),
@@ -505,6 +510,21 @@ FORMATS = {
         "camera_info, the intrinsics of a camera",
         signs=(("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
         instead="there is no pose in it; its frame stands in the tree of the robot",
+    ),
+    "intrinsics": Format(
+        "cameras of Kalibr that were calibrated alone",
+        signs=(("yaml inner", r"distortion_coeffs|cam_overlaps"),),
+        instead="there is no pose in it; one would stand under T_cam_imu or T_cn_cnm1",
+    ),
+    "cameras": Format(
+        "cameras.txt of COLMAP, the intrinsics",
+        signs=(("text", rf"\A(?:\s*#[^\n]*\n)*\s*\d+ (?:{_COLMAP_MODELS}) \d+ \d+ "),),
+        instead="there is no pose in it; those of the cameras stand in images.txt beside it",
+    ),
+    "lio": Format(
+        "parameters of FAST-LIO or LIO-SAM",
+        signs=(("yaml inner", r"extrinsic_[TR]|extrinsic(?:Trans|Rot|RPY)|[RP]cl"), ("yaml key", r"extrinsic_[TR]")),
+        instead="extrinsic_T, R are imu<-lidar, extrinsicRot is lidar<-imu; write {xyz: .., matrix: ..} as a tree",
     ),
     "map": Format(
         "map.yaml of a map server",

@@ -26,7 +26,7 @@ def translated(name: str) -> Iterator[None]:
     pa = require_pyarrow(name)
     try:
         yield
-    except (pa.ArrowException, OSError, EOFError, UnicodeDecodeError) as error:
+    except (pa.ArrowException, OSError, EOFError, ValueError, OverflowError, MemoryError) as error:
         first = next(iter(str(error).splitlines()), "") or type(error).__name__
         raise FormatError(f"it cannot be read: {printable(first[:200].rstrip('. '))}", source=name) from None
 

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
 
 HOLDS_TEXTS = True
-BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow", b"\xff\xff\xff\xff": "arrow-stream"}
+BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow", b"\xff\xff\xff\xff": "arrows"}
 MODULES = {
     "parquet": "frametool.formats.parquet",
     "arrow": "frametool.formats.arrow_ipc",
-    "arrow-stream": "frametool.formats.arrow_ipc",
+    "arrows": "frametool.formats.arrow_ipc",
 }  # form -> what reads and writes it
 
 

@@ -36,7 +36,7 @@ class IpcColumns:
         self.name = file.name
         self.pa = require_pyarrow(self.name)
         head = file.head()
-        self.form = "arrow" if head.startswith(MAGIC) else "arrow-stream"
+        self.form = "arrow" if head.startswith(MAGIC) else "arrows"
         self.codec = codec_in(head[BODY_AT:] if self.form == "arrow" else head)
         ipc = require_pyarrow(self.name, "ipc")
         with translated(self.name):
@@ -45,7 +45,7 @@ class IpcColumns:
             else:
                 self.reader = ipc.open_stream(self.pa.PythonFile(file.stream, mode="r"))
             self.schema = self.reader.schema
-        self.names: tuple[str, ...] | None = tuple(self.schema.names)
+            self.names: tuple[str, ...] | None = tuple(self.schema.names)
         self.width = len(self.schema.names)
 
     def kind(self, place: int) -> Kind | None:
@@ -68,12 +68,14 @@ class IpcColumns:
             for at in range(self.reader.num_record_batches):
                 with translated(self.name):
                     rows = self.reader.get_batch(at)
+                    rows.validate(full=True)  # what is broken ends the process where it is touched
                 yield rows
             return
         while True:
             try:
                 with translated(self.name):
                     rows = self.reader.read_next_batch()
+                    rows.validate(full=True)
             except StopIteration:
                 return
             yield rows

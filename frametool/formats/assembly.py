@@ -60,6 +60,10 @@ class Rules:
         self.policy = policy
         self.keep_ns = keep_ns
 
+    def __repr__(self) -> str:
+        """Name the rules with their values."""
+        return f"Rules({', '.join(f'{name}={getattr(self, name)!r}' for name in self.__slots__)})"
+
 
 class Replaced:
     """A sample that took the place of another one at the same stamp."""

@@ -7,6 +7,7 @@ import stat
 from shutil import copyfileobj
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
+from weakref import finalize
 
 from frametool.errors import FormatError
 
@@ -64,9 +65,10 @@ def pieces(stream: BinaryIO) -> Iterator[bytes]:
         yield piece
 
 
-def kept_in_file(stream: BinaryIO) -> BinaryIO:
-    """Return a file with the rest of a stream, for what has to be read here and there."""
-    kept: Any = TemporaryFile()  # noqa: SIM115 - gone when it is let go
+def kept_in_file(stream: BinaryIO, owner: object) -> BinaryIO:
+    """Return a file with the rest of a stream, for what has to be read here and there; it goes with its owner."""
+    kept: Any = TemporaryFile()  # noqa: SIM115 - closed with its owner
+    finalize(owner, kept.close)
     copyfileobj(stream, kept, PIECE)
     kept.seek(0)
     return kept  # type: ignore[no-any-return]

@@ -101,7 +101,7 @@ class _Scene:
             )
 
     def _model(self, model: dict[str, Any], path: Path) -> None:
-        """Give the file of a model its scope, the joints in it their values, and the model its free pose."""
+        """Take a model: put its scope on its file, tell its joints' values, and keep its free pose."""
         name = _named(model, "name")
         only(model, ("name", "file", JOINTS, BODIES))
         found = self._beside(_named(model, "file"), name)
@@ -112,7 +112,8 @@ class _Scene:
         for body, pose in free.items():
             here = (*path, BODIES, body)
             with_base = within(here[-2:], as_mapping, pose, "a pose")
-            self._state(with_base.get("base_frame", WORLD), f"{name}::{body}", with_base, here, len(path))
+            child = f"{name}::{body}" if body else name  # "" is the only body that a model has
+            self._state(with_base.get("base_frame", WORLD), child, with_base, here, len(path))
 
     def _say_joints(self, found: Recording, positions: dict[str, Any], path: Path) -> None:
         """Tell the file of a model where its joints stand; `--joint` wins."""
@@ -127,7 +128,7 @@ class _Scene:
         found.answers = found.answers._replace(joints={**values, **found.answers.joints})
 
     def _include(self, include: dict[str, Any], _: Path) -> None:
-        """Give other directives beside this file their scope."""
+        """Put their scope on other directives beside this file."""
         only(include, ("file", "model_namespace"))
         self._beside(_named(include, "file"), read_name(include, "model_namespace") or "")
 

@@ -40,11 +40,19 @@ def form_of(_file: InputFile, options: Options) -> Poses:
 def poses(file: InputFile, options: Options) -> Iterator[Written]:
     """Yield the vertices as they are written, or the edges."""
     edges = options.answers.edges
-    kinds = MEASURED if edges else VERTICES
+    kinds, others = (MEASURED, VERTICES) if edges else (VERTICES, MEASURED)
+    only_others = 0
     for number, line in text_lines(file):
         words = line.split()
+        if words and words[0] in others:
+            only_others = only_others or number
         if words and words[0] in kinds:
+            only_others = -1
             yield _pose(file, number, words, kinds[words[0]], ids=1 + edges)
+    if only_others > 0:
+        as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
+        found = "vertices in it; leave --edges out" if edges else as_poses
+        raise FormatError(f"only {found}", source=file.name, line=only_others)
 
 
 def _pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int) -> Written:

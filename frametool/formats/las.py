@@ -40,12 +40,15 @@ LIMITS = np.iinfo(np.int32)
 NEW_SCALE = 0.001  # metres, of a file that is made
 COLOURS = {"red", "green", "blue"}
 LAZ = "laz"
+PACKED_AT, PACKED = 104, b"\x80"  # the byte that says so, and from which value on
 
 
-def _laspy(name: str) -> Any:
-    """Import the library, and keep it from printing; raises FileProblem where it is not installed."""
+def _laspy(name: str, *, packed: bool = False) -> Any:
+    """Import the library, and keep it from printing; raises FileProblem where it, or what unpacks, is not installed."""
     try:
         laspy = import_module("laspy")  # it ships no types
+        if packed:
+            import_module("lazrs")
     except ImportError:
         problem = "LAS is read and written with an extra; install it: pip install 'frametool[las]'"
         raise FileProblem(f"{name}: {problem}") from None
@@ -112,10 +115,10 @@ class LasFile:
 
     def __init__(self, file: InputFile) -> None:
         """Read the header; raises FormatError for a broken one, FileProblem where the extra is missing."""
-        laspy = _laspy(file.name)
+        laspy = _laspy(file.name, packed=file.head()[PACKED_AT : PACKED_AT + 1] >= PACKED)
         self.file = file
         if bytes_left(file.stream) is None:
-            file.stream = kept_in_file(file.stream)
+            file.stream = kept_in_file(file.stream, self)
         whole = bytes_left(file.stream) or 0
         with _whole(file.name):
             self.reader = laspy.open(file.stream, closefd=False)
@@ -209,7 +212,7 @@ class LasWriter:
         if set(XYZ) <= new.keys():
             self.header.offsets = np.rint([np.median(new[name]) for name in XYZ])
         with _refusals(self.name):
-            self.writer = _laspy(self.name).LasWriter(
+            self.writer = _laspy(self.name, packed=self.packed).LasWriter(
                 self.kept, self.header, do_compress=self.packed, closefd=False
             )
 

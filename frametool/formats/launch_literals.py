@@ -27,10 +27,10 @@ class NotLiteral(ValueError):
         self.why = why
 
 
-class Scope:
+class Bindings:
     """The names that a module, a function or a class binds: each to an expression, or to None if more than once."""
 
-    def __init__(self, outer: Scope | None) -> None:
+    def __init__(self, outer: Bindings | None) -> None:
         """Create an empty scope inside another."""
         self.outer = outer
         self.bound: dict[str, ast.expr | None] = {}
@@ -64,7 +64,7 @@ class Scope:
             return error
 
 
-def evaluate(node: ast.expr, scope: Scope) -> Literal:
+def evaluate(node: ast.expr, scope: Bindings) -> Literal:
     """Return the value of a literal expression.
 
     Texts, numbers with a sign, lists and tuples of them, their concatenation, `str(0.5)`, `"0 0 1".split()`, and names
@@ -88,7 +88,7 @@ def evaluate(node: ast.expr, scope: Scope) -> Literal:
     return value
 
 
-def _items(node: ast.expr, scope: Scope) -> list[Scalar]:
+def _items(node: ast.expr, scope: Bindings) -> list[Scalar]:
     """Return what an item of a list puts into it: itself, or the items of `*another`."""
     value = evaluate(node.value if isinstance(node, ast.Starred) else node, scope)
     if isinstance(value, list) is not isinstance(node, ast.Starred):
@@ -109,7 +109,7 @@ def _joined(left: Literal, right: Literal) -> Literal | None:
     return left + right if isinstance(left, list) and isinstance(right, list) else None
 
 
-def _called(node: ast.Call, scope: Scope) -> Literal | None:
+def _called(node: ast.Call, scope: Bindings) -> Literal | None:
     """Return `str(number)` or `text.split()`."""
     function, arguments = node.func, [evaluate(each, scope) for each in node.args] if _is_known(node.func) else []
     if isinstance(function, ast.Name) and len(arguments) == 1 and not isinstance(arguments[0], list):
@@ -134,16 +134,16 @@ def _text_of(value: Scalar) -> str | None:
         return None
 
 
-def scopes_of(tree: ast.Module) -> dict[ast.AST, Scope]:
+def scopes_of(tree: ast.Module) -> dict[ast.AST, Bindings]:
     """Return the scope of the module and of each function in it."""
-    scopes: dict[ast.AST, Scope] = {}
-    pending: list[tuple[ast.AST, Scope | None]] = [(tree, None)]
+    scopes: dict[ast.AST, Bindings] = {}
+    pending: list[tuple[ast.AST, Bindings | None]] = [(tree, None)]
     while pending:
         node, scope = pending.pop()
         if isinstance(node, _SCOPES):
             if scope is not None and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
                 scope.bind(node.name, None)
-            scope = scopes[node] = Scope(scope)
+            scope = scopes[node] = Bindings(scope)
         if scope is not None:
             _take(node, scope)
         pending += [(each, scope) for each in _below(node)]
@@ -163,7 +163,7 @@ def _targets(node: ast.AST) -> list[ast.Name]:
     return [each for each in targets if isinstance(each, ast.Name)]
 
 
-def _take(node: ast.AST, scope: Scope) -> None:
+def _take(node: ast.AST, scope: Bindings) -> None:
     """Take in what one node binds or changes."""
     if isinstance(node, ast.Assign | ast.AnnAssign):
         for target in _targets(node):
@@ -190,7 +190,7 @@ def _changes(node: ast.Attribute | ast.Subscript) -> bool:
     return isinstance(node.ctx, ast.Store | ast.Del)
 
 
-def _spoil(name: str, scope: Scope | None) -> None:
+def _spoil(name: str, scope: Bindings | None) -> None:
     """Mark a name, in this scope and those around, as one whose value changes."""
     while scope is not None:
         scope.bound[name] = None

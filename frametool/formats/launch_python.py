@@ -20,7 +20,7 @@ from frametool.formats.launch_actions import (
     not_read,
     runs_publisher,
 )
-from frametool.formats.launch_literals import NotLiteral, Scope, evaluate, scopes_of
+from frametool.formats.launch_literals import Bindings, NotLiteral, evaluate, scopes_of
 from frametool.ros.publisher import CALL
 
 if TYPE_CHECKING:
@@ -53,9 +53,9 @@ def _parsed(source: Source) -> ast.Module:
         raise FormatError(f"not Python 3: {error or 'nested too deeply'}", source=source.name) from None
 
 
-def _walk(tree: ast.Module, scopes: dict[ast.AST, Scope]) -> Iterator[Action]:
+def _walk(tree: ast.Module, scopes: dict[ast.AST, Bindings]) -> Iterator[Action]:
     """Visit all calls, with the conditions around each."""
-    pending: list[tuple[ast.AST, Scope, tuple[str, ...]]] = [(tree, scopes[tree], ())]
+    pending: list[tuple[ast.AST, Bindings, tuple[str, ...]]] = [(tree, scopes[tree], ())]
     while pending:
         node, scope, conditions = pending.pop()
         scope = scopes.get(node, scope)
@@ -78,7 +78,7 @@ def _below(node: ast.AST) -> Iterator[tuple[ast.AST, tuple[str, ...]]]:
                 yield each, under
 
 
-def _action(node: ast.Call, scope: Scope, conditions: tuple[str, ...]) -> Action:
+def _action(node: ast.Call, scope: Bindings, conditions: tuple[str, ...]) -> Action:
     """Make of one call what there is to read or to tell of it."""
     given = {each.arg: each.value for each in node.keywords if each.arg}
     if _name_of(node.func) == "IncludeLaunchDescription":
@@ -101,19 +101,19 @@ def _action(node: ast.Call, scope: Scope, conditions: tuple[str, ...]) -> Action
         return not_read(error.why or f"{shown(_written(error.node))} is not a literal", node.lineno, column)
 
 
-def _is_publisher(given: dict[str, ast.expr], scope: Scope) -> bool:
+def _is_publisher(given: dict[str, ast.expr], scope: Bindings) -> bool:
     """Tell whether the keywords of a call start the publisher."""
     package = _text(given.get("package"), scope)
     return package in PACKAGES and CALL in (_text(given.get(name), scope) for name in _EXECUTABLE)
 
 
-def _is_command(value: ast.expr, scope: Scope) -> bool:
+def _is_command(value: ast.expr, scope: Bindings) -> bool:
     """Tell whether a command line starts the publisher, also if other words of it are not literal."""
     parts = value.elts if isinstance(value, ast.List | ast.Tuple) else ()
     return runs_publisher([_text(part, scope) for part in parts])
 
 
-def _text(value: ast.expr | None, scope: Scope) -> str:
+def _text(value: ast.expr | None, scope: Bindings) -> str:
     """Return a literal text; "" for anything else."""
     try:
         found = evaluate(value, scope) if value is not None else ""

@@ -52,8 +52,9 @@ class NpzFile:
     def __init__(self, file: InputFile, wanted: str) -> None:
         """Find the array; raises FormatError, Unanswered where several fit, BadAnswer for one that is not there."""
         self.file = file
+        is_file = bytes_left(file.stream) is not None
         with _whole(file.name):
-            self.zip = ZipFile(file.stream if bytes_left(file.stream) is not None else kept_in_file(file.stream))
+            self.zip = ZipFile(file.stream if is_file else kept_in_file(file.stream, self))
             self.members = self.zip.infolist()
             self.member = self._chosen(wanted)
             self.array = self._opened(self.member)

@@ -50,7 +50,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         matrices = Matrices(as_mapping(value, "matrices by name"), naming, options.answers, reading)
         if not matrices.poses:
             found = f"; {', '.join(matrices.left[:3])}" if matrices.left else ""
-            raise Misfit(f"no pose in it: of a pose the name says two frames, as body_T_cam0 does{found}")
+            raise Misfit(f"no pose in it{found}; a pose is named after its two frames, as body_T_cam0")
         edges = matrices.edges()
         options.tally.about = matrices.about(edges)
         yield from edges

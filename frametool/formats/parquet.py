@@ -41,9 +41,11 @@ class ParquetColumns:
             self.source = seekable(file)
             self.file = parquet.ParquetFile(self.source, pre_buffer=False)
             self.schema = self.file.schema_arrow
-        self.about = self.file.metadata
+            self.names: tuple[str, ...] | None = tuple(self.schema.names)
+            self.about = self.file.metadata
+            if self.about.num_row_groups:
+                next(self._rows_of(0, 1), None)  # of a damaged group this raises, where its description aborts
         self.told = False
-        self.names: tuple[str, ...] | None = tuple(self.schema.names)
         self.width = len(self.schema.names)
 
     def kind(self, place: int) -> Kind | None:
@@ -67,9 +69,9 @@ class ParquetColumns:
     def _of_group(self, group: int, table: Any) -> Iterator[ArrowBatch]:
         """Yield the batches of a group, of its table or, where that would be too large, as they are read."""
         about = self.about.row_group(group)
-        share = sum(about.column(at).total_compressed_size for at in range(about.num_columns)) / max(about.num_rows, 1)
-        left = about.num_rows
+        left, share = about.num_rows, 0.0
         for rows in self._pieces(group) if table is None else _batches_of(table, self.schema):
+            share = share or _compressed(about) / max(left, 1)
             left -= rows.num_rows
             batch = ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
             yield batch
@@ -87,15 +89,20 @@ class ParquetColumns:
         if not self.told:
             warn(f"{self.name}: groups of rows beyond {LARGEST >> 20} MiB are written in parts")
             self.told = True
-        parquet = require_pyarrow(self.name, "parquet")
-        file = parquet.ParquetFile(self.source, metadata=self.about, buffer_size=BUFFER, pre_buffer=False)
-        pieces = file.iter_batches(batch_size=ROWS, row_groups=[group])
+        pieces = self._rows_of(group, ROWS)
         while True:
             with translated(self.name):
                 rows = next(pieces, None)
             if rows is None:
                 return
             yield rows
+
+    def _rows_of(self, group: int, count: int) -> Iterator[Any]:
+        """Return what reads so many rows of a group at a time."""
+        parquet = require_pyarrow(self.name, "parquet")
+        file = parquet.ParquetFile(self.source, metadata=self.about, buffer_size=BUFFER, pre_buffer=False)
+        found: Iterator[Any] = file.iter_batches(batch_size=count, row_groups=[group])
+        return found
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Return what writes the same schema, compressed in the same way; the form may be another one of Arrow's."""
@@ -123,6 +130,11 @@ class ParquetColumns:
 def _batches_of(table: Any, schema: Any) -> Sequence[Any]:
     """Return a table in batches, one where it has no rows."""
     return table.to_batches(max_chunksize=ROWS) or [no_rows(schema)]
+
+
+def _compressed(group: Any) -> int:
+    """Count the bytes that a group of rows takes in the file."""
+    return sum(group.column(at).total_compressed_size for at in range(group.num_columns))
 
 
 def _codec(name: str) -> str:

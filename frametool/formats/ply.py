@@ -14,6 +14,7 @@ import numpy as np
 from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.formats.declared import bytes_left, check_declared, pieces, read_exactly, rows_of_batch
 from frametool.formats.npy import record_batches
+from frametool.formats.ply_elements import PlyRows
 from frametool.formats.ply_head import TYPES, read_ply_head
 from frametool.formats.structured import StructuredWriter
 from frametool.formats.text_rows import TextRows, TextWriter, same_columns
@@ -139,7 +140,10 @@ class PlyFile:
         """Yield what stands behind the vertices."""
         if self.is_last:
             return (self.behind,)
-        return self._counted(self.text) if self.text is not None else pieces(self.file.stream)
+        if self.text is not None:
+            return self._counted(self.text)
+        behind = self.head.elements[self.head.elements.index(self.vertex) + 1 :]
+        return PlyRows(behind, self.head.order, self.file.name).passing(pieces(self.file.stream))
 
     def _counted(self, text: TextRows) -> Iterator[bytes]:
         """Yield the lines of the other elements; raises FormatError where there are not as many as the header says."""

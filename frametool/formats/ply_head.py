@@ -35,12 +35,21 @@ _MOST = 1 << 62
 
 
 class PlyElement(NamedTuple):
-    """One element: its name, how many there are, its properties as (name, type), "" for the type of a list."""
+    """One element of a file.
+
+    instances: how many there are; line: where it stands in the header
+    layout: of each property its name, the type of a value, and of a list the type of what counts it, else ""
+    """
 
     name: str
     instances: int
-    properties: tuple[tuple[str, str], ...] = ()
+    layout: tuple[tuple[str, str, str], ...] = ()
     line: int = 0
+
+    @property
+    def properties(self) -> tuple[tuple[str, str], ...]:
+        """Return the properties as (name, type); "" for the type of a list."""
+        return tuple((name, "" if counted else code) for name, code, counted in self.layout)
 
     @property
     def lists(self) -> list[str]:
@@ -163,5 +172,7 @@ def _with_property(element: PlyElement, words: Sequence[str], fail: Fail) -> Ply
     name = words[-1]
     if any(name == known for known, _ in element.properties):
         raise fail(f"property {shown(name)} of {shown(element.name)} stands twice")
-    code = "" if is_list else TYPES[words[1]]
-    return element._replace(properties=(*element.properties, (name, code)))
+    codes = [TYPES[each] for each in types]
+    if is_list and codes[0][0] == "f":
+        raise fail(f"{shown(types[0])} counts the values of a list; it has to be an integer")
+    return element._replace(layout=(*element.layout, (name, codes[-1], codes[0] if is_list else "")))

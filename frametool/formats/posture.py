@@ -165,7 +165,7 @@ class Posture:
             self._take(name, [(None, value)])
 
     def _follow(self, fail: Fail) -> None:
-        """Give each joint that nobody told of its leader's value, along chains of any length, or that at rest."""
+        """Settle each joint that nobody told of: at its leader's value, along chains of any length, or at rest."""
         for name, joint in self.joints.items():
             if joint.mimic is None:
                 if name not in self.given:

@@ -63,18 +63,25 @@ def without_slashes(edge: Edge, reading: Reading) -> Edge:
 
 def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
+    if not notes:
+        return
     firsts: dict[str, Note] = {}
     for note in notes:
-        firsts.setdefault(note.message, note)
-    counts = Counter(note.message for note in notes)
+        firsts.setdefault(_alike(note), note)
+    counts = Counter(map(_alike, notes))
     told = list(firsts.values())[:most]
     places = locate_many(source.text, [note.path for note in told])
     for (line, column), note in zip(places, told, strict=True):
         place = source.name if isinstance(source, Pasted) else f"{source.name}:{line}:{column}"
-        again = counts.pop(note.message) - 1
-        warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}")
+        again = counts.pop(_alike(note)) - 1
+        warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}", rule=note.rule)
     if counts:
         warn(f"{source.name}: {counts.total()} more like these")
+
+
+def _alike(note: Note) -> str:
+    """Return what notes have in common that are told once; names with a slash are, whatever they are."""
+    return note.rule if note.rule == "slash" else note.message
 
 
 def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
@@ -181,6 +188,7 @@ def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]
             yield from _messages(entry, here, reading)
         else:
             yield from _entry(entry, here, reading)
+        entries[index] = None  # a million of them need no room beside their edges
 
 
 def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
@@ -216,6 +224,7 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
             yield _message(message, here, reading)
         except Misfit as misfit:
             reading.refuse(misfit.below(*here))
+        message.clear()  # a million of them need no room beside their edges
 
 
 def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:

@@ -80,6 +80,8 @@ class TransformBuffer(Frames):
                 page.samples.append(components)
                 track.last_ns = stamp_ns
                 track.table = None
+                if track.known is not None:
+                    track.known.add(stamp_ns)
                 return False
             if track.add_if_new(stamp_ns, components):
                 return False

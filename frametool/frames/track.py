@@ -8,6 +8,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from itertools import pairwise
 
+from frametool.frames.sample_page import Page
 from frametool.geometry import floats, segment
 
 TYPE_CHECKING = False
@@ -15,12 +16,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import Any, Literal, TypeAlias
 
+    from frametool.frames.sample_page import Way
     from frametool.geometry.types import Rigid
 
     Track: TypeAlias = "StandingTrack | MovingTrack"  # what is known of one child frame; `standing` tells which
-    Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 
-PAGE = 512  # samples: what a late one moves when it is sorted in
+PAGE = 512  # samples: a longer page is cut when a late one falls into it
 DEFAULT_AUTHORITY = "default_authority"
 
 
@@ -59,26 +60,13 @@ class StandingTrack:
         yield None, self.parent, self.components
 
 
-class Page:
-    """Successive samples as three parallel lists, and what was prepared to interpolate after each of them."""
-
-    __slots__ = ("parents", "samples", "segments", "stamps")
-
-    def __init__(self, stamps: list[int], parents: list[str], samples: list[Rigid]) -> None:
-        """Keep the lists."""
-        self.stamps = stamps
-        self.parents = parents
-        self.samples = samples
-        self.segments: dict[int, Way] = {}
-
-
 class MovingTrack:
-    """Samples in the order of time, on pages: one that comes late moves a page of others, not all that follow.
+    """Samples in the order of time, on pages: what comes late is laid on its page, which is sorted when it is asked.
 
     Appending goes to the last page, however long; a page is cut when a late sample falls into it.
     """
 
-    __slots__ = ("authority", "begins", "child", "last_ns", "pages", "parent", "table", "tail", "varies")
+    __slots__ = ("authority", "begins", "child", "known", "last_ns", "pages", "parent", "table", "tail", "varies")
     standing: Literal[False] = False
 
     def __init__(self, child: str, stamp_ns: int, parent: str, components: Rigid) -> None:
@@ -86,21 +74,18 @@ class MovingTrack:
         self.child = child
         self.authority = DEFAULT_AUTHORITY
         self.varies = False
-        self._take([Page([stamp_ns], [parent], [components])])
-
-    def _take(self, pages: list[Page]) -> None:
-        """Keep other pages: none of them empty, in the order of time."""
-        self.pages = pages
-        self.begins = [page.stamps[0] for page in pages]
-        self.tail = pages[-1]
-        self.last_ns = self.tail.stamps[-1]
-        self.parent = self.tail.parents[-1]  # the newest
+        self.tail = Page([stamp_ns], [parent], [components])
+        self.pages = [self.tail]
+        self.begins = [stamp_ns]  # of each page
+        self.last_ns = stamp_ns
+        self.parent = parent  # the newest
+        self.known: set[int] | None = None  # every stamp, once one came late
         self.table: Any = None  # the samples as arrays, for many lookups at once
 
     @property
     def count(self) -> int:
         """Return how many samples there are."""
-        return sum(len(page.stamps) for page in self.pages)
+        return sum(len(page.stamps) + len(page.late) for page in self.pages)
 
     @property
     def first_ns(self) -> int:
@@ -120,6 +105,7 @@ class MovingTrack:
     def walk(self) -> Iterator[tuple[int, str, Rigid]]:
         """Yield every sample as (stamp, parent, components), oldest first."""
         for page in self.pages:
+            page.settle()
             yield from zip(page.stamps, page.parents, page.samples, strict=True)
 
     def changes(self) -> Iterator[int]:
@@ -136,53 +122,68 @@ class MovingTrack:
         page.samples.extend(components)
         self.last_ns = page.stamps[-1]
         self.table = None
+        if self.known is not None:
+            self.known.update(stamps_ns)
 
     def add(self, stamp_ns: int, parent: str, components: Rigid) -> None:
-        """Sort a sample in, after those of the same stamp."""
+        """Take a sample in, after those of the same stamp."""
         self.varies = self.varies or parent != self.parent
-        page = self._short_page(stamp_ns)
-        self._insert(page, bisect_right(page.stamps, stamp_ns), stamp_ns, parent, components)
+        if self.known is not None:
+            self.known.add(stamp_ns)
+        if stamp_ns < self.last_ns:
+            self._lay(stamp_ns, parent, components)
+            return
+        self.tail.stamps.append(stamp_ns)
+        self.tail.parents.append(parent)
+        self.tail.samples.append(components)
+        self.last_ns, self.parent = stamp_ns, parent
+        self.table = None
 
     def add_if_new(self, stamp_ns: int, components: Rigid) -> bool:
-        """Sort a sample in under the newest parent, unless its stamp is there already; return whether it was not."""
-        page = self._short_page(stamp_ns)
-        at = bisect_right(page.stamps, stamp_ns)
-        if at and page.stamps[at - 1] == stamp_ns:
+        """Take a late sample in under the newest parent, unless its stamp is there already; return whether it was not.
+
+        The stamps are kept in a set too: looking for one on the pages costs more than all the rest.
+        """
+        known = self.known
+        if known is None:
+            known = self.known = {stamp for stamp, _, _ in self.walk()}
+        if stamp_ns in known:
             return False
-        self._insert(page, at, stamp_ns, self.parent, components)
+        known.add(stamp_ns)
+        self._lay(stamp_ns, self.parent, components)
         return True
 
-    def _short_page(self, stamp_ns: int) -> Page:
-        """Return the page of a stamp, cut if a late sample would have to move many."""
-        page = self._page(stamp_ns)
-        if stamp_ns >= self.last_ns or len(page.stamps) <= PAGE:
-            return page
-        self._cut(page)
-        return self._page(stamp_ns)
-
-    def _insert(self, page: Page, at: int, stamp_ns: int, parent: str, components: Rigid) -> None:
-        page.stamps.insert(at, stamp_ns)
-        page.parents.insert(at, parent)
-        page.samples.insert(at, components)
+    def _lay(self, stamp_ns: int, parent: str, components: Rigid) -> None:
+        """Lay a late sample on its page; cut the page once it is long."""
+        begins = self.begins
+        number = bisect_right(begins, stamp_ns) - 1
+        if number < 0:
+            number, begins[0] = 0, stamp_ns
+        page = self.pages[number]
+        page.late.append((stamp_ns, parent, components))
         self.table = None
-        if stamp_ns >= self.last_ns:
-            self.last_ns, self.parent = stamp_ns, parent
-        else:
-            page.segments.clear()
-            self.begins[0] = min(stamp_ns, self.begins[0])
+        if len(page.stamps) + len(page.late) > PAGE:
+            self._cut(number)
 
     def _page(self, at_ns: int) -> Page:
         """Return the page of the newest sample that is not after a time; the first page where there is none."""
-        if at_ns >= self.begins[-1]:
-            return self.tail
-        return self.pages[max(bisect_right(self.begins, at_ns) - 1, 0)]
+        page = self.pages[self._number(at_ns)]
+        if page.late:
+            page.settle()
+        return page
 
-    def _cut(self, page: Page) -> None:
+    def _number(self, at_ns: int) -> int:
+        return max(bisect_right(self.begins, at_ns) - 1, 0)
+
+    def _cut(self, number: int) -> None:
         """Cut a page into short ones."""
-        number = self.pages.index(page)
+        page = self.pages[number]
+        page.settle()
+        count = 2 * len(page.stamps) // PAGE
+        ends = [part * len(page.stamps) // count for part in range(count + 1)]
         cut = [
-            Page(page.stamps[at : at + PAGE // 2], page.parents[at : at + PAGE // 2], page.samples[at : at + PAGE // 2])
-            for at in range(0, len(page.stamps), PAGE // 2)
+            Page(page.stamps[begin:end], page.parents[begin:end], page.samples[begin:end])
+            for begin, end in pairwise(ends)
         ]
         self.pages[number : number + 1] = cut
         self.begins[number : number + 1] = [each.stamps[0] for each in cut]
@@ -191,36 +192,48 @@ class MovingTrack:
     def samples_at(self, stamp_ns: int) -> list[tuple[str, Rigid]]:
         """Return the (parent, components) of exactly a stamp, the first that came first."""
         begin, end = bisect_left(self.begins, stamp_ns), bisect_right(self.begins, stamp_ns)
+        pages = self.pages[max(begin - 1, 0) : end]
+        for page in pages:
+            page.settle()
         return [
             (page.parents[at], page.samples[at])
-            for page in self.pages[max(begin - 1, 0) : end]
+            for page in pages
             for at in range(bisect_left(page.stamps, stamp_ns), bisect_right(page.stamps, stamp_ns))
         ]
 
     def replace(self, stamp_ns: int, parent: str, components: Rigid) -> None:
         """Put another sample in the place of the last one at a stamp."""
-        number = bisect_right(self.begins, stamp_ns) - 1
-        page = self.pages[number]
+        page = self._page(stamp_ns)
         at = bisect_right(page.stamps, stamp_ns) - 1
+        before = page.parents[at]
         page.parents[at], page.samples[at] = parent, components
-        for each in self.pages[max(number - 1, 0) : number + 1]:
-            each.segments.clear()
-        varied = self.varies or parent != self.parent
-        self._take(self.pages)
-        self.varies = varied and any(True for _ in self.changes())
+        page.segments.pop(at, None)
+        page.segments.pop(at - 1, None)
+        if at == 0:
+            self.pages[max(self._number(stamp_ns) - 1, 0)].segments.clear()
+        self.parent = self.tail.parents[-1]
+        self.table = None
+        if parent != before:
+            self.varies = any(True for _ in self.changes())
 
     def drop_before(self, stamp_ns: int) -> None:
         """Drop the samples older than a stamp, but never the newest."""
         oldest = min(stamp_ns, self.last_ns)
-        if oldest <= self.first_ns:
+        if oldest <= self.begins[0]:
             return
-        pages = self.pages[self.pages.index(self._page(oldest - 1)) :]
-        at = bisect_left(pages[0].stamps, oldest)
-        for column in (pages[0].stamps, pages[0].parents, pages[0].samples):
-            del column[:at]
-        pages[0].segments.clear()
-        self._take(pages if pages[0].stamps else pages[1:])
-        self.varies = self.varies and any(True for _ in self.changes())
+        if len(self.pages[self._number(oldest - 1)].stamps) > PAGE:
+            self._cut(self._number(oldest - 1))
+        number = self._number(oldest - 1)
+        page = self._page(oldest - 1)
+        count = bisect_left(page.stamps, oldest)
+        may_settle = self.varies and (number > 0 or len({*page.parents[: count + 1]}) > 1)
+        page.drop(count)
+        gone = number + (not page.stamps)
+        del self.pages[:gone], self.begins[:gone]
+        self.begins[0] = self.pages[0].stamps[0]
+        self.table = None
+        if may_settle:
+            self.varies = any(True for _ in self.changes())
 
     def covers(self, at_ns: int) -> bool:
         """Return whether a time lies within the samples."""
@@ -243,6 +256,8 @@ class MovingTrack:
         Between samples under different parents the older one holds, as in tf2.
         """
         page = self.tail if at_ns >= self.begins[-1] else self._page(at_ns)
+        if page.late:
+            page.settle()
         stamps = page.stamps
         at = bisect_right(stamps, at_ns) - 1
         if at < 0:

@@ -1,9 +1,7 @@
 """Numbers as people paste them from other tools, turned into the mappings that `read_pose` takes.
 
-    [[1. 0. 0. 0.5] ..         numpy, also array([..]); MATLAB's [1 0; 0 1]; Eigen's bare lines; 3x4, 4x4
-    0.7071 + 0.7071k           the algebra of tutorials: x, y, z of i, j, k, then w
-    Quaternion(x=0.0, ..)      Python's repr of a message
-    <origin xyz=".." rpy=".."/>
+`pasted_objects` knows what says by its names what its numbers are, `pasted_rows` takes prints of numbers apart; here
+rows get their meaning: 3x3, 3x4 and 4x4 are matrices, others what the caller says.
 
 Each number stays the text it was.  None stands for a text that is nothing of the kind; what is and leaves its
 meaning open comes out as the bare list that the grammar refuses.
@@ -11,11 +9,12 @@ meaning open comes out as the bare list that the grammar refuses.
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid
 from frametool.geometry.representations import notation
+from frametool.grammar.pasted_objects import named_values
+from frametool.grammar.pasted_rows import number_rows
 from frametool.grammar.rotation import spelled
 from frametool.text.numbers import parse_angle, parse_number
 
@@ -23,19 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.geometry.representations import Notation
-
-    Rows = list[list[str]]
-
-DECIMAL = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?"
-NUMBER = rf"[-+]?{DECIMAL}"
-_LABEL = r"\s*[A-Za-z_]\w*+\s*=(?!=)\s*"  # MATLAB's and Python's `T =`
-_CALL = r"\s*[A-Za-z_][\w.]*+\s*\("  # array(, np.array(, tensor(
-_ARGUMENT = r",\s*\w+\s*=\s*[\w.'\":<>]+"  # dtype=float32
-_SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
-_SCALAR = r"(?:np|numpy)\.\w+\(([^()]*)\)"  # numpy 2 in lists: np.float64(0.5)
-_OPEN, _CLOSE = "[({", "])}"
-_TERM = re.compile(rf"([-+]*)((?:{DECIMAL})?)\*?([ijk]?)")
-_MEMBERS = rf"\s*[A-Za-z_]\w*\s*=\s*(?:{NUMBER}|[A-Za-z_][\w.]*\()"
+    from frametool.grammar.pasted_rows import Rows
 
 
 def pasted_poses(text: str, given: Notation | None = None) -> list[Any] | None:
@@ -44,143 +31,10 @@ def pasted_poses(text: str, given: Notation | None = None) -> list[Any] | None:
     given: the notation of numbers that do not say theirs.
     Raises ValueInvalid for what is known and cannot be taken.
     """
-    if (found := quaternion_algebra(text)) is not None:
-        return [found]
-    if re.match(rf"\s*(?:[A-Za-z_][\w.]*\()?{_MEMBERS}", text) and (members := _members(text)) is not None:
-        return [members]
-    if re.match(r"\s*<", text):
-        return _origins(text)
+    if (found := named_values(text)) is not None:
+        return found
     rows = number_rows(text, any_text=given is not None)
     return None if rows is None else _meant(rows, given)
-
-
-def quaternion_algebra(text: str) -> dict[str, Any] | None:
-    """Read `0.7071 + 0.7071k`, `-j`, `0.5i + -0.5j + 0.5k + 0.5`: each unit and the real part once at most."""
-    tight = re.sub(r"\s+", "", re.sub(_LABEL, "", text, count=1) if len(text) < 200 else "")
-    if not tight or tight[-1] not in "ijk0123456789." or not any(each in "ijk" for each in tight):
-        return None
-    parts: dict[str, str] = {}
-    at = 0
-    while at < len(tight):
-        match = _TERM.match(tight, at)
-        if not match or match.end() == at or not (match[2] or match[3]) or (at and not match[1]) or match[3] in parts:
-            return None
-        sign = "-" * (match[1].count("-") % 2)
-        parts[match[3]] = sign + (match[2] or "1")
-        at = match.end()
-    return {"quaternion": {name: parts.get(unit, "0") for name, unit in zip("xyzw", ("i", "j", "k", ""), strict=True)}}
-
-
-def _members(text: str) -> dict[str, Any] | None:
-    """Read `geometry_msgs.msg.Transform(translation=..Vector3(x=1.0, ..), ..)`, or `x=1.0, y=2.0` without a name."""
-    words = re.findall(rf"[A-Za-z_][\w.]*|{NUMBER}|[=(),]|\S", text.strip())
-    stack: list[dict[str, Any]] = [{}]
-    keys: list[str] = []
-    at = 2 if words[1:2] == ["("] else 0  # the outermost name
-    depth = at // 2
-    while at < len(words):
-        word, after = words[at], words[at + 1 : at + 4]
-        if after[:1] == ["="] and len(after) > 1 and word not in stack[-1]:
-            keys.append(word)
-            if after[2:3] == ["("]:
-                stack.append({})
-                at += 4
-                continue
-            if not re.fullmatch(NUMBER, after[1]):
-                return None
-            stack[-1][keys.pop()] = after[1]
-            at += 3
-        elif word == ")" and len(stack) > 1:
-            inner = stack.pop()
-            stack[-1][keys.pop()] = inner
-            at += 1
-        elif word == "," or (word == ")" and depth):
-            depth -= word == ")"
-            at += 1
-        else:
-            return None
-    return stack[0] if len(stack) == 1 and not depth else None
-
-
-def _origins(text: str) -> list[Any] | None:
-    """Read the origins of joints: metres, rpy in radians; the links of one joint are its frames."""
-    plain = re.sub(r"(?s)<!--.*?-->", "", text)
-    found = re.findall(r"<origin\b([^<>]*?)/?>", plain)
-    if not found or re.match(r"\s*<(?!origin\b|joint\b)", plain):
-        return None
-    values = [_origin(attributes) for attributes in found]
-    if len(values) == 1:
-        for key, tag in (("name", "child"), ("parent", "parent")):
-            if names := re.findall(rf"<{tag}\s+link\s*=\s*[\"']([^\"'<>]+)[\"']", plain):
-                values[0][key] = names[0]
-    return values
-
-
-def _origin(attributes: str) -> dict[str, Any]:
-    """Read the attributes of one origin."""
-    value: dict[str, Any] = {"xyz": ["0"] * 3, "rpy": ["0"] * 3}
-    for name, _, numbers in re.findall(r"([\w:]+)\s*=\s*([\"'])(.*?)\2", attributes):
-        if name not in value:
-            raise ValueInvalid(f"unknown attribute {shown(name)} of an origin; it has xyz and rpy")
-        value[name] = numbers.split()
-    return value
-
-
-def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
-    """Take a print of numbers apart into its rows; None for what is none.
-
-    any_text: words beside numbers are kept as they are, for a reader who knows what to say about them.
-    Raises ValueInvalid for a print that was cut, and for commas that may be decimal ones.
-    """
-    body = re.sub(_LABEL, "", text.strip().rstrip(";"), count=1) if re.match(_LABEL, text) else text.strip().rstrip(";")
-    body = re.sub(_SCALAR, r"\1", body)
-    scale = re.match(_SCALE, body)
-    body = body[scale.end() :] if scale else body
-    if call := re.match(_CALL, body):
-        body = re.sub(rf"(?:{_ARGUMENT})*\s*\)\s*$", "", body[call.end() :])
-    if "..." in body and re.search(rf"{NUMBER}[\s,]*\.\.\.", body):
-        raise ValueInvalid("the print was cut at '...'; print all numbers")
-    pieces = _bracketed(body) if body[:1] in _OPEN and body else re.split(r";|\n", body)
-    if pieces is None:
-        return None
-    rows = [_cells(piece) for piece in pieces if piece.strip()]
-    cells = [cell for row in rows for cell in row]
-    fits = any if any_text and not re.search("[:=\"']", body) else all
-    if not cells or not fits(map(_is_number, cells)):
-        return None
-    return [[_times(cell, scale[1]) for cell in row] for row in rows] if scale else rows
-
-
-def _bracketed(body: str) -> list[str] | None:
-    """Return what stands in the innermost brackets; None if there is more than brackets around them."""
-    plain = body.translate(str.maketrans("({)}", "[[]]"))
-    inner = re.findall(r"\[([^\[\]]*)\]", plain)
-    around = re.sub(r"\[[^\[\]]*\]", "", plain)
-    if plain.count("[") != plain.count("]") or re.sub(r"[\[\],;\s]", "", around):
-        return None
-    return inner[0].split(";") if len(inner) == 1 else inner
-
-
-def _cells(row: str) -> list[str]:
-    """Part a row at its blanks or at its commas; raise ValueInvalid where both part it."""
-    row = row.strip().removesuffix(",").strip()
-    gaps = re.findall(r"\s*,\s*|\s+", row)
-    commas = sum("," in gap for gap in gaps)
-    if 0 < commas < len(gaps):
-        raise ValueInvalid(f"{shown(row)} is parted by blanks and by commas; are these decimal commas? write points")
-    return re.split(r"\s*,\s*|\s+", row)
-
-
-def _is_number(cell: str) -> bool:
-    return re.fullmatch(rf"{NUMBER}|[-+]?(?:nan|inf)", cell, re.IGNORECASE) is not None
-
-
-def _times(cell: str, scale: str) -> str:
-    """Multiply a text by the power of ten that stands above a matrix, exactly."""
-    power = re.fullmatch(r"1(?:\.0*)?[eE]([-+]?\d+)", scale)
-    if not power or "e" in cell.lower():
-        raise ValueInvalid(f"a factor {shown(scale)} above numbers is not a power of ten; use format long")
-    return f"{cell}e{power[1]}"
 
 
 def _meant(rows: Rows, given: Notation | None) -> list[Any]:

@@ -30,7 +30,8 @@ SPREAD = ("count", "distance_rms", "distance_max", "angle_rms", "angle_rms_deg",
 VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angular_z")  # m/s, rad/s
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
 NAMES = frozenset(("name", "parent"))
-MOST_NAMED = 5  # unknown keys in one message
+MOST_NAMED = 5  # unknown keys in one message, if they fit into
+MOST_CHARACTERS = 80
 POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", AXES_KEY))
 
 
@@ -154,9 +155,15 @@ def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
 
 
 def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
-    """Name unknown keys, each with its hint, and count those beyond the first few."""
-    named = "; ".join(f"unknown key {shown(key)}{hint.replace('; ', ', ')}" for key, hint in hints[:MOST_NAMED])
-    return named if count <= MOST_NAMED else f"{named}; and {count - MOST_NAMED} more"
+    """Name unknown keys, each with its hint, as long as they fit; and count those beyond."""
+    named: list[str] = []
+    for key, hint in hints:
+        text = f"unknown key {shown(key)}{hint.replace('; ', ', ')}"
+        if named and len("; ".join([*named, text])) > MOST_CHARACTERS:
+            break
+        named.append(text)
+    more = [f"and {count - len(named)} more"] if count > len(named) else []
+    return "; ".join([*named, *more])
 
 
 def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:

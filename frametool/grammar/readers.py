@@ -141,6 +141,8 @@ def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> li
         return value
     if type(value) is not dict:
         raise Misfit(f"expected [{', '.join(names)}], found {kind(value)}")
+    if (*value,) == names:  # most mappings, and in their order
+        return [*value.values()]
     if unknown := [key for key in value if key not in names]:
         raise Misfit(f"unknown key {shown(unknown[0])}; expected {', '.join(names)}", (unknown[0],), key=True)
     if (missing := [name for name in names if name not in value]) and not partial:

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
 SECONDS = {"sec": range(-(1 << 31), 1 << 32), "secs": range(1 << 32)}  # int32 of ROS 2, uint32 of the others
 PARTS = "a TransformStamped has header, child_frame_id, transform"
-_INTEGER = r"(?a) *[-+]?\d{1,25}"
+MOST_DIGITS = 25
+_INTEGER = rf"(?a) *[-+]?\d{{1,{MOST_DIGITS}}}"
 _LEFT_OUT = "<(array|sequence) type: .*>"
 
 
@@ -63,7 +64,7 @@ def read_stamp(value: Any, *, raw: bool = False) -> int:
     """
     stamp = as_mapping(value, "stamp as {sec, nanosec}")
     for names in STAMPS:
-        if set(stamp) == set(names):
+        if (*stamp,) == names or set(stamp) == set(names):
             seconds, nanoseconds = (_whole(stamp, name) for name in names)
             if not raw and (problem := stamp_problem(seconds, nanoseconds, names)):
                 raise problem
@@ -83,6 +84,8 @@ def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Mis
 
 def _whole(stamp: dict[str, Any], key: str) -> int:
     text = stamp[key]
+    if type(text) is str and len(text) <= MOST_DIGITS and text.isascii() and text.isdigit():
+        return int(text)
     if type(text) is not str or not re.fullmatch(_INTEGER, text):
         raise Misfit(f"{key} must be a whole number, found {kind(text)}", (key,))
     return int(text)

@@ -4,6 +4,9 @@
     - Translation: [0.000, 0.000, 0.025]
     - Rotation: in Quaternion [0.000, 0.000, 0.000, 1.000]            ROS 2: in Quaternion (xyzw) [..]
                 in RPY (radian) [0.000, -0.000, 0.000]
+    - Pose [ XYZ (m) ] [ RPY (rad) ]:                                 Gazebo's `gz model -m NAME -p`
+      [0.500000 -1.000000 2.000000]
+      [0.000000 -0.000000 1.570796]
     args="0 0 5 0 0 0 world odom 100"                                 x y z yaw pitch roll parent child ms
 
 All become text of the grammar of poses, and what `pasted_poses` knows with them.  Of a block the quaternion counts:
@@ -20,7 +23,8 @@ from frametool.documents.json_writer import Verbatim, dump
 from frametool.documents.source import Pasted, Source
 from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.frames.stamps import parse_stamp
-from frametool.grammar.pasted import DECIMAL, NUMBER, pasted_poses
+from frametool.grammar.pasted import pasted_poses
+from frametool.grammar.pasted_rows import DECIMAL, NUMBER
 from frametool.grammar.readers import Reading
 from frametool.ros.publisher import CALL, read_call
 
@@ -31,23 +35,30 @@ MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
 _TRANSLATION = re.compile(rf"(?m)^\s*-\s+Translation:\s*{_LIST}")
 _TIME = re.compile(rf"(?m)^\s*At time ({NUMBER})")
-_HEADING = re.compile(r"(?m)^(\S+) seen from (\S+) \(maps points")  # frametool's own block
+_HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _ROTATIONS = (
     ("xyzw", re.compile(rf"in Quaternion(?: \(xyzw\))?\s*{_LIST}")),
     ("rpy", re.compile(rf"in RPY \(radian\)\s*{_LIST}")),
     ("rpy_deg", re.compile(rf"in RPY \(degree\)\s*{_LIST}")),
 )
+_TRIPLE = rf"\[({NUMBER}(?:[ |]+{NUMBER}){{2}})\]"
+_GAZEBO = re.compile(rf"Pose \[ XYZ \(m\) \] \[ RPY \(rad\) \]:\s*{_TRIPLE}\s*{_TRIPLE}")
 _ARGS = re.compile(r"\bargs\s*[=:]\s*([\"'])(.*?)\1", re.DOTALL)
 _ROW = rf"{NUMBER}(?:[ \t]*,[ \t]*|[ \t]+){NUMBER}"
 _BEGIN = re.compile(
     rf"""(?x)\s*(?:
     (?:[A-Za-z_]\w*\s*=\s*)?                                # T =
-    (?: [A-Za-z_][\w.]*\(\s*[-+.\d\[(A-Za-z_]               # array([[.., Quaternion(x=..
-      | [\[({{][\[({{\s]*(?:(?:{NUMBER}|nan|-?inf)(?:[\s;]|\s*[,\])}}])|np\.)  # [[1. 0., [1 0; 0 1], [0, 0, 0.7, 0.7]
-      | {NUMBER}(?:\s*[,;\n]|[ \t]+[-+.\d*]|\s*\Z)           # bare numbers, MATLAB's factor
-      | [-+]?\s*(?:{DECIMAL})?\s*\*?\s*[ijk]\s*(?:[-+]|\Z) | {NUMBER}\s*[-+] )
-    | <(?:origin|joint|node)\b | (?:args|x)\s*=
+    (?: [A-Za-z_][\w.]*\(\s*[-+.\d\[({{A-Za-z_]             # array([[.., Quaternion(x=..
+      | [\[({{][\[({{\s]*(?:{NUMBER}|nan|-?inf)(?:[\s;`*]|\s*[,\])}}])   # [[1. 0., [1 0; 0 1], [0, 0, 0.7, 0.7]
+      | [\[({{][\[({{\s]*(?:np\.|array|Array|Float)
+      | {NUMBER}(?:\s*[,;\n<]|[ \t]+[-+.\d*]|\s*\Z)          # bare numbers, MATLAB's factor
+      | [-+]?\s*(?:{DECIMAL})?\s*\*?\s*[ijk]\s*(?:[-+]|\Z) | {NUMBER}\s*[-+]
+      | \d+[\xd7x]\d+\b | Columns?\ \d | \[,\d | \\(?:left|begin)\b | [⎡⎢⎛│┃┌] | (?:se3|so3|quaternion)\s*\n )
+    | \x1b\[ | Out\[\d | Parameter\ containing: | (?:[A-Za-z_]\w*\s*)?<< | \(x,\s*y,\s*z,\s*w\)\s*= | (?:\w+:\s*)?t\s*=
+    | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=]\s*[\[(\n] | [xyzw]:\s*{NUMBER}\s*,
+    | <(?:origin|joint|node|Matrix|Quaternion|Euler)\b | (?:args|x)\s*=
     | (?:\[\w+\]\ .*\n\s*)*(?:At\ (?:any\ )?time\b|-\ +(?:Translation|Rotation):|\S+\ seen\ from\ )
+    | (?:Requesting\ state\ .*\s+)?(?:Model:\ \[|(?:-\ )?Pose\ \[\ XYZ)
     | .*\b{CALL}\s | --(?:[xyz]|roll|pitch|yaw|q[xyzw]|(?:child-)?frame-id)[ =]
     )"""
 )
@@ -72,7 +83,7 @@ def in_grammar(
         return None
     values: list[Any] | None
     try:
-        values = _blocks(text) or _published(source, normalize=normalize)
+        values = _blocks(text) or _gazebo(text) or _published(source, normalize=normalize)
         values = values or _unless_grammar(source, given, points=points)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source.name) from error
@@ -136,6 +147,14 @@ def _stamp(seconds: str) -> int | None:
         return parse_stamp(seconds)
     except ValueInvalid:
         return None
+
+
+def _gazebo(text: str) -> list[Any]:
+    """Read the pose of a model; raises ValueInvalid where its links and their inertias are printed with it."""
+    found = _GAZEBO.findall(text)
+    if len(found) > 1:
+        raise ValueInvalid(f"Gazebo printed {len(found)} poses; `gz model -m NAME -p` prints the model's alone")
+    return [{"xyz": re.split(r"[ |]+", xyz), "rpy_rad": re.split(r"[ |]+", rpy)} for xyz, rpy in found]
 
 
 def _published(source: Source, *, normalize: bool) -> list[Any]:

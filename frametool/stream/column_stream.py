@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, listing, warn
+from frametool.errors import FormatError, ValueInvalid, listing, warn
 from frametool.formats.column_file import FLOATS, Made, MovesAlong, OutColumn
 from frametool.formats.structured import not_finite
 from frametool.stream.blocks import Run, State
@@ -223,7 +223,7 @@ class ColumnRows:
         """Return which rows cannot be computed: 0 is a point, but no rotation."""
         gone: Flags | None = None
         for shape, flags in zip(self.plan.shapes, absent, strict=False):
-            if shape.notation is not None or self.plan.operation.formula is not None:
+            if shape.notation is not None or self.plan.operation.formula is not None or self.plan.gathered is not None:
                 gone = _either(gone, flags)
         return gone
 
@@ -381,7 +381,7 @@ def run_columns(
     rows = ColumnRows(file, request, source)
     columns = rows.columns() if into is None else rows.named_columns()
     move_along(file, request)
-    if rows.narrow:
+    if rows.narrow and not request.gathered:
         kinds = ", ".join(sorted({kind.name for kind in rows.narrow.values()}))
         warn(f"{source}: {kinds} columns are computed as float64 and rounded once")
     drops = request.on_error == SKIP or request.operation.velocity
@@ -426,10 +426,22 @@ class _InOtherForm:
             if column.passed is None or batch is None:
                 found.append(next(new))
                 continue
-            given = batch.column(column.passed)
-            found.append(Made(given if rows is None else np.asarray(given)[rows]))
+            given, nulls = batch.column(column.passed), None
+            if column.kind is not None and not isinstance(given, np.ndarray):
+                given, nulls = self._with_nulls(batch, column)
+            if rows is not None:
+                given, nulls = np.asarray(given)[rows], None if nulls is None else nulls[rows]
+            found.append(Made(given, nulls))
         kept = [each for each, column in zip(found, self.columns, strict=True) if column in self.kept]
         return self.writer.of_rows(None, None, kept)
+
+    def _with_nulls(self, batch: Batch, column: OutColumn) -> tuple[Floats, Flags | None]:
+        """Return numbers some of which are nulls, nan in their place; raises ValueInvalid where none can stand."""
+        if column.kind is None or column.kind.kind not in FLOATS:
+            name = f"column {column.name}"
+            raise ValueInvalid(f"{name} holds nulls, and {column.kind} has none; -f csv leaves them empty")
+        values, nulls = batch.numbers(column.passed or 0)
+        return values.astype(column.kind), nulls
 
     def end(self) -> bytes | Iterator[bytes]:
         """Return what comes behind the last batch."""

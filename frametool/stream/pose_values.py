@@ -15,10 +15,14 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.table_poses import RowPoses
 from frametool.text.cells import without_quotes
+from frametool.text.shortest import shortest_spans
+from frametool.text.shortest_single import rounded_to_single
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from frametool.stream.table_poses import Cells
     from frametool.text.array_types import Ints
@@ -142,13 +146,22 @@ def spans_of(texts: list[bytes]) -> Spans:
 
 def texts_of(cells: Cells) -> list[str]:
     """Return the text of each cell, without its quotes; of numbers the shortest that reads back."""
-    if not isinstance(cells, Spans):
+    if not isinstance(cells, Spans) and cells.dtype.kind != "f":
         texts: list[str] = cells.astype(np.str_).tolist()
         return [text.lower() for text in texts] if cells.dtype.kind == "b" else texts
+    if not isinstance(cells, Spans):
+        cells = float_spans(cells)
     bare = without_quotes(cells)
     data = bare.data.tobytes()
     places = zip(bare.starts.tolist(), bare.ends.tolist(), strict=True)
     return [data[start:end].decode("utf-8", "replace").strip().replace('""', '"') for start, end in places]
+
+
+def float_spans(values: NDArray[Any]) -> Spans:
+    """Write floats as the shortest text that reads back to the same float of their type."""
+    doubles = values.astype(np.float64) if values.dtype.itemsize > 4 else rounded_to_single(values.astype(np.float64))
+    spans = shortest_spans(doubles.reshape(-1, 1), b",")
+    return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
 
 
 def plain_cell(text: str) -> str | Verbatim | None:

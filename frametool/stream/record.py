@@ -38,6 +38,7 @@ PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque")}
 PARENT_KEYS = ("parent", "frame", "frame_id", "parent_frame_id")  # the frame a record is given in
 NAME_KEYS = ("name", "child_frame_id")  # what a pose is the pose of
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
+KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
 QUATERNION = (*XYZ, "w")
@@ -136,9 +137,9 @@ def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
 
 def _bare_numbers(value: list[Any]) -> Misfit:
     """Build the error for a list that may be anything."""
-    return Misfit(
-        f"a bare list of {len(value)} numbers does not say what it is; write {{rpy_deg: [..]}}, {{xyzw: [..]}}, .."
-    )
+    spellings = {4: "{xyzw: [..]} or {wxyz: [..]}, or give --from"}
+    write = spellings.get(len(value), "{rpy_deg: [..]}, {xyzw: [..]}, ..")
+    return Misfit(f"a bare list of {len(value)} numbers does not say what it is; write {write}")
 
 
 def _search(value: Any, path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[Path, tuple[Path, ...]]]:
@@ -282,6 +283,8 @@ def _refuse_repeated(record: Record, document: Any, path: Path, request: Request
 
 def _with_asked(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
     """Add the numbers under the keys that an expression asks for."""
+    if not request.operation.columns:
+        return record
     numbers, values = record.numbers, record.values
     for name in request.operation.columns:
         found = key_path(document, path, name, "a number")
@@ -332,7 +335,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
         record = record._replace(others=tuple(rotations[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
-    return record._replace(inverse=_is_inverse(value))
+    return record._replace(inverse=True) if _is_inverse(value) else record
 
 
 def _is_pose(positions: Sequence[str], rotation: object) -> bool:
@@ -358,9 +361,10 @@ def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request)
 
 def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> None:
     """Stop at a key that is nearly that of a rotation or a position, where no other says it."""
+    if (rotations and position) or KNOWN.issuperset(value):
+        return
     wanted = [*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)]
-    known = {*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS}
-    unknown = islice((key for key in value if wanted and key not in known), MOST_COMPARED)
+    unknown = islice((key for key in value if key not in KNOWN), MOST_COMPARED)
     if near := [(key, hint) for key in unknown if (hint := _meant(key, value[key], wanted))]:
         raise _unknown(near)
 
@@ -519,9 +523,12 @@ def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
 
 
 def _with_covariance(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
-    """Add the 36 numbers that a message has beside a pose or a twist, if records are moved."""
-    beside = (*path[:-1], "covariance")
-    around = value_at(document, path[:-1]) if path[-1:] == (record.shape.kind,) else None
+    """Add the 36 numbers that a message has beside a pose or a twist, or a record in it, if records are moved."""
+    beside = (*path, "covariance")
+    around = value_at(document, path) if record.shape.kind in (POSE, TWIST) else None
+    if path[-1:] == (record.shape.kind,) and (type(around) is not dict or "covariance" not in around):
+        beside = (*path[:-1], "covariance")
+        around = value_at(document, path[:-1])
     if type(around) is not dict or "covariance" not in around or request.operation.changes_nothing:
         return record
     if request.operation.only_adds:
@@ -554,7 +561,7 @@ def _with_names(
             parent = _named(header, ("frame_id",), (*above, *inside), parent, request)
             if not stamp and "stamp" in header:
                 stamp = _stamp_paths(header["stamp"], (*inside, "stamp"), above)
-    return record._replace(parent=parent, name=name, stamp=stamp)
+    return record._replace(parent=parent, name=name, stamp=stamp) if parent.paths or name.paths or stamp else record
 
 
 def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, request: Request) -> Name:

@@ -81,7 +81,7 @@ class RecordBlocks:
             rest = self._learn_and_cut(text, rest, found)
         for start, end in rest:
             self._take_singly(text, start, end, found)
-        cuts = found.cuts + [_as_cut(template, spans) for template, spans in found.singles.items()]
+        cuts = _by_template(found.cuts + [_as_cut(template, spans) for template, spans in found.singles.items()])
         found.cuts = _in_order(cuts) if self.request.in_order else cuts
         return self._outcome(text, framed(text), found)
 
@@ -287,6 +287,19 @@ def _cut_chunk(template: Template, chunk: bytes, offset: int) -> tuple[Cut | Non
 def _as_cut(template: Template, spans: Sequence[tuple[tuple[int, int], ...]]) -> Cut:
     found = np.fromiter(chain.from_iterable(chain.from_iterable(spans)), np.int64).reshape(len(spans), -1, 2)
     return Cut(template, np.ascontiguousarray(found[:, :, 0]), np.ascontiguousarray(found[:, :, 1]))
+
+
+def _by_template(cuts: Sequence[Cut]) -> list[Cut]:
+    """Join the cuts of each template, whose records then follow each other as in the text."""
+    found: dict[Template, list[Cut]] = {}
+    for cut in cuts:
+        found.setdefault(cut.template, []).append(cut)
+    joined = []
+    for template, each in found.items():
+        starts, ends = (np.concatenate(parts) for parts in ([cut.starts for cut in each], [cut.ends for cut in each]))
+        order = np.argsort(starts[:, 0], kind="stable") if len(each) > 1 else slice(None)
+        joined.append(Cut(template, starts[order], ends[order]))
+    return joined
 
 
 def _in_order(cuts: Sequence[Cut]) -> list[Cut]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, FrametoolError
@@ -12,7 +13,8 @@ from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.scalar import result_of
 from frametool.stream.splitter import ARRAY, Splitter
 from frametool.stream.template import learn, nulled
-from frametool.text.lines import read_blocks
+from frametool.text.lines import BLOCK_BYTES, read_blocks
+from frametool.text.ranges import blocks_behind, extent_in_file
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from frametool.stream.splitter import Part
     from frametool.stream.template import Template
     from frametool.text.lines import ByteStream
+    from frametool.text.ranges import Range
 
 FEW = 16  # records at the end of which a stream that is already complete needs no numpy
 SMALL = 1 << 14  # bytes
@@ -43,8 +46,9 @@ def run_records(
 def _outcomes(
     stream: ByteStream, splitter: Splitter, form: str, request: Request, *, source: str, jobs: int, size: int
 ) -> Generator[Outcome]:
-    options = {"size": size} if size else {}
-    blocks = read_blocks(stream, whole=splitter.whole, **options)
+    jobs = 1 if request.in_order else jobs
+    extent = extent_in_file(stream) if jobs > 1 else None
+    blocks = read_blocks(stream, whole=splitter.whole, size=size or BLOCK_BYTES)
     first = next(blocks, None)
     if first is None:
         return
@@ -57,15 +61,14 @@ def _outcomes(
     from frametool.stream.record_blocks import RecordBlocks
 
     process = RecordBlocks(splitter, form, request, source)
-    jobs = 1 if request.in_order else jobs
-    yield from mapped(process, _again(first, second, blocks), jobs)
-
-
-def _again(first: bytes, second: bytes | None, blocks: Iterator[bytes]) -> Iterator[bytes]:
-    yield first
-    if second:
-        yield second
-    yield from blocks
+    begun = [first, second] if second else [first]
+    following: Iterator[bytes | Range] = blocks
+    if extent is not None:
+        taken = sum(map(len, begun))
+        following = blocks_behind(
+            stream, extent, taken, name=source, size=size or BLOCK_BYTES, whole=lambda: splitter.whole
+        )
+    yield from mapped(process, chain(begun, following), jobs)
 
 
 def _has_ended(stream: ByteStream) -> bool:

@@ -24,7 +24,7 @@ from frametool.grammar.result import Result
 from frametool.stream.memory import Memory
 from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, placed, value_at
 from frametool.stream.request import Request
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
+from frametool.stream.row_layout import COVARIANCE, POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
 from frametool.stream.stamp_source import in_nanoseconds, key_path, read_header_stamp, read_stamp, stamp_keys
 
@@ -109,18 +109,21 @@ def results(source: Source, request: Request, style: Style, memory: Memory | Non
     memory: of the records before this text.
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
-    from frametool.documents.nodes import parse_nodes
+    from frametool.documents.nodes import NOTHING, parse_nodes
 
     nodes: list[Node] = []
     found = False
     memory = memory or Memory()
     for document, records in documents(source, request):
         found = True
-        nodes = nodes or parse_nodes(source.text)
         read = [_answer(document, record, request, source, memory) for record in records]
         answers = [answer for answer in read if answer is not None]
         for unit in dict.fromkeys(_unit(answer.record, document.value) for answer in answers):
             ours = [answer for answer in answers if answer.record.path[: len(unit)] == unit]
+            if all(_says_no_more(answer.record, document, unit) for answer in ours):
+                yield from _values(NOTHING, unit, ours, request, style, source)
+                continue
+            nodes = nodes or parse_nodes(source.text)
             yield from _values(_at(nodes, unit), unit, ours, request, style, source)
     if not found:
         raise FormatError("nothing in it", source=source.name)
@@ -273,13 +276,28 @@ def _pose_result(node: Node, unit: Path, answer: Answer, request: Request) -> Re
             position=pose.position if has_position else None, rotation=pose.rotation if has_rotation else None
         )
     extras: dict[str, Any] = dict(zip(request.operation.extras(POSE), answer.parts[7:], strict=False))
+    if shape.covariance:
+        extras["covariance"] = list(answer.parts[-COVARIANCE:])
     return Result(pose, extras | _rest(node, unit, answer.record))
+
+
+def _used_keys(record: Record) -> set[str]:
+    """Return the keys of a record that say its pose, or what is no longer true of the result."""
+    return {record.key, record.rotation, *record.others, *record.flat, *record.members, *NOT_PLAIN}
+
+
+def _says_no_more(record: Record, document: Document, unit: Path) -> bool:
+    """Tell whether a unit is one pose with its frames and nothing else, so that its text need not be walked again."""
+    value = value_at(document.value, unit[1:])
+    if record.path != unit or record.shape.kind != POSE or type(value) is not dict:
+        return False
+    names = {path[-1] for each in (record.name, record.parent) for path in each.paths if path[:-1] == unit}
+    return _used_keys(record).union(names).issuperset(value)
 
 
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     """Return what a record and the mappings around it say beside the pose, its frames and its stamp."""
-    used = {record.key, record.rotation, *record.others, *record.flat, *NOT_PLAIN}
-    used |= set(record.members)
+    used = _used_keys(record)
     names = {path for each in (record.name, record.parent) for path in each.paths}
     rest: dict[str, Any] = {}
     for depth in range(len(unit), len(record.path) + 1):

@@ -5,6 +5,7 @@ Knows no syntax: what a format found is spans of text, what it wants written is 
 
 from __future__ import annotations
 
+from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -123,7 +124,8 @@ def chosen(spans: Spans, rows: Ints) -> Spans:
 
 
 def texts_as_rows(odd: Sequence[tuple[int, bytes]]) -> tuple[Ints, list[Spans]]:
-    """Return texts as rows at their places."""
+    """Return texts as rows in the order of their places."""
+    odd = sorted(odd, key=itemgetter(0))
     lengths = np.array([len(text) for _, text in odd], np.int64)
     ends = np.cumsum(lengths) + MARGIN
     data = framed(b"".join(text for _, text in odd))

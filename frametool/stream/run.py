@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import shown, warn
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
+from frametool.text.ranges import Range, content
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -110,10 +111,10 @@ def run(
     return bad.finish(rows)
 
 
-def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes], jobs: int) -> Iterator[Outcome]:
+def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes | Range], jobs: int) -> Iterator[Outcome]:
     """Process blocks in order, over several processes if asked for."""
     if jobs < 2:
-        return map(process, blocks)
+        return map(process, map(content, blocks))
     from frametool.stream.workers import spread
 
     return spread(process, blocks, jobs)

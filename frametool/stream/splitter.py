@@ -71,9 +71,15 @@ class Splitter:
             return whole_lines(text) if self.layout else 0
         if MUCH < len(text) < 2 * self._looked:
             return 0
-        ends = [part.end for part in self._values(text, final=False).parts]
-        self._looked = 0 if ends else len(text)
-        return ends[-1] if ends else 0
+        ended = [part for part in self._values(text, final=False).parts if self._has_ended(text, part)]
+        good = [part for part in ended if not part.problem]  # what goes wrong may go on behind the text
+        end = (good or ended)[-1].after if ended else 0
+        self._looked = 0 if end else len(text)
+        return end
+
+    def _has_ended(self, text: bytes, part: Part) -> bool:
+        """Tell whether what goes with a record has come: behind it stands more, or its line has ended."""
+        return not part.outside and (self.layout == ARRAY or part.after < len(text) or text.endswith(b"\n"))
 
     def _whole_documents(self, text: bytes) -> int:
         """Return the end of the last separator; what has been looked at is not looked at again."""

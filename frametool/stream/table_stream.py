@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,15 +12,16 @@ from frametool.stream.blocks import Run, State
 from frametool.stream.faults import NULL, Fault, Misused
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, RowNote, mapped, notes_of
-from frametool.stream.table import UNCLOSED, open_table, table_block
+from frametool.stream.table import BYTE_ORDER_MARK, COMMENT, UNCLOSED, open_table, table_block
 from frametool.stream.table_names import Naming
 from frametool.stream.table_plan import plan_table
 from frametool.stream.trajectory_columns import STAMPS, as_trajectory, has_header
 from frametool.text.cells import RecordEnds, torn_record
-from frametool.text.lines import BLOCK_BYTES, read_blocks
+from frametool.text.lines import BLOCK_BYTES, read_blocks, whole_lines
+from frametool.text.ranges import blocks_behind, extent_in_file
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Callable, Generator, Iterator
 
     from frametool.stream.blocks import Plan
     from frametool.stream.output_columns import Layout
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
     from frametool.text.lines import ByteStream
+    from frametool.text.ranges import Range
 
 
 DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b"", "kitti": b"", "euroc": b","}
@@ -43,13 +46,21 @@ def run_table(
     size: int = 0,
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
+    jobs = 1 if request.in_order else jobs
+    extent = extent_in_file(stream) if jobs > 1 else None
     table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header, size=size)
     request, unasked = settle_stamps(table, request, source)
     plan, layout = plan_table(table, request, source)
     yield Outcome(table.opening(layout), lines=lines, size=taken)
     named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
     work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
-    yield from mapped(work, chain((rest,) if rest else (), blocks), 1 if request.in_order else jobs)
+    following: Iterator[bytes | Range] = blocks
+    if extent is not None:
+        whole = _record_ends(DELIMITERS[form])
+        following = blocks_behind(
+            stream, extent, taken + len(rest), name=source, size=size or BLOCK_BYTES, whole=whole
+        )
+    yield from mapped(work, chain((rest,) if rest else (), following), jobs)
 
 
 class Begun(NamedTuple):
@@ -68,7 +79,7 @@ def begin_table(
     """Read the head of a table in a form; raises FormatError."""
     delimiter = DELIMITERS[form]
     blocks = _blocks(stream, delimiter, size)
-    first = _first_rows(blocks, delimiter)
+    first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
     table, rest = open_table(first, delimiter, header=header and has_header(form, first), source=source)
@@ -78,19 +89,22 @@ def begin_table(
 
 
 def _blocks(stream: ByteStream, delimiter: bytes, size: int) -> Iterator[bytes]:
-    """Return blocks of whole rows; cells in quotes may hold line ends."""
-    size = size or BLOCK_BYTES
-    if not delimiter:
-        return read_blocks(stream, size=size)
-    return read_blocks(stream, size=size, whole=RecordEnds(delimiter))
+    """Return blocks of whole rows."""
+    return read_blocks(stream, size=size or BLOCK_BYTES, whole=_record_ends(delimiter)())
 
 
-def _first_rows(blocks: Iterator[bytes], delimiter: bytes) -> bytes | None:
+def _record_ends(delimiter: bytes) -> Callable[[], Callable[[bytes], int]]:
+    """Return what makes a finder of the ends of rows; cells in quotes may hold line ends."""
+    return partial(RecordEnds, delimiter) if delimiter else lambda: whole_lines
+
+
+def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
     """Return the first blocks, up to one that holds more than comments."""
     text = b""
     for block in blocks:
         text += block
-        if delimiter or any(line.strip() and not line.startswith(b"#") for line in block.splitlines()):
+        lines = text.removeprefix(BYTE_ORDER_MARK).splitlines()
+        if any(line.strip() and not line.startswith(COMMENT) for line in lines):
             return text
     return text or None
 

@@ -96,7 +96,7 @@ def split_blank(block: bytes, columns: int, *, comment: bytes = b"#") -> Cells:
 def whole_records(text: bytes, delimiter: bytes = b",") -> int:
     """Return how many bytes of the text are whole lines, the last of which ends outside quotes."""
     end = text.rfind(b"\n") + 1
-    if _ends_outside_quotes(text[:end], delimiter):
+    if text.find(b'"', 0, end) < 0 or _ends_outside_quotes(text[:end], delimiter):
         return end
     before_last_quote = text.rfind(b"\n", 0, text.rfind(b'"', 0, end)) + 1
     if before_last_quote and _ends_outside_quotes(text[:before_last_quote], delimiter):

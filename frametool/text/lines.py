@@ -25,7 +25,7 @@ BLOCK_BYTES = 1 << 19
 LONGEST_RECORD = 1 << 26
 # A piece this large was not typed: more is on its way, and waiting a moment for it saves much work per block. But
 # nothing that has arrived is kept back for longer than the second number.
-_BULK_BYTES = 1 << 14
+BULK_BYTES = 1 << 14
 _PATIENCE_MS = 5
 _LONGEST_WAIT_S = 0.02
 
@@ -41,12 +41,14 @@ def read_blocks(
     size: int = BLOCK_BYTES,
     longest: int = LONGEST_RECORD,
     whole: Callable[[bytes], int] = whole_lines,
+    lines_before: Callable[[], int] = int,
 ) -> Iterator[bytes]:
     """Yield blocks of whole lines, in order; only the very last may lack its line end.
 
     size: bytes a block has when the stream delivers as fast as they are taken.
     whole: how many bytes of a text are finished records; for records of several lines. A negative number: so many
     bytes are the beginning of a record that goes on behind them, and need not be looked at again.
+    lines_before: counts the lines before the stream, for errors.
     Raises FormatError if one record is longer than `longest`, however the stream was cut.
     """
     ready = _readiness(stream)
@@ -68,7 +70,7 @@ def read_blocks(
                 begun.append(text[:-end])
             pieces = [text[abs(end) :]]
         if held >= longest:
-            what = f"the record that begins in line {line} is longer than {longest} bytes"
+            what = f"the record that begins in line {lines_before() + line} is longer than {longest} bytes"
             raise FormatError(f"{what}: this is no text in lines, or a quote is not closed")
     if rest := b"".join((*begun, *pieces)):
         yield rest
@@ -82,7 +84,7 @@ def _read_piece(stream: ByteStream, size: int, ready: Callable[[int], bool]) -> 
     pieces = [piece]
     missing = size - len(piece)
     until = monotonic() + _LONGEST_WAIT_S
-    while missing > 0 and monotonic() < until and ready(_PATIENCE_MS if len(piece) >= _BULK_BYTES else 0):
+    while missing > 0 and monotonic() < until and ready(_PATIENCE_MS if len(piece) >= BULK_BYTES else 0):
         piece = stream.read1(missing)
         if not piece:
             break

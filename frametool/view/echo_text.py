@@ -8,6 +8,7 @@ from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.result import rotation_numbers
+from frametool.view.pose_text import in_width
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -20,7 +21,7 @@ ROTATIONS = (("quaternion", "Quaternion"), ("rpy_rad", "RPY (radian)"), ("rpy_de
 
 def write_blocks(results: Iterable[Result], target: str, source: str, style: Style) -> Iterator[str]:
     """Yield the blocks as they come; the first begins by saying in words which frame is seen from which."""
-    heading = f"{source} seen from {target} (maps points in {source} to points in {target})\n"
+    heading = in_width(f"{source} seen from {target}", f"(maps points in {source} to points in {target})")
     for result in results:
         yield heading + _block(result, style)
         heading = ""

@@ -32,14 +32,22 @@ class Label(NamedTuple):
 
 
 class TakenBoxes:
-    """Rectangles that nothing may be put over."""
+    """Rectangles that nothing may be put over.
+
+    Of those that are the same to a pixel one is kept: a million frames on one spot cost their names no more than one.
+    """
 
     def __init__(self) -> None:
         """Create an empty grid."""
         self._cells: dict[tuple[int, int], list[Box]] = {}
+        self._known: set[tuple[int, ...]] = set()
 
     def add(self, box: Box) -> None:
         """Take a rectangle."""
+        rounded = tuple(map(round, box))
+        if rounded in self._known:
+            return
+        self._known.add(rounded)
         for cell in _cells(box):
             self._cells.setdefault(cell, []).append(box)
 

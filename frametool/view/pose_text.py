@@ -76,7 +76,13 @@ def _heading(result: Result) -> str:
     source = name if source_at is None else f"{name} at {format_stamp(source_at)}"
     target = parent if at is None else f"{parent} at {format_stamp(at)}"
     across = "" if fixed is None else f" with {fixed} standing still"
-    return f"{source} seen from {target}{across}  (maps points in {name} to points in {parent})\n"
+    return in_width(f"{source} seen from {target}{across}", f"(maps points in {name} to points in {parent})", gap="  ")
+
+
+def in_width(text: str, more: str, *, gap: str = " ") -> str:
+    """Return one line, or two where one is wider than the terminal."""
+    width = get_terminal_size((WIDTH, 0)).columns
+    return f"{text}{gap}{more}\n" if len(text) + len(gap) + len(more) <= width else f"{text}\n  {more}\n"
 
 
 def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[NumberLine]:
@@ -136,9 +142,11 @@ def _columns(lines: Sequence[NumberLine], label: int, style: Style) -> list[str]
 
 
 def _stacked(lines: Sequence[NumberLine]) -> list[NumberLine]:
-    """Put each number on a line of its own."""
+    """Put each number on a line of its own; a line without any has a word to say."""
     return [
-        NumberLine(line.label * (not at), [cell], line.unit) for line in lines for at, cell in enumerate(line.cells)
+        NumberLine(line.label * (not at), cells, line.unit)
+        for line in lines
+        for at, cells in enumerate([[cell] for cell in line.cells] or [[]])
     ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.frames.stamps import format_stamp
+from frametool.view.pose_text import in_width
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -60,4 +61,4 @@ def _chain(entry: dict[str, Any]) -> str:
         said = f"its edges share no time: one begins at {format_stamp(first)}, one ends at {format_stamp(last)}"
     else:
         said = f"all edges have data from {format_stamp(first)} to {format_stamp(last)} ({(last - first) / 1e9:.3f} s)"
-    return f"{entry['parents']}: {said}\n"
+    return in_width(f"{entry['parents']}:", said)

@@ -94,7 +94,7 @@ def main() -> None:
         print("|---|---|---|---|---|---|---|---|")
         for form, path in files.items():
             out = folder / f"out.{form}"
-            apply = [*tool(), "apply", "--transform", POSE, "--quiet", "--force", "-i", path, "-o", out]
+            apply: list[str | Path] = [*tool(), "apply", "--transform", POSE, "--quiet", "--force", "-i", path, "-o", out]
             runs = [measured(apply) for _ in range(options.rounds)]
             copies = [measured(["cp", path, out]) for _ in range(options.rounds)]
             wall, busy = min(run[0] for run in runs), min(run[1] for run in runs)

@@ -17,6 +17,7 @@ from frametool.view.form_list import option_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from conftest import Outcome
 
@@ -109,3 +110,12 @@ def test_the_suffix_of_the_output_chooses_the_form_of_the_list(run: Run, tmp_pat
 
 def test_python_users_have_the_same_table() -> None:
     assert frametool.FORMATS is FORMATS
+
+
+@pytest.mark.parametrize("arguments", [("convert", "--from", "rpy", "0", "0", "1"), ("tree", "{frames: {a: {b: {xyz: [1, 2, 3]}}}}")])
+def test_a_file_whose_suffix_is_no_form_says_what_it_holds(arguments: tuple[str, ...], run: Run, tmp_path: Path) -> None:
+    note = "no form written here has the suffix '.foo'; it holds yaml, -f says another"
+    assert run(*arguments, "-o", "out.foo").err == f"frametool: note: out.foo: {note}\n"
+    assert (tmp_path / "out.foo").read_text() == run(*arguments, "-f", "yaml").out
+    for quiet in (["-o", "out.yml"], ["-o", "plain"], ["-o", "other.foo", "-f", "yaml"], ["-o", "/dev/null"]):
+        assert run(*arguments, *quiet).err == ""

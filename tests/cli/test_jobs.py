@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from shell import by_default, run, start
+from shell import by_default, in_shell, run, start
 
 from frametool.errors import FormatError, UnknownFrame
+from frametool.stream.workers import cores
 
 if TYPE_CHECKING:
     import subprocess
@@ -29,11 +30,21 @@ def begun(*arguments: str) -> tuple[subprocess.Popen[bytes], list[int]]:
     process.stdin.write(HEAD)
     workers: list[int] = []
     while len(workers) < 2:
-        assert process.poll() is None
         process.stdin.write(BLOCK)
         process.stdin.flush()
-        workers = [int(each) for each in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+        workers = children_of(process, 0)
     return process, workers
+
+
+def children_of(process: subprocess.Popen[bytes], count: int) -> list[int]:
+    """Return the processes that a process has started, once there are so many."""
+    found: list[int] = []
+    while not found or len(found) < count:
+        assert process.poll() is None
+        found = [int(each) for each in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+        if not count:
+            break
+    return found
 
 
 @CHILDREN
@@ -59,8 +70,64 @@ def test_a_parent_that_dies_takes_its_workers_along(number: int, tmp_path: Path)
         assert process.wait() == (130 if number == signal.SIGINT else -number)
 
 
+@CHILDREN
+def test_a_worker_that_dies_over_a_file_is_an_error_too(tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").write_bytes(HEAD + BLOCK * 50)
+    process = start(*MOVE, "-i", str(tmp_path / "rows.csv"))  # which nobody reads from yet
+    for worker in children_of(process, 2):
+        os.kill(worker, signal.SIGKILL)
+    out, err = process.communicate()
+    assert err == b"frametool: a process of --jobs died of SIGKILL; the result is not complete\n"
+    assert process.returncode == 5
+    assert len(out) < 50 * len(BLOCK)
+
+
+def test_a_reader_that_goes_ends_all(tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").write_bytes(HEAD + BLOCK * 20)
+    assert in_shell("| head -n 2", *MOVE, "-i", str(tmp_path / "rows.csv")) == (141, HEAD + b"2.0,4.0,6.0\n", b"")
+
+
+def test_a_typed_line_is_answered_at_once() -> None:
+    with start(*MOVE) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for line in (HEAD + b"0,0,0\n", b"1,1,1\n"):
+            process.stdin.write(line)
+            process.stdin.flush()
+            answers = [process.stdout.readline() for _ in range(line.count(b"\n"))]
+            assert len(answers[-1].split(b",")) == 3
+        process.stdin.close()
+        assert (process.stdout.read(), process.wait()) == (b"", 0)
+
+
+def test_zero_means_all_cores(tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").write_bytes(HEAD + BLOCK * 10)
+    told = [run(*MOVE[:-1], count, "-i", str(tmp_path / "rows.csv")) for count in ("0", "1")]
+    assert told[0] == told[1]
+    assert cores() == len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1))
+
+
+ROWS = b"t,x,y,z,yaw\n" + b"0,1,2,3,1\n1,2,2,3,3\n2,3,3,3,5\n"
+RECORDS = b'{"xyz": [1, 2, 3], "rpy": [0, 0, 1]}\n' * 2
+OBSTACLES = [
+    ("each row needs those before it", ROWS, ["convert", "--to", "rpy", "--unwrap"]),
+    ("each row needs those before it", ROWS, ["relative", "--consecutive"]),
+    ("each row needs those before it", ROWS, ["mean"]),
+    ("rows become tum one after the other", ROWS, ["convert", "-f", "tum"]),
+    ("records become csv one after the other", RECORDS, ["convert", "-f", "csv"]),
+]
+
+
+@pytest.mark.parametrize(("obstacle", "rows", "command"), OBSTACLES)
+def test_where_one_process_has_to_do_it_that_is_said_once(obstacle: str, rows: bytes, command: list[str]) -> None:
+    status, out, err = run(*command, text=rows)
+    word = f"frametool: --jobs does not help here: {obstacle}; one process does the work\n".encode()
+    assert run(*command, "--jobs", "3", text=rows) == (status, out, word + err)
+    assert status == 0
+
+
 def test_more_processes_than_anyone_has_are_refused() -> None:
-    for count in ("0", "257", "99999999999999999999"):
+    for count in ("-1", "257", "99999999999999999999"):
         status, out, err = run(*MOVE[:-1], count, text=HEAD)
         assert (status, out, err.count(b"\n")) == (2, b"", 1)
 

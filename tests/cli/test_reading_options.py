@@ -119,6 +119,7 @@ def test_without_a_stream_the_form_is_that_of_the_tree(run: Run) -> None:
         (("tree", "t.yaml", "--in", "xacro"), "is not read: expand it: xacro FILE"),
         (("tree", "t.yaml", "--frames", "a,"), "--frames takes names with commas between them, found 'a,'"),
         (("tree", "t.yaml", "-j", "lift"), "--joint takes NAME=VALUE, found 'lift'"),
+        (("tree", "t.yaml", "-j", "lift=1", "-j", "a=2", "-j", "lift=3"), "--joint 'lift' is given twice, 1 and 3; leave one out"),
         (("tree", "t.yaml", "--direction", "up"), "'up' is not one of 'parent-from-child', 'child-from-parent'"),
     ],
 )

@@ -11,8 +11,9 @@ import yaml
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as some
 
-from frametool.documents import json_reader, source, yaml_events
+from frametool.documents import json_reader, limits, source, yaml_events
 from frametool.documents.document import explain_scalar, format_error, locate, locate_many, parse_documents
+from frametool.documents.json_writer import dump
 from frametool.documents.nodes import parse_nodes
 from frametool.documents.source import decode, read_text
 from frametool.errors import FileProblem, FormatError
@@ -113,11 +114,29 @@ def test_lists_and_maps_are_counted(text: str, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_text_too_long_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(source, "MOST_CHARACTERS", 100)
+    for module in (source, limits):
+        monkeypatch.setattr(module, "MOST_CHARACTERS", 100)
     assert refusal("a" * 101) == "f: longer than 100 characters, the most in one file; split it"
     (tmp_path / "long.yaml").write_text("a" * 101)
     with pytest.raises(FormatError, match="longer than 100 bytes"):
         read_text(tmp_path / "long.yaml")
+
+
+@pytest.mark.parametrize("text", ["1," * 31, "- 1\n" * 31])
+def test_values_in_no_list_of_their_own_are_counted(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "MOST_VALUES", 30)
+    assert refusal(text) == "f: more than 30 commas and line ends, the most in one file; split it"
+
+
+def test_a_million_messages_are_within_the_limits() -> None:
+    stamp = {"sec": 1_700_000_000, "nanosec": 123_456_789}
+    moved, turned = (dict.fromkeys(names, -0.7071067811865476) for names in ("xyz", "xyzw"))
+    transform = {"translation": moved, "rotation": turned}
+    message = {"header": {"stamp": stamp, "frame_id": "f123456"}, "child_frame_id": "f123457", "transform": transform}
+    text = json.dumps(message, indent=4)
+    assert 1e6 * text.count("{") < limits.MOST_CONTAINERS
+    assert 1e6 * (text.count(",") + text.count("\n") + 2) < limits.MOST_VALUES
+    assert 1e6 * len(text) < limits.MOST_CHARACTERS
 
 
 def laughs(depth: int) -> str:
@@ -351,3 +370,9 @@ def test_many_frames_are_read() -> None:
     line, column = locate(document.source.text, (0, "frames", 1999, "rpy_deg", 2))
     assert document.source.text.split("\n")[line - 1][column - 1 :] == "-4.9959]}"
     assert line == 2001
+
+
+@pytest.mark.parametrize("text", ["", "base_link", "-1.5", 'a"b', "a\\b", "a/b", "\u00e9", "\x7f", "\n", "\ud800", *map(chr, range(128))])
+def test_texts_are_written_as_json_writes_them(text: str) -> None:
+    assert json.loads(dump(text)) == text
+    assert dump(text) == json.dumps(text, ensure_ascii=not text.isprintable())

@@ -34,7 +34,7 @@ POSE = "{xyz: [1, -2, 0.5], rpy_deg: [10, 20, 30]}"
 MOVER = frametool.Transform(frametool.Rotation.from_rpy(np.radians([10, 20, 30])), [1, -2, 0.5])
 ROWS = 40
 EXAMPLES = console.ROOT / "examples"
-FORMS = ("parquet", "arrow", "arrow-stream")
+FORMS = ("parquet", "arrow", "arrows")
 
 
 def encoded(table: Any, form: str = "parquet", rows: int | None = 16, codec: str | None = None, **options: Any) -> bytes:
@@ -168,7 +168,7 @@ def test_the_schema_that_parquet_itself_has_stays(use: Use, options: dict[str, A
 
 
 @pytest.mark.parametrize("codec", [None, "lz4", "zstd"])
-@pytest.mark.parametrize("form", ["arrow", "arrow-stream"])
+@pytest.mark.parametrize("form", ["arrow", "arrows"])
 def test_batches_and_their_compression_stay(use: Use, form: str, codec: str | None) -> None:
     data = encoded(cloud(), form, codec=codec)
     made = use("apply", "--transform", POSE, data=data, form=form).data
@@ -330,6 +330,27 @@ def test_the_same_rows_give_the_same_numbers_in_every_form(use: Use, run: Callab
     assert {each.tobytes() for each in found} == {MOVER.apply(points(given)).tobytes()}
 
 
+def test_arrays_of_numpy_take_columns_of_numbers_and_are_taken(run: Callable[..., Outcome], use: Use, tmp_path: Path) -> None:
+    given = cloud(pa.float32()).append_column("gain", pa.array([None, 2.5] * (ROWS // 2)))
+    done = run("apply", "--transform", POSE, "-o", "made.npy", stdin=encoded(given))
+    assert "left out: it holds numbers" in done.err
+    records = np.load(tmp_path / "made.npy")
+    kinds = {"id": "u4", "x": "f4", "y": "f4", "z": "f4", "gain": "f8"}
+    assert {name: records.dtype[name] for name in records.dtype.names} == {name: np.dtype(kind) for name, kind in kinds.items()}
+    assert np.isnan(records["gain"]).tolist() == [True, False] * (ROWS // 2)
+    back = use("convert", "--from", "quaternion", data=(tmp_path / "made.npy").read_bytes())
+    assert back.status == 1  # points are no poses
+    again = use("apply", "--transform", "{xyz: [0, 0, 0]}", data=(tmp_path / "made.npy").read_bytes()).table()
+    assert {field.name: str(field.type) for field in again.schema} == {"id": "uint32", "x": "float", "y": "float", "z": "float", "gain": "double"}
+    assert points(again).tobytes() == np.stack([records[name] for name in XYZ], axis=1).tobytes()
+
+
+def test_whole_numbers_with_nulls_have_no_place_in_an_array(run: Callable[..., Outcome]) -> None:
+    given = cloud().select(XYZ).append_column("n", pa.array([None, 2] * (ROWS // 2)))
+    done = run("apply", "--transform", POSE, "-o", "made.npy", stdin=encoded(given))
+    assert (done.status, done.err) == (1, "frametool: column n holds nulls, and int64 has none; -f csv leaves them empty\n")
+
+
 def test_other_columns_go_into_a_table_of_text(run: Callable[..., Outcome]) -> None:
     given = cloud().slice(0, 2)
     header, first, second = run("apply", "--transform", POSE, "-f", "csv", stdin=encoded(given)).out.splitlines()
@@ -414,14 +435,15 @@ def test_what_is_no_such_file_is_said_in_one_line(use: Use, data: bytes, words: 
     assert words in done.err
 
 
-def test_bytes_that_flipped_are_one_line_or_other_numbers(use: Use) -> None:
-    data = encoded(cloud().select(["id", *XYZ]), codec="zstd")
+@pytest.mark.parametrize("form", FORMS)
+def test_bytes_that_flipped_are_one_line_or_other_numbers(use: Use, form: str) -> None:
+    data = encoded(cloud().select(["id", *XYZ, "tag"]), form, codec="zstd")
     generator = np.random.default_rng(3)
-    for _ in range(60):
+    for _ in range(30):
         broken = bytearray(data)
         for place in generator.integers(4, len(data), 3).tolist():
             broken[place] ^= 1 << int(generator.integers(8))
-        done = use("apply", "--transform", POSE, data=bytes(broken))
+        done = use("apply", "--transform", POSE, data=bytes(broken), form=form)
         assert done.status in (0, 1, 2)
         assert (done.status == 0) == bool(done.data)
         assert len(done.err) < 2000
@@ -443,6 +465,23 @@ def test_columns_that_cannot_be_moved_are_named(use: Use, columns: dict[str, Any
     assert words in done.err
 
 
+def test_a_group_too_large_to_be_held_is_written_in_parts(use: Use, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("parquet", "arrow_writer"):
+        monkeypatch.setattr(f"frametool.formats.{module}.LARGEST", 1 << 20)
+    xyz = np.random.default_rng(4).normal(size=(200_000, 3))
+    given = pa.table(dict(zip(XYZ, xyz.T, strict=True)))
+    done = use("apply", "--transform", POSE, data=encoded(given, rows=None))
+    assert points(done.table()).tobytes() == MOVER.apply(xyz).tobytes()
+    assert done.err.count("\n") == done.err.count("are written in parts") == 1
+    assert pq.ParquetFile(io.BytesIO(done.data)).num_row_groups == 4
+
+
+def test_bytes_are_text_where_they_are_utf_8_and_escaped_elsewhere(run: Callable[..., Outcome]) -> None:
+    given = pa.table({**{name: [1.0, 2.0] for name in XYZ}, "raw": pa.array([b"caf\xc3\xa9", b"\xff\x00"])})
+    rows = run("apply", "--transform", POSE, "-f", "csv", stdin=encoded(given)).out.splitlines()
+    assert [row.split(",")[-1] for row in rows[1:]] == ["caf\u00e9", "\\xff\x00"]
+
+
 def test_without_pyarrow_the_extra_is_named(use: Use, monkeypatch: pytest.MonkeyPatch) -> None:
     data = encoded(cloud())
     for name in [name for name in sys.modules if name.partition(".")[0] == "pyarrow"]:
@@ -456,3 +495,9 @@ def test_without_pyarrow_the_extra_is_named(use: Use, monkeypatch: pytest.Monkey
 
 def test_a_file_of_the_first_feather_says_what_to_do(use: Use) -> None:
     assert "write it anew" in use("apply", "--transform", POSE, data=b"FEA1" + b"\0" * 100).err
+
+
+def test_rows_of_joints_are_refused_by_their_form(use: Use) -> None:
+    done = use("fk", str(EXAMPLES / "arm.urdf"), "arm_base", "tool", data=encoded(cloud()))
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "rows of joints are a table of text, records or messages, not parquet" in done.err

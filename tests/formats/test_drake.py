@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from calibrations import matrix
 from scipy.spatial.transform import Rotation as Peer
 
 from frametool.errors import FormatError
@@ -51,10 +52,6 @@ def read(folder: Path, text: str, *more: str, **options: Any) -> Any:
     (folder / "a.dmd.yaml").write_text(text)
     (folder / "arm.urdf").write_text(ARM)
     return load(folder / "a.dmd.yaml", *(folder / name for name in more), **options)
-
-
-def matrix(tree: Any, target: str, source: str) -> Array:
-    return np.asarray(tree.lookup(target, source).as_matrix())
 
 
 def tip() -> Array:

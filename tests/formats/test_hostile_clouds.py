@@ -123,12 +123,12 @@ def test_a_file_that_is_cut_anywhere_leaves_nothing(run: Run, tmp_path: Path, fo
         ("ply", ply(CLOUD, before="element cam 1000000000\nproperty float f\n")),
     ],
 )
-@pytest.mark.parametrize("piped", [False, True])
-def test_no_memory_is_taken_for_points_that_are_not_there(run: Run, tmp_path: Path, form: str, data: bytes, piped: bool) -> None:
+@pytest.mark.parametrize("way", ["file", "pipe"])
+def test_no_memory_is_taken_for_points_that_are_not_there(run: Run, tmp_path: Path, form: str, data: bytes, way: str) -> None:
     move(run, tmp_path, form, PLY if form == "ply" else GOOD)  # what is loaded once
     tracemalloc.start()
     try:
-        if piped:
+        if way == "pipe":
             status = run("apply", "--transform", "{}", "-o", "out", "-f", form, "--force", stdin=data).status
         else:
             status = move(run, tmp_path, form, data, "--quiet").status

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from calibrations import matrix, read
 from scipy.spatial.transform import Rotation as Peer
 
 from frametool.errors import FormatError, Unanswered
@@ -48,31 +49,22 @@ CAMERAS = (
 )
 
 
-def read(folder: Path, text: str, name: str = "calib.txt", **options: Any) -> Any:
-    (folder / name).write_text(text)
-    return load(folder / name, **options)
-
-
-def matrix(tree: Any, target: str, source: str) -> Array:
-    return np.asarray(tree.lookup(target, source).as_matrix())
-
-
 def test_tr_takes_points_of_the_lidar_to_the_camera(tmp_path: Path) -> None:
-    assert matrix(read(tmp_path, ODOMETRY), "cam0", "velo") == pytest.approx(CAM0_VELO, abs=1e-15)
+    assert matrix(read(tmp_path, ODOMETRY, "calib.txt"), "cam0", "velo") == pytest.approx(CAM0_VELO, abs=1e-15)
 
 
 def test_a_projection_says_the_baseline_to_the_right(tmp_path: Path) -> None:
-    assert read(tmp_path, ODOMETRY).lookup("cam0", "cam1").components == (376.0 / FOCAL, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    assert read(tmp_path, ODOMETRY, "calib.txt").lookup("cam0", "cam1").components == (376.0 / FOCAL, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def test_what_a_projection_says_beyond_its_baseline_is_told(tmp_path: Path) -> None:
     text = f"P0: {projection()}\nP2: {projection(45.0, -0.1, 0.003)}\n"
     with pytest.warns(UserWarning, match=r"calib.txt:2: P2: the baseline -P\[3\]/f is used; the centre of the whole matrix is -0.061714 0.000914 -0.003000 m"):
-        assert read(tmp_path, text).lookup("cam0", "cam2").components[0] == -45.0 / FOCAL
+        assert read(tmp_path, text, "calib.txt").lookup("cam0", "cam2").components[0] == -45.0 / FOCAL
 
 
 def test_rectification_stands_between_the_lidar_and_the_projections(run: Callable[..., Any], tmp_path: Path) -> None:
-    tree = read(tmp_path, OBJECT)
+    tree = read(tmp_path, OBJECT, "calib.txt")
     assert matrix(tree, "cam0_rect", "velo") == pytest.approx(RECT @ CAM0_VELO, abs=1e-15)
     assert matrix(tree, "velo", "imu") == pytest.approx(VELO_IMU, abs=1e-15)
     assert matrix(tree, "cam0_rect", "cam1_rect")[0, 3] == pytest.approx(376.0 / FOCAL)
@@ -98,7 +90,7 @@ def test_raw_files_make_one_tree_in_which_cameras_are_as_they_are(tmp_path: Path
 
 
 def test_frames_are_called_as_told(tmp_path: Path) -> None:
-    assert set(read(tmp_path, ODOMETRY, frames=("left", "right")).frames) == {"left", "right", "velo"}
+    assert set(read(tmp_path, ODOMETRY, "calib.txt", frames=("left", "right")).frames) == {"left", "right", "velo"}
 
 
 @pytest.mark.parametrize(
@@ -116,14 +108,14 @@ def test_frames_are_called_as_told(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_one_placed_line(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(FormatError) as caught:
-        read(tmp_path, ODOMETRY.replace(old, new, 1))
+        read(tmp_path, ODOMETRY.replace(old, new, 1), "calib.txt")
     assert said in str(caught.value)
 
 
 def test_a_file_cut_off_or_without_a_pose_says_so(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"Tr: expected 12 numbers, found 6"):
-        read(tmp_path, ODOMETRY[: ODOMETRY.index("Tr:") + 28])
+        read(tmp_path, ODOMETRY[: ODOMETRY.index("Tr:") + 28], "calib.txt")
     with pytest.raises(FormatError, match="no pose in it"):
-        read(tmp_path, f"P0: {projection()}\n")
+        read(tmp_path, f"P0: {projection()}\n", "calib.txt")
     with pytest.raises(FormatError, match="missing T: beside R:"):
-        read(tmp_path, VELO_TO_CAM.replace("T: ", "X: "))
+        read(tmp_path, VELO_TO_CAM.replace("T: ", "X: "), "calib.txt")

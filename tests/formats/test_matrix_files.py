@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from calibrations import matrix, read
 from scipy.spatial.transform import Rotation as Peer
 
 from frametool.errors import FormatError, Unanswered
-from frametool.formats.load import load
 from frametool.formats.matrix_keys import Ambiguous, Meaning, meaning_of
 
 if TYPE_CHECKING:
@@ -65,15 +65,6 @@ OKVIS = (
     f"     - {{T_SC:\n        [ {line(inverse(CAM1_IMU))}],\n        image_dimension: [752, 480]}}\n"
 )
 VINS = f'%YAML:1.0\n\n#common parameters\nimu_topic:"/imu0"\nViewer.PointSize:2\n{stored("body_T_cam0", inverse(CAM0_IMU), "")}{stored("body_T_cam1", inverse(CAM1_IMU))}'
-
-
-def read(folder: Path, text: str, name: str = "a.yaml", **options: Any) -> Any:
-    (folder / name).write_text(text)
-    return load(folder / name, **options)
-
-
-def matrix(tree: Any, target: str, source: str) -> Array:
-    return np.asarray(tree.lookup(target, source).as_matrix())
 
 
 @pytest.mark.parametrize(
@@ -208,7 +199,7 @@ def test_rectification_projection_and_intrinsics_are_left_out_and_told(run: Call
 
 
 def test_a_file_without_a_pose_says_so(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"no pose in it: .*; LEFT.R \(rectification\)"):
+    with pytest.raises(FormatError, match=r"no pose in it; LEFT.R \(rectification\)"):
         read(tmp_path, f"%YAML:1.0\n---\n{stored('LEFT.R', np.eye(3))}")
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FACE = "element face 2\nproperty list uchar int vertex_indices\nproperty uchar red\n"
 FACES = struct.pack("<B3iBB4iB", 3, 0, 1, 2, 9, 4, 0, 1, 2, 3, 8)
-BINARY = {"binary_little_endian": "<", "binary_big_endian": ">"}
+BINARY = ("binary_little_endian", "binary_big_endian")
 
 
 @pytest.mark.parametrize("form", BINARY)
@@ -26,7 +26,7 @@ def test_vertices_move_and_all_else_passes(run: Run, tmp_path: Path, form: str, 
     given = cloud(30, kind, red="u1", nx="<f4", ny="<f4", nz="<f4")
     data = ply(given, form, after=FACE) + FACES
     done = move(run, tmp_path, "ply", data)
-    head, found, rest = ply_rows(done.data, given.dtype.newbyteorder(BINARY[form]), 30)
+    head, found, rest = ply_rows(done.data, given.dtype.newbyteorder("<" if "little" in form else ">"), 30)
     assert (head, rest) == (data[: len(head)], FACES)
     eps = float(np.finfo(np.dtype(kind)).eps)
     assert np.allclose(xyz(found), moved(xyz(given)), rtol=eps, atol=1e-6)
@@ -112,3 +112,25 @@ def test_results_beside_what_they_come_from_are_new_properties(run: Run, tmp_pat
     assert b"property uchar red\nproperty double map_x\nproperty double map_y\nproperty double map_z\nelement face" in head
     assert np.allclose(xyz(found, "map_x", "map_y", "map_z"), moved(xyz(given)), rtol=1e-12, atol=1e-12)
     assert rest == FACES
+
+
+MESH = "element face {}\nproperty list uchar int vertex_indices\nproperty list ushort float uv\nelement edge 2\nproperty uchar a\n"
+
+
+def mesh(order: str, corners: list[int]) -> bytes:
+    """Return faces with so many corners each, and two edges."""
+    faces = [struct.pack(f"{order}B{n}iH{n - 3}f", n, *range(n), n - 3, *range(n - 3)) for n in corners]
+    return b"".join(faces) + b"ab"
+
+
+@pytest.mark.parametrize("form", BINARY)
+@pytest.mark.parametrize("corners", [[3] * 2000, [3, 4] * 500, [3] * 40 + [4] * 40 + [5, 3, 4] * 9, []])
+def test_faces_of_any_length_pass_and_their_end_is_known(run: Run, tmp_path: Path, form: str, corners: list[int]) -> None:
+    given = cloud(6)
+    faces = mesh("<" if "little" in form else ">", corners)
+    data = ply(given, form, after=MESH.format(len(corners))) + faces
+    assert (move(run, tmp_path, "ply", data).data or b"").endswith(faces)
+    for wrong, said in ((data[:-1], "it ends too early"), (data + b"x", "1 bytes too many")):
+        done = move(run, tmp_path, "ply", wrong)
+        assert (done.data, done.status) == (None, 1)
+        assert f"in.ply: the rest of the file does not fit its header: {said}; is it whole?" in done.err

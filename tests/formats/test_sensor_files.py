@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from calibrations import read
 from scipy.spatial.transform import Rotation as Peer
 
 from frametool.errors import FormatError
@@ -43,11 +44,6 @@ def pose(*numbers: float) -> Any:
     made = np.eye(4)
     made[:3, :3], made[:3, 3] = Peer.from_euler("xyz", numbers[3:]).as_matrix(), numbers[:3]
     return made
-
-
-def read(folder: Path, text: str, name: str = "a.yaml", **options: Any) -> Any:
-    (folder / name).write_text(text)
-    return load(folder / name, **options)
 
 
 def test_two_files_of_autoware_make_one_tree(tmp_path: Path) -> None:

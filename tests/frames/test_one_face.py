@@ -14,6 +14,7 @@ from frametool import FrameTree, Transform, TransformBuffer
 from frametool.errors import BadTopology, LookupFailed, NoDataAt, TooLate, UnknownFrame, ValueInvalid
 from frametool.frames import track as track_module
 from frametool.frames.path import compose_path
+from frametool.frames.sample_page import Page
 from frametool.frames.track import PAGE, MovingTrack
 
 if TYPE_CHECKING:
@@ -208,7 +209,7 @@ class Counting(list[Any]):
 
 @pytest.mark.parametrize("order", ["reverse", "random", "two halves"])
 def test_a_late_sample_moves_a_page_of_others_and_not_all(order: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    class CountingPage(track_module.Page):
+    class CountingPage(Page):
         def __init__(self, stamps: list[int], parents: list[str], samples: list[Any]) -> None:
             super().__init__(Counting(stamps), parents, samples)
 
@@ -254,6 +255,72 @@ def test_the_order_of_inserts_and_the_pages_change_no_answer(page: int, monkeypa
     times = range(min(stamps), max(stamps) + 1)
     assert [in_order.lookup("w", "c", at).components for at in times] == [late.lookup("w", "c", at).components for at in times]
     assert (in_order.lookup_many("w", "c", times).xyzw == late.lookup_many("w", "c", times).xyzw).all()
+
+
+@pytest.mark.parametrize("every", [1, 3, 100])
+@pytest.mark.parametrize("policy", ["frametool", "ros2"])
+def test_lookups_between_late_samples_find_what_is_known_so_far(every: int, policy: str) -> None:
+    draw = random.Random(every)  # noqa: S311 - not for secrets
+    buffer = TransformBuffer(policy=policy, keep_ns=10**12)
+    known: list[int] = []
+    for number, stamp in enumerate(draw.sample(range(1, 5000), 1500)):
+        buffer.insert("a", "b", shifted(stamp), stamp)
+        known.append(stamp)
+        if number % every == 0:
+            at = draw.randint(min(known), max(known))
+            assert buffer.lookup("a", "b", at).xyz == pytest.approx((at, 0.0, 0.0))
+
+
+def test_a_late_sample_costs_one_sort_of_its_page_when_somebody_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    settled: list[int] = []
+
+    class WatchedPage(Page):
+        def settle(self) -> None:
+            settled.extend([len(self.stamps) + len(self.late)] * bool(self.late))
+            super().settle()
+
+    monkeypatch.setattr(track_module, "Page", WatchedPage)
+    count = 20_000
+    buffer = TransformBuffer()
+    for stamp in range(count, 0, -1):
+        buffer.insert("a", "b", shifted(stamp), stamp)
+    assert sum(settled) < 4 * count
+    assert max(settled) <= PAGE + 1
+
+
+def test_of_two_poses_at_a_stamp_the_last_holds_however_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(track_module, "PAGE", 4)
+    buffer = TransformBuffer()
+    order = [9, 3, 7, 1, 5, 8, 2, 6, 4]
+    for stamp in order:
+        assert not buffer.insert_components("a", "b", shifted(stamp).components, stamp)
+    for stamp in order:
+        assert buffer.insert_components("a", "b", shifted(-stamp).components, stamp)
+        assert not buffer.insert_components("a", "b", shifted(-stamp).components, stamp)
+        assert [*buffer.lookup("a", "b", stamp).xyz] == [-stamp, 0.0, 0.0]
+    track = buffer.track("b")
+    assert isinstance(track, MovingTrack)
+    assert track.count == len(order)
+    assert [stamp for stamp, _, _ in track.walk()] == sorted(order)
+
+
+def test_what_is_forgotten_in_order_moves_short_pages_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    dropped: list[int] = []
+
+    class WatchedPage(Page):
+        def drop(self, count: int) -> None:
+            dropped.append(len(self.stamps))
+            super().drop(count)
+
+    monkeypatch.setattr(track_module, "Page", WatchedPage)
+    buffer = TransformBuffer(keep_ns=5000)
+    for stamp in range(20_000):
+        buffer.insert("a", "b", shifted(stamp), stamp)
+    assert max(dropped) <= PAGE
+    track = buffer.track("b")
+    assert isinstance(track, MovingTrack)
+    assert track.span == (14_999, 19_999)
+    assert track.count == 5001
 
 
 def test_what_is_too_old_is_dropped_across_pages(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError
 from frametool.formats import readers
@@ -14,6 +14,9 @@ from frametool.stream.record_stream import run_records
 from frametool.stream.request import Request
 from frametool.stream.run import run
 from frametool.stream.table_stream import run_table
+
+if TYPE_CHECKING:
+    from io import BufferedReader
 
 QUARTER = (1.0, 2.0, 3.0, 0.0, 0.0, 0.7071067811865476, 0.7071067811865476)
 MOVE = Request(Operation(left=QUARTER, moves=True), way=lambda _own: QUARTER, rename=lambda _parent, name: (None, name))
@@ -31,16 +34,24 @@ class Flow(NamedTuple):
 
 
 def flow(
-    text: bytes, request: Request, form: str = "csv", *, header: bool = True, size: int = 0, jobs: int = 1, most: int = MOST
+    text: bytes | BufferedReader,
+    request: Request,
+    form: str = "csv",
+    *,
+    header: bool = True,
+    size: int = 0,
+    jobs: int = 1,
+    most: int = MOST,
 ) -> Flow:
+    stream = io.BytesIO(text) if isinstance(text, bytes) else text
     out = io.BytesIO()
     told: list[str] = []
     bad = BadRows("in", request.on_error, most=most, tell=lambda error: told.append(str(error)))
     try:
         if form in readers("records"):
-            outcomes = run_records(io.BytesIO(text), form, request, source="in", size=size, jobs=jobs)
+            outcomes = run_records(stream, form, request, source="in", size=size, jobs=jobs)
         else:
-            outcomes = run_table(io.BytesIO(text), form, request, source="in", header=header, size=size, jobs=jobs)
+            outcomes = run_table(stream, form, request, source="in", header=header, size=size, jobs=jobs)
         status = run(outcomes, lambda block: [out.write(block)].clear(), bad, lambda _rows, _size: None)
     except FrametoolError as error:
         told.append(str(error))

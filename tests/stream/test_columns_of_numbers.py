@@ -286,3 +286,22 @@ def test_columns_that_stand_one_by_one_are_the_same_array(use: Use, array: Array
 
 def test_an_array_of_no_rows_stays_one(use: Use) -> None:
     assert loaded(use("apply", "--transform", POSE, "-f", "npy", data=npy(POINTS[:0]))).shape == (0, 3)
+
+
+def test_points_without_numbers_do_not_count_in_a_mean(use: Use) -> None:
+    points = POINTS.copy()
+    points[3] = np.nan
+    found = json.loads(use("mean", "-f", "json", data=npy(points)).out)
+    assert found["count"] == 49
+    assert np.allclose(found["xyz"], np.delete(POINTS, 3, axis=0).mean(axis=0))
+
+
+@pytest.mark.parametrize("precision", [(), ("--precision", "3")])
+def test_rows_of_csv_in_bulk_are_those_written_one_by_one(use: Use, precision: tuple[str, ...]) -> None:
+    power = (RNG.normal(size=50) * 1e6).astype("f4")
+    records = with_fields(POINTS, ring=np.arange(50, dtype="u2"), weight=RNG.normal(size=50), power=power)
+    apply = ("apply", "--transform", POSE, *precision, "-f", "csv")
+    rows = use(*apply, data=npy(records)).out.splitlines()
+    singly = [use(*apply, data=npy(records[at : at + 1])).out.splitlines()[1] for at in range(50)]
+    assert rows[1:] == singly
+    assert [float(row.split(",")[-1]) for row in rows[1:]] == [float(str(value)) for value in power]

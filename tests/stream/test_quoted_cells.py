@@ -23,7 +23,7 @@ def test_a_long_cell_passes_in_blocks_of_any_size(cell: bytes) -> None:
 
 
 def test_a_record_beyond_the_limit_is_refused_with_its_line_whatever_the_block(monkeypatch: pytest.MonkeyPatch) -> None:
-    defaults = {"size": lines.BLOCK_BYTES, "longest": 5000, "whole": lines.whole_lines}
+    defaults = {**(lines.read_blocks.__kwdefaults__ or {}), "longest": 5000}
     monkeypatch.setattr(lines.read_blocks, "__kwdefaults__", defaults)
     for cell in (b'"' + b"a\n" * 3000 + b'"', b"x" * 5000):
         text = ROWS + b"4,5,6," + cell + b"\n7,8,9,b\n"

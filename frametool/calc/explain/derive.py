@@ -12,6 +12,7 @@ from frametool.calc.explain.agreement import (
     DerivationStyle,
     DerivationWrong,
     check_rotation,
+    check_vector,
     end,
     end_with_pose,
     explained,
@@ -20,7 +21,8 @@ from frametool.calc.explain.agreement import (
 )
 from frametool.calc.explain.chain import MOST_SHOWN, chain, joined_across
 from frametool.calc.explain.given import Given, frames_of
-from frametool.calc.explain.operations import between, compose, extent, inverse, product, relative
+from frametool.calc.explain.operations import between, compose, extent, inverse, relative
+from frametool.calc.explain.other_axes import with_other_axes
 from frametool.calc.explain.short_ways import SHORT
 from frametool.errors import printable
 from frametool.grammar import pose_algebra
@@ -30,21 +32,21 @@ from frametool.grammar.result import Result
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.calc.explain.other_axes import OtherAxes
     from frametool.calc.explain.render import Explanation
     from frametool.calc.explain.sheet import Sheet
     from frametool.frames.lookups import Frames
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.pose import Pose
-    from frametool.grammar.readers import Quaternion
 
 
 def derive_convert(
-    given: Given, plan: DerivationStyle, *, own: Pose | None = None, turn: tuple[str, Quaternion] | None = None
+    given: Given, plan: DerivationStyle, *, own: Pose | None = None, change: OtherAxes | None = None
 ) -> Explanation:
     """Derive one pose or rotation in the notations asked for.
 
-    own: what the command makes of it.  turn: a change of axes by name, multiplied from the right.
+    own: what the command makes of it.  change: of its axes.
     """
     result = Result(own or given.pose)
 
@@ -52,10 +54,12 @@ def derive_convert(
         sheet.reached(given.position)
         hub: Rigid | None = None
         for form in plan.notations:
-            numbers = None if turn or given.inverse else _short_way(sheet, given, form, plan)
+            numbers = None if change or given.inverse else _short_way(sheet, given, form, plan)
             if numbers is None:
                 if hub is None:
-                    hub = _hub(sheet, given, turn)
+                    hub = _hub(sheet, given, change)
+                    if result.pose.position is not None:
+                        check_vector(sheet, hub[:3], result.pose.position)
                 numbers = written(sheet, hub[3:], form, plan)
             check_rotation(sheet, form, numbers, result, plan)
             matrix_of_pose(sheet, form, result)
@@ -68,19 +72,14 @@ def _title(given: Given) -> str:
     return "identity" if given.notation is None else given.notation.spec
 
 
-def _hub(sheet: Sheet, given: Given, turn: tuple[str, Quaternion] | None) -> Rigid:
-    """Add the way from what is written to the quaternion."""
+def _hub(sheet: Sheet, given: Given, change: OtherAxes | None) -> Rigid:
+    """Add the way from what is written to the position and the quaternion."""
     q = given.quaternion(sheet)
     x, y, z = given.position
     pose: Rigid = (x, y, z, *q)
     if given.inverse:
         pose = inverse(sheet, pose, "child", "parent")
-    if turn is None:
-        return pose
-    name, change = turn
-    sheet.heading(f"Other axes: {name}")
-    sheet.say(f"a is the rotation so far, b = {name}: the pose of the new axes in the old ones.")
-    return *pose[:3], *product(sheet, pose[3:], change)
+    return pose if change is None else with_other_axes(sheet, pose, change)
 
 
 def _short_way(sheet: Sheet, given: Given, form: Notation, plan: DerivationStyle) -> Sequence[float] | None:

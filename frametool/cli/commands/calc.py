@@ -71,8 +71,8 @@ def command(
 
     \b
       frametool calc --tree robot.yaml 'inv(map<-base_link) * (map<-tool)'
-      frametool calc --tree robot.yaml '(map<-lidar) * [1, 0, 0]' 'dist(map<-tool, map<-lidar)'
-      frametool calc d=drive.yaml 'angle(d[map<-base_link @ 0.5s], d[map<-base_link @ 3.5s])' --deg
+      frametool calc --tree robot.yaml '(map<-lidar) * [1, 0, 0]' 'inv(map<-tool)'
+      frametool calc d=drive.yaml 'dist(d[map<-box @ 1s], d[map<-box @ 3s])'
       frametool calc --tree robot.yaml '(map<-lidar) * row' -i cloud.csv
       frametool calc -e 'd=norm(trans(row))' -e 'heading=rpy(row)' -i walk.tum
 
@@ -96,7 +96,7 @@ def command(
         return stream.run(request, output)
     from frametool.cli.calc_output import value_texts
 
-    output.pieces(value_texts(list(_results(lines, scope)), output.style))
+    output.pieces(value_texts(_results(lines, scope), output.style))
     return 0
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
 import click
@@ -55,9 +57,20 @@ def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> i
     recordings = opened(files)
     findings = check(recordings, normalize=normalize)
     state(recordings)
+    text = WRITERS[form](findings)
     with writing(None) as write:
-        write(WRITERS[form](findings))
+        write(_in_terminal(text) if form == "text" and sys.stdout.isatty() else text)
     return FAILED if _fails(findings, strict=strict) else 0
+
+
+def _in_terminal(text: str) -> str:
+    """Break lines between words where the terminal ends."""
+    from textwrap import TextWrapper
+
+    wrapper = TextWrapper(
+        get_terminal_size().columns, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    )
+    return "".join(f"{wrapper.fill(line)}\n" for line in text.splitlines())
 
 
 def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:

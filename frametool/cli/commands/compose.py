@@ -31,9 +31,9 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
 
     \b
       frametool compose '{xyz: [1, 2, 3]}' '{rpy_deg: [0, 0, 90]}'
-      frametool lookup robot.yaml map base_link | frametool compose - '{xyz: [0, 0, 1]}'
+      frametool lookup robot.yaml map tool | frametool compose - '{xyz: [0,0,1]}'
       frametool compose 'inv({xyz: [1, 2, 3]})' '~{rpy_deg: [0, 0, 90]}'
-      frametool lookup robot.yaml map base_link | frametool compose inv - '{xyz: [14, -4, 0]}'
+      frametool compose inv '{rpy_deg: [0, 0, 90]}' '{xyz: [14, -4, 0]}'
 
     POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch. The
     inverse of any of them is inv(POSE) or ~POSE, in quotes, or the word inv before it.

@@ -27,6 +27,7 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.calc.explain.other_axes import OtherAxes
     from frametool.documents.source import Source
     from frametool.geometry.representations import Notation
     from frametool.stream.operation import Operation
@@ -90,7 +91,7 @@ def command(
     \b
       frametool convert --from rpy_deg 0 0 90
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
-      frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle --format json
+      frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle -f json
       frametool convert --axes optical --to rpy_deg
       frametool convert --from rpy_deg 10 20 30 --to euler:all
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
@@ -104,10 +105,8 @@ def command(
     stream, explaining = Stream(options), Explaining(options)
     output = Output("poses", deg=deg, **options)
     if explaining:
-        if world is not None:
-            raise click.UsageError("--explain derives a change of axes on one side; leave --world-axes out")
         explaining.plan(output, stream)
-        one_argument(values[0] if values else axes)
+        one_argument(values[0] if values else axes or world)
     from frametool.stream.operation import Operation
     from frametool.stream.request import Request
 
@@ -155,8 +154,8 @@ def command(
         from frametool.calc.explain.derive import derive_convert
 
         written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
-        change = (axes or "", operation.right[0][3:]) if operation.right and values else None
-        return explaining.write(derive_convert(written, explaining.plan(output), own=poses[0], turn=change), output)
+        change = _named_change(axes, world, operation) if values else None
+        return explaining.write(derive_convert(written, explaining.plan(output), own=poses[0], change=change), output)
     output.values(results)
     output.tell_of_lock(poses)
     return 0
@@ -219,6 +218,15 @@ def _change_of_axes(axes: str | None, world: str | None) -> Operation:
     before = (0.0, 0.0, 0.0, *left.components) if left is not None else None
     behind = ((0.0, 0.0, 0.0, *right.components),) if right is not None else ()
     return Operation(before, behind, turns=True, mirrors=mirrors)
+
+
+def _named_change(axes: str | None, world: str | None, operation: Operation) -> OtherAxes | None:
+    """Return the change of axes for a derivation, None without one."""
+    from frametool.calc.explain.other_axes import OtherAxes
+
+    left = (world, operation.left[3:]) if world and operation.left else None
+    right = (axes, operation.right[0][3:]) if axes and operation.right else None
+    return OtherAxes(left, right, operation.mirrors) if left or right else None
 
 
 def _say_other_side(axes: str | None, world: str | None) -> None:

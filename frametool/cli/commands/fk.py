@@ -11,6 +11,7 @@ from frametool.cli.output import Output
 from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import RECORDS, Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, opened, state
+from frametool.formats import holds_arrays
 from frametool.formats.detect import detect
 from frametool.formats.robot import robot_of
 from frametool.stream.faults import ROWS_SKIPPED
@@ -33,7 +34,7 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
 
     \b
       frametool fk arm.urdf arm_base tool -i joints.csv
-      frametool fk arm.urdf tool right_finger -i joints.csv --to rpy_deg --prefix finger_
+      frametool fk arm.urdf tool right_finger -i joints.csv --prefix finger_
       printf 't,gripper_mm\\n0,12.5\\n' | frametool fk arm.urdf tool left_finger
       ros2 topic echo /joint_states | frametool fk arm.urdf arm_base tool -f csv
 
@@ -52,6 +53,8 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
     name = stream.path or "stdin"
     begin = stream.opened().peek()
     form = stream.told_form() or detect(begin, *STREAMED, name=stream.path or "")[0]
+    if holds_arrays(form):
+        raise click.UsageError(f"rows of joints are a table of text, records or messages, not {form}")
     names = names_in(begin, form, name, header=stream.options["header"])
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
     file.tally.about = f"{len(rows.columns)} of {len(robot.joints)} joints from the rows"

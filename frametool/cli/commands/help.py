@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from shutil import get_terminal_size
+from textwrap import fill
 from typing import Any
 
 import click
@@ -26,6 +28,11 @@ def topic(name: str) -> str:
     """Return the text of a subject."""
     with open(os.path.join(FOLDER, f"{name}.txt"), encoding="utf-8") as file:
         return file.read()
+
+
+def _wrapped(line: str, indent: int) -> str:
+    """Return a line, or several in the width of the terminal."""
+    return fill(line, min(get_terminal_size().columns, 100), subsequent_indent=" " * indent) + "\n"
 
 
 class Topic(click.ParamType[str]):
@@ -68,6 +75,7 @@ def command(ctx: click.Context, name: str | None) -> None:
     if name is not None and name not in known:
         raise click.UsageError(f"no topic {shown(name)}{alternatives(name, tuple(known | COMMANDS), 'topics')}")
     width = max(map(len, known))
-    listed = "".join(f"  {each:{width}}  {about}\n" for each, about in known.items())
+    listed = "".join(_wrapped(f"  {each:{width}}  {about}", width + 4) for each, about in known.items())
+    all_commands = _wrapped(f"Commands: {', '.join(COMMANDS)}", 2)
     with writing(None) as write:
-        write(topic(name) if name else f"Topics (frametool help TOPIC):\n\n{listed}\nCommands: {', '.join(COMMANDS)}\n")
+        write(topic(name) if name else f"Topics (frametool help TOPIC):\n\n{listed}\n{all_commands}")

@@ -26,8 +26,8 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
     """Print poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
 
     \b
-      frametool interpolate '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0], rpy_deg: [0, 0, 90]}' 0.5
-      frametool interpolate '{rpy_deg: [0, 0, 0]}' '{rpy_deg: [0, 0, 90]}' 0 0.25 0.5 0.75 1 --format csv
+      frametool interpolate '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0]}' 0.5
+      frametool interpolate '{rpy: [0, 0, 0]}' '{rpy: [0, 0, 1]}' 0 0.5 1 -f csv
 
     The rotation takes the shorter arc. Fractions outside 0 .. 1 extrapolate. Unlike a screw motion, position and
     rotation are independent.

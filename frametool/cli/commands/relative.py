@@ -59,8 +59,8 @@ def command(
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
     \b
-      frametool relative '{xyz: [1, 0, 0]}' '{xyz: [1, 2, 0], rpy_deg: [0, 0, 90]}'
-      frametool lookup robot.yaml map base_link | frametool relative - '{xyz: [1, 2, 0]}'
+      frametool relative '{xyz: [1, 0, 0]}' '{rpy_deg: [0, 0, 90]}'
+      frametool lookup robot.yaml map tool | frametool relative - '{xyz: [1,2,0]}'
 
     A and B are poses in one frame: mappings, files, or - for standard input. distance in metres; angle in radians,
     angle_deg in degrees.

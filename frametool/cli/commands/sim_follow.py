@@ -37,7 +37,7 @@ def command(leader: str, explain_step: int | None, explain: str | None, **option
     \b
       frametool sim follow
       frametool sim follow --spawn 1,1,0 --leader square --format csv
-      frametool sim follow --leader figure8 --followers 3 --plot chain.svg --emit tf
+      frametool sim follow --leader figure8 --followers 3 --plot f.svg --emit tf
       frametool sim follow --explain-step 3
 
     A leader file has t, linear, angular as CSV, JSON or YAML; standard input also takes Twist messages and the words

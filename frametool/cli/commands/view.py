@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -186,7 +187,7 @@ def _content(
     if form == "text":
         from frametool.view.frames_terminal import TerminalPicture
 
-        return TerminalPicture(scene, *PIPE_SIZE, eye).text()
+        return TerminalPicture(scene, *get_terminal_size(PIPE_SIZE), eye).text()
     from frametool.view.frames_picture import still_picture
 
     still = still_picture(scene, eye, title, before)

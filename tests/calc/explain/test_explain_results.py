@@ -7,6 +7,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from recheck import recheck
 from written import HOSTILE, ROTATIONS, SPECS, rotation, seeded
 
 import frametool
@@ -155,3 +156,20 @@ def test_a_representation_without_a_block_is_refused_in_one_line(monkeypatch: py
     outcome = run("convert", "--from", "mrp", "0.1", "0", "0", "--explain")
     assert (outcome.status, outcome.out) == (1, "")
     assert outcome.err.startswith("frametool: there is no derivation of 'mrp'; derived are quaternion, xyzw, wxyz, rpy")
+
+
+SIDES = [
+    ["--world-axes", "enu_from_ned", "--axes", "frd_from_flu"],
+    ["--world-axes", "ned_from_enu"],
+    ["--world-axes", "unity_from_ros", "--axes", "ros_from_unity"],
+]
+
+
+@pytest.mark.parametrize("sides", SIDES, ids=" ".join)
+@pytest.mark.parametrize("digits", [[], ["--precision", "full"]], ids=["short", "full"])
+def test_axes_of_both_sides_are_derived(sides: list[str], digits: list[str], run: Callable[..., Outcome]) -> None:
+    for pose in ("{xyz: [1, -2, 300], rpy_deg: [10, 20, 30]}", "{xyzw: [0.5, -0.5, 0.5, 0.5]}"):
+        sheet = run("convert", pose, *sides, "--to", "rpy_deg", *digits, "--explain").out
+        result = json.loads(run("convert", pose, *sides, "--to", "rpy_deg", "-f", "json").out)
+        assert last_numbers(sheet) == numbers_in(result)
+        assert recheck(sheet, None if digits else 6) > 0

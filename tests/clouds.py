@@ -96,8 +96,8 @@ def ply(records: NDArray[Any], form: str = "binary_little_endian", before: str =
     head = f"ply\nformat {form} 1.0\ncomment by hand\nobj_info none\n{before}element vertex {len(records)}\n{properties}{after}end_header\n"
     if form == "ascii":
         return head.encode() + b"".join(" ".join(map(str, row.tolist())).encode() + b"\n" for row in records)
-    order = "<" if "little" in form else ">"
-    return head.encode() + records.astype(records.dtype.newbyteorder(order)).tobytes()
+    kind = records.dtype.newbyteorder("<" if "little" in form else ">")
+    return head.encode() + records.astype(kind).tobytes()
 
 
 def ply_rows(data: bytes | None, kind: Any, count: int) -> tuple[bytes, NDArray[Any], bytes]:
