@@ -144,7 +144,7 @@ def compare(case: Case, rows: int) -> str:
 
 def verdict(ratio: float, goal: float) -> str:
     """Show a ratio with its goal, and whether it is missed."""
-    return f"{ratio:.1f} | {goal:g}{'' if ratio >= goal else ' missed'}"
+    return f"{ratio:.3g} | {goal:g}{'' if ratio >= goal else ' missed'}"
 
 
 def extra_memory(function: Callable[[], Any]) -> float:
