@@ -209,7 +209,7 @@ class Stream:
         from frametool.grammar.edges import Options, Tally, Topics
         from frametool.stream.column_stream import run_columns
 
-        self._jobs(f"one process is enough for {form}")
+        self._jobs(f"{form} holds numbers, no text")
         name = self.path or "stdin"
         if output.path is None and request.gathered is None and sys.stdout.isatty():
             raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
