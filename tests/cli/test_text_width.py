@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Run = Callable[..., Outcome]
 
 # what the golden lines print for machines, printed for people; findings are lines for compilers, `place: level: ..`
-ROWS = re.compile(r"-i \S+\.(?:csv|tum)|^check")  # tables stay tables
+ROWS = re.compile(r"-i \S+\.(?:csv|tum)|^check|^batch")  # tables stay tables
 TABLE = [
     (re.sub(r" -f \w+", "", line) + " -f text", name)
     for line, name in COMMANDS
