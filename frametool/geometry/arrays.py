@@ -241,7 +241,7 @@ def finite_throughout(parts: Components) -> bool:
 def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:
     """Cut components, flat, into blocks of contiguous float64 for a kernel that fills so many targets."""
     shape = batch_shape(parts)
-    columns = [part if isinstance(part, float) else _flat(part, shape) for part in parts]
+    columns = [_flat(part, shape) if isinstance(part, np.ndarray) else float(part) for part in parts]
     for start, stop in blocks(int(np.prod(shape)), len(parts) + targets):
         yield slice(start, stop), tuple(_cut(column, start, stop) for column in columns)
 

@@ -138,12 +138,13 @@ def toward(
     With s and c the sine and cosine of half the arc: (b - a) / 2sc + a s/c, which keeps its digits where b is near a.
     """
     apart, along = halves(ax, ay, az, aw, bx, by, bz, bw, xp)
+    half_arc = incline(apart, along, xp)  # 0 between equal ends: they stay as they are at every fraction
     apart = xp.maximum(apart, TINY)
     sign = xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
     ahead, beside = 0.5 / (apart * along), apart / along
     return (
         ahead * (sign * bx - ax) + beside * ax, ahead * (sign * by - ay) + beside * ay,
-        ahead * (sign * bz - az) + beside * az, ahead * (sign * bw - aw) + beside * aw, incline(apart, along, xp),
+        ahead * (sign * bz - az) + beside * az, ahead * (sign * bw - aw) + beside * aw, half_arc,
     )  # fmt: skip
 
 

@@ -62,6 +62,13 @@ class Talk:
         os.write(self.terminal, keys.encode())
         return self.read()
 
+    def interrupt(self) -> str:
+        """Press Ctrl-C; where it falls between Python's look for signals and its wait for keys, a key wakes it up."""
+        os.write(self.terminal, b"\x03")
+        if not select.select([self.terminal], [], [], 2)[0]:
+            os.write(self.terminal, b" ")
+        return self.read()
+
     def until(self, keys: str, expected: str) -> None:
         """Type without ending the line, and wait for what the terminal then shows."""
         os.write(self.terminal, keys.encode())
@@ -107,7 +114,7 @@ def test_a_session_completes_remembers_goes_on_after_errors_and_ends(talk: Talk,
     talk.until("d[map<-sh\t", "d[map<-shelf")
     assert "shelf seen from map" in talk.say("]\n")
     talk.until("1 / 0 and more", "more")
-    talk.say("\x03")
+    talk.interrupt()
     assert "7.0\r\n" in talk.say("7\n")
     assert "7.0\r\n" in talk.say("\x1b[A\n")
     assert "look-ups: TARGET<-SOURCE" in talk.say("help\n")

@@ -106,9 +106,9 @@ function inverse(pose) {
 function along(a, b, fraction) {  // from sample a to sample b: `toward`, then `along`
   const q = rotation(a), to = rotation(b), dot = q[0] * to[0] + q[1] * to[1] + q[2] * to[2] + q[3] * to[3];
   const lengths = [-1, 1].map((k) => Math.sqrt(squared_norm(...to.map((part, at) => part + k * q[at]))));
-  const apart = Math.max(0.5 * Math.min(...lengths), TINY), near = 0.5 * Math.max(...lengths);
+  const least = 0.5 * Math.min(...lengths), apart = Math.max(least, TINY), near = 0.5 * Math.max(...lengths);
   const sign = dot < 0 ? -1 : 1, ahead = 0.5 / (apart * near), beside = apart / near;
-  const [sine, cosine] = doubled_sincos(fraction * incline(apart, near));
+  const [sine, cosine] = doubled_sincos(fraction * incline(least, near));
   return [0, 1, 2].map((k) => a[k] + fraction * (b[k] - a[k]))
     .concat(q.map((part, at) => cosine * part + sine * (ahead * (sign * to[at] - part) + beside * part)));
 }
