@@ -56,5 +56,5 @@ def writer_of(
     """
     form = told if told in MODULES else own
     same = MODULES[form] == MODULES[own]
-    made: ColumnWriter = import_module(MODULES[form]).Writer(form, columns, given, how if same else {})
+    made: ColumnWriter = import_module(MODULES[form]).WRITER(form, columns, given, how if same else {})
     return made

@@ -136,7 +136,7 @@ def _table(message: memoryview, table: int, field: int) -> int:
     return place + int(struct.unpack_from("<i", message, place)[0])
 
 
-class Writer(GroupWriter):
+class IpcWriter(GroupWriter):
     """Write each group of rows as one batch."""
 
     def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
@@ -161,3 +161,6 @@ class Writer(GroupWriter):
 def open_columns(file: InputFile) -> IpcColumns:
     """Open a file or a stream; raises FormatError."""
     return IpcColumns(file)
+
+
+WRITER = IpcWriter

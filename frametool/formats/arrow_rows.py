@@ -12,7 +12,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.arrow_columns import DTYPES, column_of, nulls_of, require_pyarrow, stamps_of
-from frametool.formats.column_file import Numbers
+from frametool.formats.column_file import ColumnNumbers
 from frametool.frames.stamps import BILLION
 from frametool.text.seconds import FURTHEST, nanoseconds_of
 
@@ -61,11 +61,11 @@ class ArrowBatch:
         """Count the rows."""
         return int(self.rows.num_rows)
 
-    def numbers(self, place: int) -> Numbers:
+    def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats, nan where it is null."""
         column = self.rows.column(place)
         values = column.to_numpy(zero_copy_only=False).astype(np.float64)
-        return Numbers(values, nulls_of(column))
+        return ColumnNumbers(values, nulls_of(column))
 
     def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why rows have none: timestamps, integers by their name, float seconds."""

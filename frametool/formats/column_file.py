@@ -23,7 +23,7 @@ FLOATS, WHOLE = "f", "iu"  # kinds of numpy's types
 STAMP_NS = np.dtype(np.int64)
 
 
-class Numbers(NamedTuple):
+class ColumnNumbers(NamedTuple):
     """Numbers of a column: (n,) in float64, and which of them are nulls (None: there are none)."""
 
     values: Floats
@@ -64,7 +64,7 @@ class Batch(Protocol):
     def bytes_read(self) -> int:
         """Count the bytes of the file that they take."""
 
-    def numbers(self, place: int) -> Numbers:
+    def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats; a null may be any number."""
 
     def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:

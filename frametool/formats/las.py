@@ -17,7 +17,7 @@ from weakref import finalize
 import numpy as np
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown, warn
-from frametool.formats.column_file import Numbers
+from frametool.formats.column_file import ColumnNumbers
 from frametool.formats.declared import MOST_ROWS, bytes_left, check_declared, kept_in_file, pieces
 from frametool.formats.structured import stamps_of_numbers
 
@@ -60,16 +60,20 @@ def _laspy(name: str, *, packed: bool = False) -> Any:
     return laspy
 
 
+BROKEN = "the file cannot be read; is it whole? ({})"
+REFUSED = "it cannot be written as las: {}"
+
+
 @contextmanager
-def _whole(name: str) -> Iterator[None]:
-    """Turn whatever the library raises for a broken file into one error."""
+def _told(name: str, what: str) -> Iterator[None]:
+    """Turn whatever the library raises into one error, with what the library says in the place of {}."""
     try:
         yield
     except FrametoolError:
         raise
     except Exception as error:  # noqa: BLE001 - a broken file makes the library raise anything, also MemoryError
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
-        raise FormatError(f"the file cannot be read; is it whole? ({said})", source=name) from None
+        raise FormatError(what.format(said), source=name) from None
 
 
 class LasBatch:
@@ -90,9 +94,9 @@ class LasBatch:
         """Count the bytes of the points, unpacked."""
         return int(self.points.array.nbytes)
 
-    def numbers(self, place: int) -> Numbers:
+    def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats."""
-        return Numbers(self.column(place).astype(np.float64))
+        return ColumnNumbers(self.column(place).astype(np.float64))
 
     def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why points have none."""
@@ -120,7 +124,7 @@ class LasFile:
         if bytes_left(file.stream) is None:
             file.stream = kept_in_file(file.stream, self)
         whole = bytes_left(file.stream) or 0
-        with _whole(file.name):
+        with _told(file.name, BROKEN):
             self.reader = laspy.open(file.stream, closefd=False)
             header = self.header = self.reader.header
             if not header.are_points_compressed:
@@ -150,7 +154,7 @@ class LasFile:
         """Yield the points; raises FormatError where the file ends too early."""
         count, done = self.header.point_count, 0
         while done < count:
-            with _whole(self.file.name):
+            with _told(self.file.name, BROKEN):
                 points = self.reader.read_points(min(MOST_ROWS, count - done))
             if not len(points) or len(points) < min(MOST_ROWS, count - done):
                 there = done + len(points)
@@ -200,7 +204,7 @@ class LasWriter:
         if not there.any():
             return b""
         self._begin(new)
-        with _refusals(self.name):
+        with _told(self.name, REFUSED):
             self.writer.write_points(self._points(batch, rows, new))
         self.count += len(there)
         return b""
@@ -211,7 +215,7 @@ class LasWriter:
             return
         if set(XYZ) <= new.keys():
             self.header.offsets = np.rint([np.median(new[name]) for name in XYZ])
-        with _refusals(self.name):
+        with _told(self.name, REFUSED):
             self.writer = _laspy(self.name, packed=self.packed).LasWriter(
                 self.kept, self.header, do_compress=self.packed, closefd=False
             )
@@ -249,7 +253,7 @@ class LasWriter:
     def end(self) -> Iterator[bytes]:
         """Yield the file."""
         self._begin({})
-        with _refusals(self.name):
+        with _told(self.name, REFUSED):
             evlrs = getattr(self.header, "evlrs", None)
             if evlrs:
                 self.writer.write_evlrs(evlrs)
@@ -261,18 +265,6 @@ class LasWriter:
             warn(f"{self.name}: {rows} without numbers left out: las has no place for them")
         self.kept.seek(0)
         yield from pieces(self.kept)
-
-
-@contextmanager
-def _refusals(name: str) -> Iterator[None]:
-    """Turn what the library refuses to write into an error."""
-    try:
-        yield
-    except FrametoolError:
-        raise
-    except Exception as error:  # noqa: BLE001 - the library raises what it likes
-        said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
-        raise FormatError(f"it cannot be written as las: {said}", source=name) from None
 
 
 def open_columns(file: InputFile, options: Options) -> LasFile:
@@ -295,6 +287,6 @@ def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> Las
         if column.kind is None:
             raise ValueInvalid(f"las holds numbers; column {shown(column.name)} of texts has no place in it")
         if column.name not in known and column.name not in XYZ:
-            with _refusals(style.form):
+            with _told(style.form, REFUSED):
                 header.add_extra_dim(laspy.ExtraBytesParams(name=column.name, type=column.kind.newbyteorder("<")))
     return LasWriter(header, columns, packed=style.form == LAZ)

@@ -31,7 +31,7 @@ LONGEST_TEXT = 64  # characters of a name that is made; numpy has a fixed size f
 ALIGNED = 64  # bytes, as numpy pads its headers
 
 
-class Header(NamedTuple):
+class ArrayHeader(NamedTuple):
     """What stands before the numbers: the type of an element, the shape, and whether columns stand one by one."""
 
     kind: Kind
@@ -39,7 +39,7 @@ class Header(NamedTuple):
     by_columns: bool
 
 
-def read_header(stream: BinaryIO, name: str) -> Header:
+def read_header(stream: BinaryIO, name: str) -> ArrayHeader:
     """Read the header; raises FormatError."""
 
     def wrong(what: str) -> FormatError:
@@ -63,7 +63,7 @@ def read_header(stream: BinaryIO, name: str) -> Header:
         raise wrong(f"the header cannot be read: {shown(text.strip())}") from None
     if kind.hasobject:
         raise wrong("it holds Python objects, which are never unpickled; save plain numbers")
-    return Header(kind, shape, bool(by_columns))
+    return ArrayHeader(kind, shape, bool(by_columns))
 
 
 def _exactly(stream: BinaryIO, size: int, name: str) -> bytes:

@@ -147,7 +147,7 @@ def _repeats(column: Any) -> bool:
     return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
 
 
-class Writer(GroupWriter):
+class ParquetWriter(GroupWriter):
     """Write groups of rows."""
 
     def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
@@ -173,3 +173,6 @@ class Writer(GroupWriter):
 def open_columns(file: InputFile) -> ParquetColumns:
     """Open a file; raises FormatError."""
     return ParquetColumns(file)
+
+
+WRITER = ParquetWriter

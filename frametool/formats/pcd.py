@@ -288,6 +288,6 @@ def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> Pcd
 
 
 def named_xyz(columns: Sequence[OutColumn]) -> list[OutColumn]:
-    """Give columns without names some."""
+    """Return the columns, with names for those that have none."""
     names = iter(numbers_from(1))
     return [each if each.name else each._replace(name=f"column_{next(names)}") for each in columns]

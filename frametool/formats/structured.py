@@ -10,7 +10,7 @@ from weakref import finalize
 import numpy as np
 
 from frametool.errors import ValueInvalid, shown
-from frametool.formats.column_file import FLOATS, WHOLE, Made, Numbers
+from frametool.formats.column_file import FLOATS, WHOLE, ColumnNumbers, Made
 from frametool.frames.stamps import BILLION
 from frametool.text.seconds import FURTHEST, nanoseconds_of
 
@@ -47,9 +47,9 @@ class StructuredBatch:
         """Return a field as it is."""
         return self.rows[self.fields[place]]
 
-    def numbers(self, place: int) -> Numbers:
+    def numbers(self, place: int) -> ColumnNumbers:
         """Return a field as floats."""
-        return Numbers(self.column(place).astype(np.float64))
+        return ColumnNumbers(self.column(place).astype(np.float64))
 
     def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
         """Return a field as nanoseconds, and why rows have none."""

@@ -12,7 +12,7 @@ from weakref import finalize
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid
-from frametool.formats.column_file import WHOLE, Numbers
+from frametool.formats.column_file import WHOLE, ColumnNumbers
 from frametool.formats.declared import PIECE
 from frametool.formats.structured import stamps_of_numbers
 from frametool.text.cells import split_blank
@@ -63,7 +63,7 @@ class TextBatch:
         """Count the bytes of the file that they take."""
         return len(self.cells.data) - 2 * MARGIN
 
-    def numbers(self, place: int) -> Numbers:
+    def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats; raises FormatError for a cell that is no number."""
         column = self.cells.column(self.at[place])
         values, bad = parse_floats(column)
@@ -73,7 +73,7 @@ class TextBatch:
             if known is None:
                 raise self.place(row, place, explain_number(text))
             values[row] = -known if text.startswith("-") else known
-        return Numbers(values)
+        return ColumnNumbers(values)
 
     def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why rows have none."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from frametool.stream.splitter import Part
     from frametool.stream.template import Template
     from frametool.text.lines import ByteStream
-    from frametool.text.ranges import Range
+    from frametool.text.ranges import ByteRange
 
 FEW = 16  # records at the end of which a stream that is already complete needs no numpy
 SMALL = 1 << 14  # bytes
@@ -62,7 +62,7 @@ def _outcomes(
 
     process = RecordBlocks(splitter, form, request, source)
     begun = [first, second] if second else [first]
-    following: Iterator[bytes | Range] = blocks
+    following: Iterator[bytes | ByteRange] = blocks
     if extent is not None:
         taken = sum(map(len, begun))
         following = blocks_behind(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import shown, warn
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
-from frametool.text.ranges import Range, content
+from frametool.text.ranges import ByteRange, content
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -111,7 +111,7 @@ def run(
     return bad.finish(rows)
 
 
-def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes | Range], jobs: int) -> Iterator[Outcome]:
+def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes | ByteRange], jobs: int) -> Iterator[Outcome]:
     """Process blocks in order, over several processes if asked for."""
     if jobs < 2:
         return map(process, map(content, blocks))

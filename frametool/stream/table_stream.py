@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
     from frametool.text.lines import ByteStream
-    from frametool.text.ranges import Range
+    from frametool.text.ranges import ByteRange
 
 
 DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b"", "kitti": b"", "euroc": b","}
@@ -54,7 +54,7 @@ def run_table(
     yield Outcome(table.opening(layout), lines=lines, size=taken)
     named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
     work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
-    following: Iterator[bytes | Range] = blocks
+    following: Iterator[bytes | ByteRange] = blocks
     if extent is not None:
         whole = _record_ends(DELIMITERS[form])
         following = blocks_behind(

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, FrametoolWarning, heard_by, warn
 from frametool.text.lines import BLOCK_BYTES, BULK_BYTES
-from frametool.text.ranges import Range
+from frametool.text.ranges import ByteRange
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
@@ -57,7 +57,7 @@ class Task(NamedTuple):
     """What a worker is to do: a block, or where it stands in a file, and the place for what becomes of it."""
 
     place: int
-    block: Parcel | Range
+    block: Parcel | ByteRange
 
 
 class Reply(NamedTuple):
@@ -117,7 +117,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def spread(process: Process, blocks: Iterable[bytes | Range], jobs: int) -> Generator[Outcome]:
+def spread(process: Process, blocks: Iterable[bytes | ByteRange], jobs: int) -> Generator[Outcome]:
     """Deal blocks out to forked processes, and yield what becomes of them in order; a warning is passed on once.
 
     The text of an outcome is good until the next one is asked for.  What ends the blocks, or a worker's work on one,
@@ -139,7 +139,7 @@ class Team:
         self.dealt: deque[Dealt] = deque()  # in the order of the blocks
         self._warned: set[str] = set()
 
-    def outcomes(self, blocks: Iterable[bytes | Range]) -> Iterator[Outcome]:
+    def outcomes(self, blocks: Iterable[bytes | ByteRange]) -> Iterator[Outcome]:
         """Yield what becomes of blocks; of one so small that it was typed at once."""
         failure: list[Exception] = []
         for block in _until_failure(blocks, failure):
@@ -149,7 +149,7 @@ class Team:
                 else:
                     yield from self._oldest()
             self._deal(block)
-            while self.dealt and not isinstance(block, Range) and len(block) < BULK_BYTES:
+            while self.dealt and not isinstance(block, ByteRange) and len(block) < BULK_BYTES:
                 yield from self._oldest()
         while self.dealt:
             yield from self._oldest()
@@ -161,14 +161,14 @@ class Team:
         free = len(self.workers) < self.jobs or any(worker.is_free for worker in self.workers)
         return bool(self.places.free) and free
 
-    def _deal(self, block: bytes | Range) -> None:
+    def _deal(self, block: bytes | ByteRange) -> None:
         """Send a block to the worker that has the fewest."""
         worker = min(self.workers, key=lambda each: len(each.has), default=None)
         if worker is None or (worker.has and len(self.workers) < self.jobs):
             worker = Worker(self.process, self.places, [each.connection for each in self.workers])
             self.workers.append(worker)
         dealt = Dealt(worker, self.places.free.pop())
-        worker.send(Task(dealt.place, block if isinstance(block, Range) else self.places.put(dealt.place, block)))
+        worker.send(Task(dealt.place, block if isinstance(block, ByteRange) else self.places.put(dealt.place, block)))
         worker.has.append(dealt)
         self.dealt.append(dealt)
 
@@ -249,7 +249,7 @@ class Worker:
         return WorkerDied(f"a process of --jobs {how}; the result is not complete")
 
 
-def _until_failure(blocks: Iterable[bytes | Range], failure: list[Exception]) -> Iterator[bytes | Range]:
+def _until_failure(blocks: Iterable[bytes | ByteRange], failure: list[Exception]) -> Iterator[bytes | ByteRange]:
     """Yield blocks; keep what ends them if that is an error."""
     try:
         yield from blocks
@@ -288,7 +288,8 @@ def _answer(process: Process, places: Places, task: Task) -> Reply:
     warned: list[tuple[str, str, type[FrametoolWarning]]] = []
     try:
         with heard_by(lambda *warning: warned.append(warning)):
-            outcome = process(task.block.read() if isinstance(task.block, Range) else bytes(places.look(task.block)))
+            block = task.block
+            outcome = process(block.read() if isinstance(block, ByteRange) else bytes(places.look(block)))
         text = places.put(task.place, bytes(outcome.text))
         return Reply(text, outcome._replace(text=b""), None, warned)
     except Exception as error:  # noqa: BLE001 - raised again by the parent

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
             """Go on at a place."""
 
 
-class Range(NamedTuple):
+class ByteRange(NamedTuple):
     """Some bytes of a file.
 
     file: its descriptor, which processes share; name: as messages name it
@@ -54,9 +54,9 @@ class Range(NamedTuple):
         return b"".join(pieces)
 
 
-def content(block: bytes | Range) -> bytes:
+def content(block: bytes | ByteRange) -> bytes:
     """Return the bytes of a block."""
-    return block.read() if isinstance(block, Range) else block
+    return block.read() if isinstance(block, ByteRange) else block
 
 
 class Extent(NamedTuple):
@@ -84,7 +84,7 @@ def blocks_behind(
     name: str,
     size: int = BLOCK_BYTES,
     whole: Callable[[], Callable[[bytes], int]],
-) -> Iterator[bytes | Range]:
+) -> Iterator[bytes | ByteRange]:
     """Yield the blocks of a file from a place on as `read_blocks` cuts them; as ranges up to the last.
 
     extent: of the stream at its start; taken: the bytes of it that were read, whole records
@@ -108,10 +108,10 @@ def _shrunk(name: str) -> FileProblem:
     return FileProblem(f"{name}: became shorter while it was read")
 
 
-def _ranges(file: int, name: str, at: int, size: int, whole: Callable[[bytes], int]) -> Iterator[Range]:
+def _ranges(file: int, name: str, at: int, size: int, whole: Callable[[bytes], int]) -> Iterator[ByteRange]:
     """Yield ranges up to a record that does not fit into a block, or to where the file ends."""
     while len(text := os.pread(file, size, at)) == size and b"\n" in text and (end := whole(text)) > 0:
-        yield Range(file, name, at, end)
+        yield ByteRange(file, name, at, end)
         at += end
 
 
