@@ -18,14 +18,14 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.calc.explain.api import explain as explain
-    from frametool.calc.python_face import calc as calc
+    from frametool.calc.api import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
-    from frametool.formats import FORMATS as FORMATS
+    from frametool.explain.api import explain as explain
     from frametool.formats.load import load as load
-    from frametool.formats.robot import load_robot as load_robot
+    from frametool.formats.robots.robot import load_robot as load_robot
+    from frametool.formats.table import FORMATS as FORMATS
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
-    from frametool.frames.tree import FrameTree as FrameTree
+    from frametool.frames.lookups import FrameTree as FrameTree
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
@@ -36,33 +36,33 @@ if TYPE_CHECKING:
     from frametool.sim.sweep import simulate_many as simulate_many
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
-    from frametool.stream.arrow_tables import apply_arrow as apply_arrow
-    from frametool.stream.engine_expressions import polars_exprs as polars_exprs
-    from frametool.stream.engine_expressions import sql as sql
+    from frametool.stream.engines import apply_arrow as apply_arrow
+    from frametool.stream.engines import polars_exprs as polars_exprs
+    from frametool.stream.engines import sql as sql
 
 __version__ = "0.2.0"
 
 _HOMES = {
     "calc": "frametool.calc",
-    "FORMATS": "frametool.formats",
+    "FORMATS": "frametool.formats.table",
     "FollowController": "frametool.sim.controllers",
-    "FrameTree": "frametool.frames.tree",
+    "FrameTree": "frametool.frames.lookups",
     "FrametoolError": "frametool.errors",
     "Rotation": "frametool.geometry.rotation",
     "Transform": "frametool.geometry.transform",
     "TransformBuffer": "frametool.frames.buffer",
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
-    "apply_arrow": "frametool.stream.arrow_tables",
+    "apply_arrow": "frametool.stream.engines",
     "diff": "frametool.lint.tree_diff",
-    "explain": "frametool.calc.explain.api",
+    "explain": "frametool.explain",
     "follow_steps": "frametool.sim.followed",
     "load": "frametool.formats.load",
-    "load_robot": "frametool.formats.robot",
-    "polars_exprs": "frametool.stream.engine_expressions",
+    "load_robot": "frametool.formats.robots.robot",
+    "polars_exprs": "frametool.stream.engines",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
-    "sql": "frametool.stream.engine_expressions",
+    "sql": "frametool.stream.engines",
     "tutorial": "frametool.sim.scene",
 }
 __all__ = [

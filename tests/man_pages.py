@@ -10,9 +10,9 @@ import click
 
 from frametool import __version__
 from frametool.cli import COMMANDS
-from frametool.cli.command import EXIT_CODES
 from frametool.cli.commands.help import topic, topics
-from frametool.cli.help_page import GROUPS, option_row
+from frametool.cli.group import GROUPS, option_row
+from frametool.cli.options import EXIT_CODES
 
 FOLDER = Path(__file__).resolve().parent.parent / "frametool" / "data" / "share" / "man" / "man1"
 

@@ -13,8 +13,8 @@ import frametool
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
-    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "calc", "sim", "view",
-    "cli",
+    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "explain", "calc",
+    "sim", "view", "cli",
 ]  # fmt: skip
 HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}
 MODULES = sorted(path for path in ROOT.rglob("*.py") if path.parent != ROOT or path.stem == "errors")

@@ -13,7 +13,7 @@ import console
 import pytest
 
 from frametool.cli import COMMANDS
-from frametool.formats import FORMATS
+from frametool.formats.table import FORMATS
 from frametool.geometry.representations import REPRESENTATIONS
 
 if TYPE_CHECKING:

@@ -6,18 +6,7 @@ The room is a function too, because `frametool.calc(..)` and `frametool.calc.eva
 from __future__ import annotations
 
 import sys
-from types import ModuleType
-from typing import Any
 
+from frametool.explain import CallableRoom
 
-class _Room(ModuleType):
-    """Calculates when it is called; see `frametool.calc.python_face.calc`."""
-
-    def __call__(self, text: str, /, **options: Any) -> Any:
-        """Return the value of an expression."""
-        from frametool.calc.python_face import calc
-
-        return calc(text, **options)
-
-
-sys.modules[__name__].__class__ = _Room
+sys.modules[__name__].__class__ = CallableRoom

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.calc import frame_rules as rules
-from frametool.calc.demands import wanted
+from frametool.calc import rules
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import RESERVED, column_name, parse_line
+from frametool.calc.rules import wanted
 from frametool.calc.scope import Scope, pointed
 from frametool.calc.tokens import CalcError, NoTree
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POSE, UNITS, Term, Type

@@ -1,6 +1,8 @@
 """The command line: its table of commands, and the edge where whatever goes wrong becomes a line and an exit code.
 
 Nothing is imported here that takes time: from the first moment on Ctrl-C ends the process without a traceback.
+
+What Python and the system could not do, in words of ours.
 """
 
 from __future__ import annotations
@@ -61,8 +63,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
     from frametool.cli.signals import die_of
     from frametool.cli.stderr import discard, say, say_warning
-    from frametool.cli.troubles import TROUBLES, words_of
-    from frametool.documents.limits import DEEPEST
+    from frametool.documents.source import DEEPEST
     from frametool.errors import heard_by
 
     in_out = TROUBLE.get(arguments[0] if arguments else "", IN_OUT)
@@ -92,10 +93,8 @@ def run(arguments: list[str]) -> int:
 
 def _run(arguments: list[str]) -> int:
     """Run one command; closed pipes and other trouble with stdout are the caller's."""
-    from frametool.cli.error_json import wants_json
-    from frametool.cli.group import called
-    from frametool.cli.misuse import answered
-    from frametool.cli.stderr import say_error
+    from frametool.cli.group import answered, called
+    from frametool.cli.stderr import say_error, wants_json
     from frametool.errors import FrametoolError
 
     try:
@@ -105,3 +104,15 @@ def _run(arguments: list[str]) -> int:
     except FrametoolError as error:
         say_error(error, in_json=wants_json(arguments))
         return TROUBLE.get(arguments[0] if arguments else "", error.exit_code)
+
+
+TROUBLES = (MemoryError, ImportError, OSError)
+
+
+def words_of(trouble: Exception) -> str:
+    """Say what Python or the system could not do."""
+    if isinstance(trouble, MemoryError):
+        return "out of memory"
+    if isinstance(trouble, ImportError):  # numpy's tells of missing memory and files in many lines, the cause last
+        return f"a library cannot be loaded: {str(trouble).strip().splitlines()[-1]}"
+    return (getattr(trouble, "strerror", None) or str(trouble)).lower()

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import READING
+from frametool.cli.options import READING
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
-from frametool.formats import BAG, FORMATS, by_suffix, holds_arrays, writers
 from frametool.formats.detect import of_folder
+from frametool.formats.table import BAG, FORMATS, by_suffix, holds_arrays, writers
 from frametool.stream.faults import Fault
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ class BagOfClouds:
 
     def _write(self, cloud: PointCloud, pose_of: Callable[[str | None, int | None], Rigid], bad: BadRows) -> int:
         """Write one cloud; return how many points it has, 0 where the message is bad."""
-        from frametool.stream.cloud_messages import moved_cloud
+        from frametool.stream.column_stream import moved_cloud
 
         try:
             pose = pose_of(cloud.frame or None, cloud.stamp_ns)

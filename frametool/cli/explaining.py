@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FULL, decorated
+from frametool.cli.options import FULL, decorated
 from frametool.errors import FormatError, heard_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import TypeVar
 
-    from frametool.calc.explain.agreement import DerivationStyle
-    from frametool.calc.explain.given import Given
-    from frametool.calc.explain.render import Explanation
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
     from frametool.documents.source import Source
+    from frametool.explain.derive import DerivationStyle
+    from frametool.explain.given import Given
+    from frametool.explain.render import Explanation
     from frametool.geometry.representations import Notation
 
     Function = TypeVar("Function", bound=Callable[..., Any])
@@ -51,7 +51,7 @@ class Explaining:
 
     def plan(self, output: Output, stream: Stream | None = None) -> DerivationStyle:
         """Return how to derive; refuse what a derivation cannot be: a machine format, a stream."""
-        from frametool.calc.explain.agreement import DerivationStyle
+        from frametool.explain.derive import DerivationStyle
 
         if output.told not in (None, "text"):
             raise click.UsageError(f"--explain writes {', '.join(FORMS)}, not {output.told}; leave one of them out")
@@ -67,7 +67,7 @@ class Explaining:
 
 def significant(precision: int | None) -> int | None:
     """Return how many significant digits --precision asks for; None for all."""
-    from frametool.calc.explain.sheet import DIGITS
+    from frametool.explain.sheet import DIGITS
 
     if precision == 0:
         raise click.UsageError("--precision counts significant digits with --explain; give 1 or more, or full")
@@ -89,8 +89,8 @@ def given(
 
     notation: of numbers that do not say theirs.  told: with its warnings, else they were told already.
     """
-    from frametool.calc.explain.given import given_poses
     from frametool.cli.poses import pose_source, usage_if_inline
+    from frametool.explain.given import given_poses
 
     try:
         source = pose_source(one_argument(argument), notation, normalize=normalize)

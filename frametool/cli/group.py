@@ -1,23 +1,129 @@
-"""The group of all commands: each is imported when it is called; help and completion come from the table."""
+"""The group of all commands: each is imported when it is called; help and completion come from the table.
+
+The help option of all commands, made without click's translations: those load `locale`, 2 ms of every start.
+
+What click says of arguments, as errors and lines of ours.
+
+Commands that are called many times in one process: parser and values of options that are not given, made once.
+
+Both come from click itself, so there is no second list of options: the parser is click's own, a value that was given
+is processed by its parameter, and one that was not is what click made of an empty line.
+"""
 
 from __future__ import annotations
 
 import os
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
+from click.core import iter_params_for_processing
 
 from frametool import __version__
 from frametool.cli import COMMANDS
-from frametool.cli.help_page import WithHelp
 from frametool.cli.sink import writing
-from frametool.errors import alternatives, shown
+from frametool.errors import SHOWN, alternatives, shown
+from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from click.shell_completion import CompletionItem
+
+
+def show_help(ctx: click.Context) -> None:
+    """Print the help of a command."""
+    with writing(None) as write:
+        write(f"{ctx.get_help()}\n")
+
+
+def _help(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
+    if chosen:
+        show_help(ctx)
+        ctx.exit()
+
+
+def _has_many_choices(option: click.Option, ctx: click.Context) -> bool:
+    """Tell whether the choices of an option are too long to stand beside it."""
+    has_choices = isinstance(option.type, click.Choice) and not option.metavar
+    return has_choices and len(option.make_metavar(ctx)) > LONGEST_CHOICE
+
+
+def _spelled(option: click.Option, ctx: click.Context) -> str:
+    """Return the names of an option and what it takes."""
+    names = ", ".join((*option.opts, *option.secondary_opts))
+    if option.is_flag or option.count:
+        return names
+    taken = option.make_metavar(ctx)
+    return f"{names} {option.opts[-1].strip('-').upper() if _has_many_choices(option, ctx) else taken}"
+
+
+def option_row(option: click.Option, ctx: click.Context) -> tuple[str, str]:
+    """Return an option and its meaning, with the choices that its name does not list."""
+    text = option.help or ""
+    if _has_many_choices(option, ctx):
+        what, bracket, default = text.partition("  [")
+        text = f"{what}: {', '.join(getattr(option.type, 'choices', ()))}{bracket}{default}"
+    if option.show_default and option.default is not None:
+        text += f"  [default: {option.default}]"
+    return _spelled(option, ctx), text
+
+
+HELP_OPTION = click.Option(
+    ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_help, help="Show this message."
+)
+
+
+# heading -> names of the parameters under it; all others stand first, they are what the command is about
+GROUPS = {
+    "Files": ("more", "with_a", "with_b", "input_forms", "topics", "quiet", "verbose"),
+    "Time (help time)": ("at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2"),
+    "Rotations (help rotations)": ("given", "notations", "deg", "keep_sign", "normalize"),
+    "Rows (help streams)": (
+        "input_path", "columns", "frame_column", "target_column", "source_column", "keep", "prefix", "header", "unwrap",
+        "on_error", "max_errors", "jobs",
+    ),
+    "Result": ("format_name", "precision", "output", "force", "explain", "explain_full", "explain_step"),
+    "What a form of file leaves open (help formats)": (
+        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array",
+    ),
+}  # fmt: skip
+NAMES_ONLY = tuple(GROUPS)[-1]  # explained by the topic alone
+WIDEST = 24  # of the left column
+LONGEST_CHOICE = 14  # of choices beside their option
+
+
+class WithHelp(click.Command):
+    """A command with -h and --help, its options in groups."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options group by group, those of this command first; then the commands of a group."""
+        self._format_groups(ctx, formatter)
+        if isinstance(self, click.Group):
+            self.format_commands(ctx, formatter)
+
+    def _format_groups(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        options = [each for each in self.get_params(ctx) if isinstance(each, click.Option) and not each.hidden]
+        placed = {name: title for title, names in GROUPS.items() for name in names}
+        shown = [each for each in options if placed.get(each.name or "") != NAMES_ONLY]
+        width = max((size for each in shown if (size := len(_spelled(each, ctx))) <= WIDEST), default=0)
+        formatter.write_paragraph()
+        for title in ("Options", *GROUPS):
+            ours = [each for each in options if placed.get(each.name or "", "Options") == title]
+            if not ours:
+                continue
+            formatter.write(f"{title}:\n")
+            with formatter.indentation():
+                if title == NAMES_ONLY:
+                    formatter.write_text("  ".join(each.opts[-1] for each in ours))
+                else:
+                    rows = [option_row(each, ctx) for each in ours]
+                    formatter.write_dl([(left.ljust(width), text) for left, text in rows], WIDEST, col_spacing=1)
+
+    def get_help_option(self, ctx: click.Context) -> click.Option | None:  # noqa: ARG002 - click's signature
+        """Return the one help option."""
+        return HELP_OPTION
+
 
 HELP = """The calculator for rigid-body frames.
 
@@ -143,3 +249,106 @@ def called_in(parent: click.Context, words: Sequence[str], prepare: Callable[[cl
 def _status(result: object) -> int:
     """Return the status that a command's result stands for."""
     return result if isinstance(result, int) else 0
+
+
+def answered(call: Callable[[], int], arguments: Sequence[str]) -> int:
+    """Return the status of a call of a command; a call without arguments may have help for an answer.
+
+    Raises FrametoolError for all that a user did wrong.
+    """
+    try:
+        return call()
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    except click.exceptions.NoArgsIsHelpError as error:
+        show_help(error.ctx)
+        return 0
+    except click.ClickException as error:
+        raise Misused(_usage(error, arguments)) from None
+
+
+def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
+    """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
+    ctx = getattr(error, "ctx", None)
+    message = error.format_message().replace("\n", " ").rstrip(".")
+    for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
+        message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
+    if message[1:2].islower():
+        message = message[0].lower() + message[1:]
+    if ctx is None or ctx.parent is None:
+        return message
+    pieces = " ".join(ctx.command.collect_usage_pieces(ctx))
+    return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
+
+
+class Prepared(NamedTuple):
+    """What does not change from one call of a command to the next.
+
+    parser: click's, made for all parameters
+    direct: the same, in which short names are found at once
+    params: all of them
+    absent: what the parser says of arguments that are not there
+    values, meta: what parameters that are not there leave in a context
+    """
+
+    parser: Any
+    direct: Any
+    params: list[click.Parameter]
+    absent: Mapping[str, Any]
+    values: Mapping[str, Any]
+    meta: Mapping[str, Any]
+
+
+class Reused(click.Command):
+    """A command that is parsed by click at its first call, and with what that left at all others.
+
+    Its parameters must not change, and their callbacks must do no more for an absent value than keep it in the
+    context's `meta`, in mappings at most one level deep.
+    """
+
+    _calls = 0
+    _params: list[click.Parameter] | None = None
+    _prepared: Prepared | None = None
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return the parameters, collected and checked once."""
+        if self._params is None:
+            self._params = super().get_params(ctx)
+        return self._params
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse as click does; only parameters that stand in the arguments are processed anew."""
+        self._calls += 1
+        if self._calls == 1 or ctx.resilient_parsing:  # most processes call one command once
+            return super().parse_args(ctx, args)
+        if self._prepared is None:
+            self._prepared = self._prepare(ctx)
+        parser, direct, params, absent, values, meta = self._prepared
+        if not any(each[2:3] == "=" for each in args):  # -f=x is no -f x
+            parser = direct
+        parser.ctx = ctx
+        given, rest, order = parser.parse_args(args=list(args))
+        if rest or not args:
+            return super().parse_args(ctx, args)  # has the words for what is wrong
+        ctx.meta.update({key: dict(kept) if isinstance(kept, dict) else kept for key, kept in meta.items()})
+        wanted = [each for each in params if each.required or _is_given(each.name or "", given, absent)]
+        for param in iter_params_for_processing(order, wanted):
+            param.handle_parse_result(ctx, given, rest)
+        ctx.params = {**values, **ctx.params}
+        ctx.args = []
+        return []
+
+    def _prepare(self, ctx: click.Context) -> Prepared:
+        """Parse no arguments, once, without what may not be missing."""
+        params = self.get_params(ctx)
+        optional: list[click.Parameter] = [each for each in params if not each.required]
+        empty = click.Command(None, params=optional, add_help_option=False).make_context("", [])
+        parser, direct = self.make_parser(ctx), self.make_parser(ctx)
+        # click looks for -f among the long names first, and fails with all that an error message needs
+        direct._long_opt.update(direct._short_opt)  # noqa: SLF001
+        return Prepared(parser, direct, params, parser.parse_args(args=[])[0], empty.params, empty.meta)
+
+
+def _is_given(name: str, given: Mapping[str, Any], absent: Mapping[str, Any]) -> bool:
+    """Tell whether the arguments say something of a parameter."""
+    return name in given and (name not in absent or given[name] is not absent[name])

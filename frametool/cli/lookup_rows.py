@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.completions import ColumnNames
+from frametool.cli.options import ColumnNames
 from frametool.cli.trees import frame_name
 from frametool.errors import UnknownFrame
 from frametool.geometry.representations import notation
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
 
     Function = TypeVar("Function", bound=Callable[..., Any])

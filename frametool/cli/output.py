@@ -1,4 +1,7 @@
-"""Results: in which form they are written, and where to."""
+"""Results: in which form they are written, and where to.
+
+Pictures on their way out: in which form, by the suffix of a file.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,11 @@ from itertools import islice
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
-from frametool.cli.command import FULL
+from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, printable, shown
-from frametool.formats import FORMATS, by_name, holds_arrays, is_trajectory, writers
+from frametool.formats.table import FORMATS, by_name, holds_arrays, is_trajectory, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
@@ -20,10 +23,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import FrameTree
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
-
+    from frametool.view.pictures import Picture
 
 BATCH = 256  # poses
 BLOCK = 1 << 13  # poses of a trajectory
@@ -105,10 +108,9 @@ class Output:
 
     def _blocks(self, results: Iterator[Result]) -> Iterator[bytes]:
         """Yield the poses of a trajectory, or columns of numbers, block after block."""
-        from frametool.stream.column_writer import ArrayWriter
-        from frametool.stream.pose_values import block_of
-        from frametool.stream.pose_writer import PoseWriter
         from frametool.stream.row_layout import POSE
+        from frametool.stream.row_poses import block_of
+        from frametool.stream.writers import ArrayWriter, PoseWriter
 
         writer = ArrayWriter(self.style, POSE) if self._holds_arrays else PoseWriter(self.style)
         while batch := list(islice(results, BLOCK)):
@@ -160,8 +162,8 @@ class Output:
         if self.style.form in FORMATS and "points" not in self._writes:
             raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
         if self._holds_arrays:
-            from frametool.stream.column_writer import ArrayWriter
-            from frametool.stream.pose_values import block_of_points
+            from frametool.stream.row_poses import block_of_points
+            from frametool.stream.writers import ArrayWriter
 
             writer = ArrayWriter(self.style, next((kind for kind in ("point", "vector") if kind in found[0]), "point"))
             self.pieces([bytes(writer.of_block(block_of_points(found))), *writer.end()])
@@ -222,3 +224,17 @@ def _axes_of_only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
         instead = f"name two: lookup TREE TARGET SOURCE -f {form}"
         raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; {instead}")
     return tree.camera_axes.get(children[0], "")
+
+
+PICTURES = (".svg", ".html", ".png")
+
+
+def drawn(picture: Picture, suffix: str, more: str = "") -> str | bytes:
+    """Return a picture in the form of a suffix of PICTURES; `more` stands below it in HTML."""
+    if suffix == ".png":
+        from frametool.view.pictures import write_png
+
+        return write_png(picture)
+    from frametool.view.pictures import write_html, write_svg
+
+    return write_svg(picture) if suffix == ".svg" else write_html(picture, more)

@@ -1,7 +1,13 @@
-"""What a run of turtles shows, and where: records to stdout or a file, messages to stderr, a drawing, a plot."""
+"""What a run of turtles shows, and where: records to stdout or a file, messages to stderr, a drawing, a plot.
+
+Options that several commands of the turtles share, and the types of their values.
+
+Leaders from the command line: a built-in name, a file, standard input.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from contextlib import ExitStack
@@ -12,28 +18,114 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FULL, TEXT, Digits, decorated
-from frametool.cli.pictures import PICTURES, drawn
-from frametool.cli.sim_options import REACH
+from frametool.cli.options import FULL, TEXT, Digits, Number, Text, decorated
+from frametool.cli.output import PICTURES, drawn
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.errors import FileProblem, shown
-from frametool.formats import by_suffix
+from frametool.documents.source import Source, decode, read_text
+from frametool.errors import FileProblem, FormatError, ValueInvalid, alternatives, shown
+from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.grammar.result import Style
-from frametool.sim.run_summary import RunSummary
-from frametool.sim.simulate import simulate
+from frametool.sim.command_file import read_commands, read_script
+from frametool.sim.controllers import LAWS, TARGETS
+from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
+from frametool.sim.scene import LONGEST
+from frametool.sim.simulate import RunSummary, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
+from frametool.sim.turtle import VARIANTS
+from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.cli.sink import Write
+    from frametool.sim.leaders import MakeLeader
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
-    from frametool.view.drawing import Drawing
-
+    from frametool.view.run_plot import Drawing
     Watch = Callable[[SimulationStep], None]
+
+NUMBER = Number()
+
+
+class Spawn(Text):
+    """A place: X,Y or X,Y,THETA."""
+
+    name = "x,y,theta"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read metres and radians; the angle may carry a unit."""
+        cells = [cell.strip() for cell in str(super().convert(value, param, ctx)).split(",")]
+        if len(cells) not in (2, 3):
+            self.fail(f"expected X,Y,THETA, found {shown(str(value))}", param, ctx)
+        try:
+            angle, unit = parse_angle(cells[2]) if len(cells) == 3 else (0.0, None)
+            return parse_number(cells[0]), parse_number(cells[1]), math.radians(angle) if unit == "deg" else angle
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+
+
+class Seconds(Number):
+    """A span of time, 0 or more."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read it, and check that stamps reach so far."""
+        seconds = float(super().convert(value, param, ctx))
+        if not 0.0 <= seconds <= LONGEST:
+            self.fail(f"expected 0 or more, and at most {LONGEST}, found {seconds:g}", param, ctx)
+        return seconds
+
+
+class Duration(Seconds):
+    """Seconds, or inf."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read it."""
+        return math.inf if value == "inf" else super().convert(value, param, ctx)
+
+
+LEADER = click.option("--leader", type=TEXT, default="still", show_default=True, metavar="NAME|FILE|-",
+                      help="still, circle, square, figure8, random, a file of commands, or - for standard input")
+LAW = click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
+                   help="the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)")
+RATE = click.option("--rate", type=NUMBER, metavar="HZ", help="control steps a second")
+MAX_LINEAR = click.option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]")
+MAX_ANGULAR = click.option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]")
+SPAWN = click.option("--spawn", type=Spawn(), default="4,2,0", show_default=True, metavar="X,Y,THETA",
+                     help="where turtle2 begins: metres, radians (or 90deg)")
+SEED = click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader")
+REACH = click.option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D",
+                     help="metres that count as having come to the target")
+FOLLOWERS = click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
+                         help="each follows the one before, the first follows turtle1")  # fmt: skip
+
+
+def follow_options(duration: str) -> Callable[[Any], Any]:
+    """Add to a command the options of followers; `duration` is how long it runs if not told."""
+    options = [
+        FOLLOWERS,
+        LAW,
+        RATE,
+        click.option("--gain-linear", type=NUMBER, metavar="K", help="speed for each metre of distance"),
+        click.option("--gain-angular", type=NUMBER, metavar="K", help="turn rate for each radian of bearing"),
+        MAX_LINEAR,
+        MAX_ANGULAR,
+        click.option("--target", type=click.Choice(TARGETS), default="leader", show_default=True,
+                     help="the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m"),
+        click.option("--delay", type=Seconds(), default=0.0, metavar="S",
+                     help="follow where the target was so long ago, looked up through world  [default: 0]"),
+        SPAWN,
+        click.option("--duration", type=Duration(), default=duration, show_default=True, metavar="S",
+                     help="simulated seconds, or inf"),
+        click.option("--turtlesim", type=click.Choice(VARIANTS), default="ros1", show_default=True,
+                     help="whose turtlesim"),
+        click.option("--holonomic", is_flag=True, help="let linear.y count in ROS 2, as the node's parameter does"),
+        SEED,
+    ]  # fmt: skip
+    return lambda function: decorated(function, options)
 
 
 def format_options(function: Any) -> Any:
@@ -123,12 +215,12 @@ class SimOutput:
         """Return what is written after the run, by file: what watches the steps, and what then makes the content."""
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
-            from frametool.view.drawing import Drawing
+            from frametool.view.run_plot import Drawing
 
             drawing = Drawing(scene)
             pictures[self.plot] = drawing.watch, partial(_plot, drawing, suffix_of(self.plot))
         if self.view:
-            from frametool.view.run_page import RunPage
+            from frametool.view.html_page import RunPage
 
             page = RunPage()
             pictures[self.view] = page.watch, page.content
@@ -224,6 +316,57 @@ def check_files(plot: str | None, output: str | None, view: str | None = None, *
         if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
             raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     if plot and suffix_of(plot) == ".png":
-        from frametool.view.png import require_matplotlib
+        from frametool.view.pictures import require_matplotlib
 
         require_matplotlib()
+
+
+def leader_of(argument: str, seed: int, *, paced: bool) -> MakeLeader:
+    """Return the leader of an argument; `paced`: what comes from standard input acts when it arrives.
+
+    Raises FormatError; FileProblem; click.UsageError for a name that is neither a leader nor a file.
+    """
+    if argument in LEADERS:
+        return built_in(argument, seed)
+    if argument == "-":
+        return _from_stdin(paced=paced)
+    if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
+        raise click.UsageError(f"no leader {shown(argument)}{alternatives(argument, LEADERS, 'leaders')}, or a file")
+    return scripted(read_script(Source(argument, read_text(argument))))
+
+
+def _from_stdin(*, paced: bool) -> MakeLeader:
+    """Read commands as they come: by their times, or in real time whenever they arrive."""
+    if sys.stdin.isatty():
+        raise click.UsageError("standard input is a terminal; pipe commands in, or see frametool sim teleop")
+    if not paced:
+        return scripted(read_commands(stdin_lines(), "stdin"))
+    mailbox = Mailbox()
+    mailbox.fill_from(read_commands(stdin_lines(), "stdin", period_ns=0))
+    return lambda: mailbox
+
+
+def stdin_lines() -> Iterator[str]:
+    """Yield the lines of standard input as they arrive.
+
+    Raises FormatError for bytes that are no text.
+    """
+    for number, data in enumerate(_lines(sys.stdin.buffer)):
+        try:
+            yield decode(data, "stdin")
+        except FormatError as error:
+            error.line += number
+            raise
+
+
+def _lines(stream: Any) -> Iterator[bytes]:
+    """Read past the stream's buffer: Python aborts when it ends while a thread waits inside that."""
+    begun: list[bytes] = []
+    while block := stream.raw.read(1 << 16):
+        first, *more = block.split(b"\n")
+        begun.append(first)
+        for rest in more:
+            yield b"".join(begun) + b"\n"
+            begun = [rest]
+    if last := b"".join(begun):
+        yield last

@@ -1,16 +1,20 @@
-"""Talk beside the data: the one way to stderr, which nobody has to read."""
+"""Talk beside the data: the one way to stderr, which nobody has to read.
+
+An error as one JSON object on a line of stderr: the sentence and what it is made of.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from typing import TextIO
 
 
@@ -76,8 +80,6 @@ def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
     fate: what became of the line of a batch in which it is
     """
     if in_json:
-        from frametool.cli.error_json import as_json
-
         tell(as_json(error, _lines[-1] if _lines else None, fate))
         return
     first, *rest = str(error).split("\n") if error.many_lines else [str(error)]
@@ -92,3 +94,30 @@ def discard(stream: TextIO) -> None:
     """Let what is still buffered vanish, so that it does not raise again when the process ends."""
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+PLACE = ("source", "line", "column")
+
+
+def wants_json(arguments: Sequence[str]) -> bool:
+    """Tell whether the arguments of a command ask for JSON."""
+    if "--format=json" in arguments or "-fjson" in arguments:
+        return True
+    return any(option in ("-f", "--format") and value == "json" for option, value in pairwise(arguments))
+
+
+def as_json(error: FrametoolError, line: BatchLine | None = None, fate: str = "") -> str:
+    """Return the error's kind, its message and its fields.
+
+    line: of the batch in which it is; the object's place is then that one, and its own place stands under `input`
+    fate: what became of that line
+    """
+    from frametool.documents.json import dump
+
+    message, details = str(error), error.details()
+    if line is not None:
+        own = {key: value for key, value in details.items() if key in PLACE}
+        rest = {key: value for key, value in details.items() if key not in PLACE}
+        message = f"{line}{message}"
+        details = {**line._asdict(), **({"input": own} if own else {}), **rest}
+    return dump({"error": error.kind, "message": f"{message} ({fate})" if fate else message, **details})

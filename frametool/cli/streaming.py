@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import (
+from frametool.cli.options import (
     FILE,
     READING,
     STREAMED,
     TREES_OPENED,
     UTF8,
+    ColumnNames,
     Notations,
     decorated,
     forms_told,
@@ -23,12 +24,11 @@ from frametool.cli.command import (
     say_if_verbose,
     verbose_option,
 )
-from frametool.cli.completions import ColumnNames
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
-from frametool.formats import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.formats.detect import by_sign, detect
+from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
@@ -145,13 +145,13 @@ class Stream:
         with self.opened() as given:
             head = given.peek()
             if head.lstrip()[:1] == b"<":
-                from frametool.cli.tree_hint import refuse_robots
+                from frametool.cli.trees import refuse_robots
 
                 refuse_robots(head, name)
             try:
                 return self._run_opened(given, name, request, output, tables_only=tables_only)
             except FormatError as error:
-                from frametool.cli.tree_hint import with_hint
+                from frametool.cli.trees import with_hint
 
                 raise with_hint(error, head, name) from None
 
@@ -205,7 +205,7 @@ class Stream:
         from importlib import import_module
 
         from frametool.cli.trees import answers
-        from frametool.documents.input_file import InputFile
+        from frametool.documents.source import InputFile
         from frametool.grammar.edges import Options, Tally, Topics
         from frametool.stream.column_stream import run_columns
 
@@ -254,7 +254,7 @@ class Stream:
 
     def _pasted(self, stream: BufferedReader, name: str, request: Request) -> tuple[Source | None, BufferedReader]:
         """Look for what was pasted; the stream is then another, with the same in it."""
-        from frametool.cli.pasted_input import pasted_stream
+        from frametool.cli.poses import pasted_stream
 
         return pasted_stream(stream, name, request._replace(given=request.given or self.given))
 

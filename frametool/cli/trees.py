@@ -1,36 +1,134 @@
-"""Trees and frame names from the command line."""
+"""Trees and frame names from the command line.
+
+Where one pose is wanted and a file of frames is given: the error that says what the file is and points to lookup.
+
+What several lines of a batch read from the same files, read once for as long as these stay as they are.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import sys
+import time
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.command import FORMS, READING, TREES_OPENED, VERBOSE, Text, forms_told
-from frametool.cli.pasted_input import is_inline
-from frametool.cli.poses import source_of
+from frametool.cli.options import FORMS, READING, TREES_OPENED, VERBOSE, Text, forms_told
+from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
-from frametool.cli.tree_cache import TreeCache
-from frametool.errors import shown, warn
-from frametool.formats import FORMATS
+from frametool.documents.source import HEAD, noting_files, states_of
+from frametool.errors import FormatError, shown, warn
+from frametool.formats.table import FORMATS
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
-    from typing import Any, TypeVar
+    from collections.abc import Callable, Collection, Hashable, Sequence
+    from typing import TypeVar
 
     from click.shell_completion import CompletionItem
 
-    from frametool.formats.assembly import Place, Rules
-    from frametool.formats.recordings import Recording
-    from frametool.formats.robot import Robot
+    from frametool.documents.source import FileState
+    from frametool.formats.load import Place, Recording, Rules
+    from frametool.formats.robots.robot import Robot
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import FrameTree
 
     Value = TypeVar("Value")
+
+_XML = rb"\s*(?:<\?xml\b|<!--|<(?:robot|sdf|mujoco|launch|opencv_storage)\b)"
+_TREE = rb"(?m)^\s*(?:---\s*)?\{?\s*[\"']?frames[\"']?\s*:"  # our own
+_MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # are read as poses too
+
+
+def refuse_robots(text: bytes, name: str) -> None:
+    """Raise FormatError for XML of a robot or a launch file, in which no reader of poses finds anything."""
+    if re.match(_XML, text) and (error := _pointing(text, name)):
+        raise error
+
+
+def with_hint(error: FormatError, text: bytes, name: str) -> FormatError:
+    """Return the error to raise where no pose was found in a text: for a file of frames, one that says so."""
+    return _pointing(text, name) or error
+
+
+def _pointing(text: bytes, name: str) -> FormatError | None:
+    from frametool.formats.detect import by_sign
+    from frametool.formats.table import FORMATS
+
+    try:
+        form = by_sign(text[:HEAD], "tree", name=name)
+    except FormatError as error:
+        return error
+    if form is None or form in ("yaml", "json"):
+        form = "yaml" if re.search(_TREE, text[:HEAD]) else None
+    if form is None or form in _MESSAGES or "rows" in FORMATS[form].reads:
+        return None
+    what = "a tree of frames" if form == "yaml" else f"{FORMATS[form].summary}: frames"
+    file = "FILE" if name in ("", "stdin") else name
+    hint = f"look one up: frametool lookup {file} TARGET SOURCE"
+    return FormatError(f"{what}, not a pose; {hint}", source=name or "stdin")
+
+
+MOST = 32  # values
+MOST_BYTES = 1 << 28  # of the files and texts they were read from
+SETTLED_NS = 50_000_000  # a file that was written just now may change again within one tick of its clock
+
+
+class Remembered(NamedTuple):
+    """A value, and the files it was read from as they were then."""
+
+    value: Any
+    files: dict[str, list[FileState]]
+    size: int
+
+    def is_current(self) -> bool:
+        """Tell whether all files still are what was read."""
+        try:
+            return all(states_of(path) == states for path, states in self.files.items())
+        except OSError:
+            return False
+
+
+class TreeCache:
+    """What was read last, mostly trees, by the arguments and by all that says how they are read."""
+
+    def __init__(self) -> None:
+        """Create an empty cache."""
+        self._kept: dict[Hashable, Remembered] = {}
+
+    def read(self, arguments: Sequence[str], options: Hashable, read: Callable[[], Value]) -> Value:
+        """Return what `read` makes of some arguments: as it did before, or anew."""
+        key = (tuple(arguments), options)
+        if (kept := self._kept.pop(key, None)) is not None and kept.is_current():
+            self._kept[key] = kept  # as the youngest
+            return kept.value  # type: ignore[no-any-return]
+        texts = [argument for argument in arguments if is_inline(argument)]
+        with noting_files() as files:
+            for argument in arguments:
+                if argument not in texts and os.path.exists(argument):
+                    files[argument] = states_of(argument)
+            value = read()
+        if _may_be_kept(files):
+            size = sum(map(len, texts)) + sum(state.size for states in files.values() for state in states)
+            self._kept[key] = Remembered(value, files, size)
+            self._forget()
+        return value
+
+    def _forget(self) -> None:
+        """Forget the oldest values where there are too many, or too large ones."""
+        while len(self._kept) > MOST or sum(kept.size for kept in self._kept.values()) > MOST_BYTES:
+            del self._kept[next(iter(self._kept))]
+
+
+def _may_be_kept(files: dict[str, list[FileState]]) -> bool:
+    """Tell whether files can be read again, and whether a change would show."""
+    plain = all(os.path.isfile(path) or os.path.isdir(path) for path in files)
+    youngest = max((state.ctime_ns for states in files.values() for state in states), default=0)
+    return plain and youngest < time.time_ns() - SETTLED_NS
+
 
 OPEN_IN_TREES = ("frames", "direction", "camera_axes", "dh", "stamps")  # what forms of files of frames may leave open
 
@@ -60,7 +158,7 @@ def load_sides(
     count = len(a) + len(b)
 
     def side(arguments: Sequence[str], behind: int) -> tuple[FrameTree | TransformBuffer, dict[str, Place]]:
-        from frametool.formats.assembly import Rules
+        from frametool.formats.load import Rules
 
         where: dict[str, Place] = {}
         return _loaded(opened(arguments, behind=behind, of=count), Rules(normalize=normalize), where), where
@@ -139,7 +237,7 @@ def opened(
     behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
     of: so many files there are in all
     """
-    from frametool.formats.recordings import Recording, opened_together
+    from frametool.formats.load import Recording, opened_together
 
     refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():

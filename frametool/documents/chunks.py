@@ -5,8 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.limits import MOST_CHARACTERS
-from frametool.documents.source import UTF16, decode
+from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
 from frametool.errors import FormatError
 
 if TYPE_CHECKING:

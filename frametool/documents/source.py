@@ -2,26 +2,66 @@
 
 Knows no syntax.  Lines and columns are counted from 1; a line ends where YAML says it does, so that the places are
 the parser's own.
+
+A file that was opened and looked at, or a text given as it stands: its name for messages, its form, its bytes.
+
+How much a document may hold: room for a million frames, none for a short text that asks for gigabytes.
+
+Plain size is no fault: it costs what it is long.  What is held back is depth, which takes stack; lists and maps, which
+take thirty times the room that they are written in; and what aliases repeat, which grows without bound.
+
+Building a million objects without the garbage collector walking them all, over and over.
 """
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import sys
 from bisect import bisect_right
 from contextlib import contextmanager
-from io import BufferedReader
+from functools import cached_property
+from io import BufferedReader, BytesIO
 from typing import NamedTuple
 
-from frametool.documents.limits import MOST_CHARACTERS, size_problem
 from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, shown
 
 TYPE_CHECKING = False
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from os import PathLike
     from typing import BinaryIO
+
+DEEPEST = 1000
+"""Most levels of lists and maps; a tree of 60 frames in a row has 120."""
+
+MOST_CHARACTERS = 1 << 30
+"""Longest text read as one file of documents, also in bytes; a million frames take 100 to 600 million."""
+
+MOST_CONTAINERS = 10_000_000
+"""Most lists and maps in one text: each takes 64 bytes or more, and 3 characters to write; a million messages: 6e6."""
+
+MOST_VALUES = 50_000_000
+"""Most commas and line ends in one text: a value beside each takes 60 bytes; a million messages in lines have 4e7."""
+
+
+def size_problem(text: str) -> str:
+    """Say what of a text is too long; "" if nothing is."""
+    if len(text) > MOST_CHARACTERS:
+        return f"longer than {MOST_CHARACTERS} characters, the most in one file; split it"
+    if len(text) > MOST_VALUES and text.count(",") + text.count("\n") > MOST_VALUES:
+        return f"more than {MOST_VALUES} commas and line ends, the most in one file; split it"
+    return ""
+
+
+def too_much(depth: int) -> str:
+    """Say which of the two limits is passed at a depth."""
+    if depth >= DEEPEST:
+        return f"nested deeper than {DEEPEST} levels"
+    return f"more than {MOST_CONTAINERS} lists and maps in one file; split it"
+
 
 HEAD = 1 << 16
 """How many bytes of a file are looked at before it is read."""
@@ -266,3 +306,52 @@ def _gap(character: str) -> str:
     from unicodedata import combining, east_asian_width
 
     return "" if combining(character) else "  " if east_asian_width(character) in "WF" else " "
+
+
+class InputFile:
+    """A file, standard input for `-`, or a folder; what it holds is read once, as a stream or as one text."""
+
+    def __init__(self, path: str | PathLike[str], stream: BinaryIO | None = None, *, folder: bool = False) -> None:
+        """Open a file.
+
+        stream: what was opened already, with nothing of it read; folder: there is nothing to open.
+        Raises FileProblem.
+        """
+        self.path = str(path)
+        self.name = "stdin" if self.path == "-" else self.path
+        self.form = ""
+        self.beside: Sequence[InputFile] = ()  # all files that are read together
+        self.scopes: list[str] = []  # what stands before its names, once for each, where another file says so
+        self.stream: BinaryIO = BytesIO() if folder else stream or opened(path)
+
+    def head(self) -> bytes:
+        """Return the first bytes, and leave them to be read."""
+        head: bytes = self.stream.peek(HEAD)[:HEAD]  # type: ignore[attr-defined]
+        return head
+
+    @cached_property
+    def text(self) -> str:
+        """Return the whole text."""
+        return read_text(self.path, self.stream)
+
+    @property
+    def source(self) -> Source:
+        """Return the whole text under its name."""
+        return Source(self.name, self.text)
+
+    def close(self) -> None:
+        """Let go of a file; standard input stays open."""
+        if self.path != "-":
+            self.stream.close()
+
+
+@contextmanager
+def paused_collector() -> Iterator[None]:
+    """Keep the garbage collector off meanwhile: it would walk the growing result again and again."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()

@@ -32,7 +32,7 @@ from functools import cached_property
 
 from frametool.documents.source import LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, bare, shown
-from frametool.formats import FORMATS, by_suffix, readers, unread
+from frametool.formats.table import FORMATS, by_suffix, readers, unread
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class Beginning:
     @cached_property
     def data_line(self) -> str:
         """Return the first line of data."""
-        from frametool.ros.noise import NOISE
+        from frametool.ros.message_stream import NOISE
 
         lines = (line for line in self.text.splitlines() if line.strip() and not line.startswith(("#", "---")))
         return next((line for line in lines if not NOISE(line)), "")
@@ -74,7 +74,7 @@ class Beginning:
     @cached_property
     def json_paths(self) -> set[tuple[str, ...]]:
         """Return the ways to the keys of JSON; lists on the way do not count."""
-        from frametool.documents.json_reader import json_events, looks_like_json
+        from frametool.documents.json import json_events, looks_like_json
         from frametool.documents.marks import END, LEAF, MAP
 
         text = self.text[:LOOKED_AT].lstrip()
@@ -111,7 +111,7 @@ class Beginning:
         A list in between is a `[`.
         """
         from frametool.documents.marks import END, LEAF, LIST, MAP
-        from frametool.documents.yaml_events import yaml_events
+        from frametool.documents.yaml import yaml_events
 
         found: set[str] = set()
         outer: list[tuple[str, str | None]] = []

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frametool.errors import ValueInvalid, shown
-from frametool.geometry import arrays, quaternion, segment
+from frametool.geometry import arrays, quaternion, rigid
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class TrackTable:
         if track.varies:
             under = np.array(parents, dtype=object)
             following = np.where(under[following] == under, following, np.arange(self.stamps.size))
-        ways = arrays.run(segment.prepare, 8, (*here, *here[:, following]), arrays)
+        ways = arrays.run(rigid.prepare, 8, (*here, *here[:, following]), arrays)
         step = np.append(np.diff(self.stamps), 1)
         self.columns = np.array((*here, *ways, 1.0 / np.maximum(step, 1)))
 
@@ -139,7 +139,7 @@ class TrackTable:
         """Return the poses at sorted times, none of them outside of the samples."""
         stamps, columns = self._spread(times)
         arguments: tuple[Any, ...] = (*columns[:15], (times - stamps) * columns[15], arrays)
-        return segment.along(*arguments)
+        return rigid.along(*arguments)
 
     def _spread(self, times: Stamps) -> tuple[Stamps, Floats]:
         """Return for each time the newest sample that is not after it: its stamp and its columns.

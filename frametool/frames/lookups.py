@@ -1,14 +1,24 @@
-"""What can be asked of frames: which there are, how they hang together, where one is seen from another, and when."""
+"""What can be asked of frames: which there are, how they hang together, where one is seen from another, and when.
+
+A tree of frames that stand still relative to one another.
+
+A recording played back: the same lookup again and again while its time goes by, as tf2_echo does on a robot.
+"""
 
 from __future__ import annotations
 
+from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING
+from itertools import chain, repeat
+from math import ceil, floor
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import BadTopology, NoDataAt, NotConnected, warn
-from frametool.frames.path import edges_between, to_root
+from frametool.errors import BadTopology, NoDataAt, NotConnected, ValueInvalid, shown, warn
+from frametool.frames.path import cycle_message, edges_between, to_root
+from frametool.frames.policy import FRAMETOOL
 from frametool.frames.query import Query
-from frametool.frames.stamps import whole_stamp
+from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
+from frametool.frames.track import StandingTrack
 from frametool.geometry import rigid
 from frametool.geometry.transform import Transform
 
@@ -18,9 +28,7 @@ if TYPE_CHECKING:
 
     from frametool.errors import LookupFailed
     from frametool.frames.policy import BufferPolicy
-    from frametool.frames.replay import Replayed
     from frametool.frames.track import Track
-    from frametool.frames.tree import FrameTree
     from frametool.geometry.types import Rigid
 
 MOST_KEPT = 1 << 14  # queries
@@ -86,8 +94,7 @@ class Frames:
 
     def tree_at(self, at_ns: int) -> FrameTree:
         """Return the tree as it stands at one time; edges without data then are left out, with a warning."""
-        from frametool.frames.no_data import left_out
-        from frametool.frames.tree import FrameTree
+        from frametool.frames.policy import left_out
 
         tree = FrameTree(self.name)
         for frame in self._frames:
@@ -172,8 +179,6 @@ class Frames:
         rate_hz: steps in a second.  start_ns, stop_ns: None for the `span`.  If nothing moves there is one step.
         Raises ValueInvalid for a rate whose steps are not between a nanosecond and a century; otherwise as `lookup`.
         """
-        from frametool.frames.replay import replay
-
         return replay(self, target, source, rate_hz, start_ns, stop_ns)
 
     # --- the way ---
@@ -292,3 +297,107 @@ class Frames:
             else:
                 return self.policy.missing(self, target, source, at_ns, way)
         return self.policy.unconnected(self, error, target, source, at_ns)
+
+
+class FrameTree(Frames):
+    """Hold frames and the fixed transforms between them; answer where one is seen from another.
+
+    Several roots are fine. Every frame has at most one parent, and no frame is its own ancestor.
+
+        tree = FrameTree()
+        tree.add("base", "camera", base_from_camera)
+        tree.lookup("camera", "base")               # camera_from_base
+    """
+
+    def __init__(self, name: str = "") -> None:
+        """Create an empty tree; `name` says in error messages where the frames come from."""
+        super().__init__(name, FRAMETOOL)
+        self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
+
+    def add(self, parent: str, child: str, transform: Transform) -> None:
+        """Hang a frame under a parent; `transform` is parent_from_child, the pose of the child in its parent.
+
+        Adding an edge again with the same numbers changes nothing.
+        Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself.
+        """
+        self.add_components(parent, child, transform.components)
+
+    def add_components(self, parent: str, child: str, components: Rigid) -> None:
+        """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
+        known = self._tracks.get(child)
+        if known is not None and known.standing:
+            self.policy.stand(known, parent, components)
+            return
+        if parent == child:
+            raise BadTopology(f"frame {shown(child)} is its own parent", rule="self")
+        if child in self._frames and self._root_of(parent) == child:
+            raise BadTopology(cycle_message([*to_root(parent, self.parent), parent]), rule="cycle")
+        self._frames[parent] = None
+        self._frames[child] = None
+        self._tracks[child] = StandingTrack(child, parent, components)
+        self._queries.clear()
+        self._upward[child] = parent
+
+    def _root_of(self, frame: str) -> str:
+        """Find a frame's root, halving the way for the next search."""
+        upward = self._upward
+        while (above := upward.get(frame)) is not None:
+            further = upward.get(above)
+            if further is None:
+                return above
+            upward[frame] = further
+            frame = further
+        return frame
+
+    def __repr__(self) -> str:
+        """Return how many frames there are and which roots."""
+        return f"FrameTree({len(self._frames)} frames, roots: {', '.join(self.roots) or 'none'})"
+
+
+HALF = Fraction(1, 2)
+
+
+class Replayed(NamedTuple):
+    """One lookup of a replay.
+
+    at_ns: its time; None if nothing moves
+    found: target_from_source, or the error where there is no data
+    steps: how many it stands for; all that lie before the data, or after, are one
+    """
+
+    at_ns: int | None
+    found: Transform | NoDataAt
+    steps: int = 1
+
+
+def replay(
+    frames: Frames, target: str, source: str, rate_hz: float, start_ns: int | None, stop_ns: int | None
+) -> Iterator[Replayed]:
+    """Yield the lookups of a replay; see Frames.replay."""
+    period = BILLION / Fraction(checked_rate(rate_hz))
+    span = frames.span(target, source)
+    if span is None:
+        yield Replayed(start_ns, frames.lookup(target, source))
+        return
+    begin = span[0] if start_ns is None else whole_stamp(start_ns)
+    end = span[1] if stop_ns is None else whole_stamp(stop_ns)
+    if begin > end:
+        frames.lookup(target, source, begin if stop_ns is None else end)  # raises: all the data lie on one side of it
+    steps = floor((end - begin + HALF) / period) + 1
+    steps -= begin + round((steps - 1) * period) > end
+    first = min(max(ceil((span[0] - begin - HALF) / period), 0), steps)
+    last = min(max(floor((span[1] - begin + HALF) / period) + 1, first), steps)
+    for number, count in chain([(0, first)], zip(range(first, last), repeat(1)), [(last, steps - last)]):
+        at_ns = begin + round(number * period)
+        try:
+            if count:
+                yield Replayed(at_ns, frames.lookup(target, source, at_ns), count)
+        except NoDataAt as error:
+            yield Replayed(at_ns, error, count)
+
+
+def checked_rate(rate_hz: float) -> float:
+    """Return a rate of steps back; raise ValueInvalid unless they are between a nanosecond and a century apart."""
+    if not BILLION / FURTHEST_NS <= rate_hz <= BILLION:
+        raise ValueInvalid(f"a rate of {rate_hz:g} Hz has no steps between 1 ns and {FURTHEST_NS // BILLION} s")
+    return rate_hz

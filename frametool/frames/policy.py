@@ -1,20 +1,26 @@
-"""What a buffer accepts, and the words of its refusals: frametool's own; those of tf2 are in `frametool.frames.tf2`."""
+"""What a buffer accepts, and the words of its refusals: frametool's own; those of tf2 are in `frametool.frames.tf2`.
+
+The error of a lookup at a time without data: which edge, how far off, and when the whole way has data.
+"""
 
 from __future__ import annotations
 
 from math import isfinite
 
-from frametool.errors import BadTopology, UnknownFrame, ValueInvalid, shown
+from frametool.errors import BadTopology, NoDataAt, TooEarly, TooLate, UnknownFrame, ValueInvalid, bare, shown
 from frametool.frames.path import edges_between
-from frametool.frames.stamps import format_stamp
+from frametool.frames.stamps import BILLION, format_stamp
 
 TYPE_CHECKING = False
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.errors import LookupFailed, NotConnected
+    from frametool.frames.edge_log import EdgeLog
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack, StandingTrack, Track
     from frametool.geometry.types import Rigid
-
 
 def policy_named(name: str) -> BufferPolicy:
     """Return the rules of `frametool`, `ros1` or `ros2`."""
@@ -129,8 +135,6 @@ class BufferPolicy:
         self, buffer: Frames, target: str, source: str, at_ns: int, way: list[Track],  # noqa: ARG002
     ) -> LookupFailed:
         """Report that an edge on the way has no data at a time."""
-        from frametool.frames.no_data import no_data
-
         return no_data(target, source, at_ns, way)
 
 
@@ -141,3 +145,90 @@ def _parent_exactly(buffer: Frames, frame: str, at_ns: int) -> str | None:
 
 
 FRAMETOOL = BufferPolicy()
+
+
+OTHER_CLOCK = 10**8 * BILLION  # three years: beyond, one clock counts from 1970 and the other from its start
+
+
+def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDataAt:
+    """Compose the error for a lookup at a time, blaming the edge that is furthest from it.
+
+    path: the edges between the two frames, from the target to the source.
+    """
+    moving = [track for track in path if not track.standing]
+    worst = max(moving, key=lambda track: gap(track, at_ns))
+    first, last = worst.span
+    short = gap(worst, at_ns)
+    early = at_ns < first
+    begin, end = max(track.first_ns for track in moving), min(track.last_ns for track in moving)
+    parent = worst.parent_near(at_ns)
+    off = f"{seconds(short)} s too {'early' if early else 'late'}"
+    message = (
+        f"no data for {bare(parent)} -> {bare(worst.child)} at {format_stamp(at_ns)}; {_cover(first, last)} ({off}), "
+        f"{_way(target, source, path)}{_whole(moving, begin, end)}{_clocks(short)}"
+    )
+    return (TooEarly if early else TooLate)(
+        message, parent=parent, child=worst.child, at_ns=at_ns, first_ns=first, last_ns=last, short_ns=short,
+        short_s=short / BILLION, target=target, source=source, path=frames_on(target, source, path),
+        available_from_ns=begin if begin <= end else None, available_until_ns=end if begin <= end else None,
+    )  # fmt: skip
+
+
+def left_out(track: MovingTrack, at_ns: int) -> str:
+    """Return the sentence that says why an edge is left out of the tree at a time."""
+    return (
+        f"{bare(track.parent)} -> {bare(track.child)} is left out: no data at {format_stamp(at_ns)}, "
+        f"samples cover {format_stamp(track.first_ns)} .. {format_stamp(track.last_ns)} "
+        f"({seconds(gap(track, at_ns))} s off)"
+    )
+
+
+def gap(track: MovingTrack, at_ns: int) -> int:
+    """Return how far a time lies outside of a track's samples, in nanoseconds."""
+    first, last = track.span
+    return max(first - at_ns, at_ns - last, 0)
+
+
+def seconds(duration_ns: int) -> str:
+    """Write a duration in seconds without idle zeros: `0.5`, `3`."""
+    return format_stamp(duration_ns).rstrip("0").rstrip(".")
+
+
+def _cover(first: int, last: int) -> str:
+    if first == last:
+        return f"its only sample is at {format_stamp(first)}"
+    return f"samples cover {format_stamp(first)} .. {format_stamp(last)}"
+
+
+def _way(target: str, source: str, path: Sequence[Track]) -> str:
+    """Write the way with arrows from source to target, cut in the middle when it is long."""
+    frames = list(map(bare, frames_on(target, source, path)))
+    if len(frames) > 12:
+        frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
+    return f"on the path {' <- '.join(frames)}"
+
+
+def frames_on(target: str, source: str, path: Sequence[Track | EdgeLog]) -> list[str]:
+    """List the frames on a path of edges from target to source, both included."""
+    frames = [target]
+    for track in path:
+        frames.append(track.parent if track.child == frames[-1] else track.child)
+    return frames if frames[-1] == source else [*frames, source]
+
+
+def _whole(moving: Sequence[MovingTrack], begin: int, end: int) -> str:
+    """Return the clause that says when all edges have data, or which two never do."""
+    if len(moving) == 1:
+        return ""
+    if begin <= end:
+        return f"; the whole path has data from {format_stamp(begin)} until {format_stamp(end)}"
+    late = max(moving, key=lambda track: track.first_ns)
+    early = min(moving, key=lambda track: track.last_ns)
+    ended, begun = (f"{bare(track.parent)} -> {bare(track.child)}" for track in (early, late))
+    return f"; {ended} ends at {format_stamp(end)} before {begun} begins at {format_stamp(begin)}: they never overlap"
+
+
+def _clocks(short: int) -> str:
+    if short < OTHER_CLOCK:
+        return ""
+    return "; that is years: one of the clocks counts from 1970, the other does not"

@@ -1,25 +1,71 @@
 """What one frame does over time: one pose in its parent for ever, or poses in its parents, oldest first.
 
 Knows stamps in integer nanoseconds and components; knows no other frames.
+
+Successive samples of one frame: a piece of a track that is short enough to be put in order again and again.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from itertools import pairwise
+from operator import itemgetter
 
-from frametool.frames.sample_page import Page
-from frametool.geometry import floats, segment
+from frametool.geometry import floats, rigid
 
 TYPE_CHECKING = False
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import Any, Literal, TypeAlias
 
-    from frametool.frames.sample_page import Way
     from frametool.geometry.types import Rigid
 
+    Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
     Track: TypeAlias = "StandingTrack | MovingTrack"  # what is known of one child frame; `standing` tells which
+
+FEW = 64  # late samples: up to so many are sorted in one by one, a microsecond each; a whole page takes a hundred
+
+
+class Page:
+    """Samples as three parallel lists, and what was prepared to interpolate after each of them.
+
+    `late` holds those that came out of order, as (stamp, parent, components): they wait until somebody asks, so that
+    one sort takes in many.  None of them is before the first of the page, unless the page is the first.
+    """
+
+    __slots__ = ("late", "parents", "samples", "segments", "stamps")
+
+    def __init__(self, stamps: list[int], parents: list[str], samples: list[Rigid]) -> None:
+        """Keep the lists."""
+        self.stamps = stamps
+        self.parents = parents
+        self.samples = samples
+        self.segments: dict[int, Way] = {}
+        self.late: list[tuple[int, str, Rigid]] = []
+
+    def settle(self) -> None:
+        """Sort in what came late, each after those of its stamp."""
+        if len(self.late) > FEW:
+            rows = [*zip(self.stamps, self.parents, self.samples, strict=True), *self.late]
+            rows.sort(key=itemgetter(0))
+            self.stamps[:], self.parents[:], self.samples[:] = zip(*rows, strict=True)
+        else:
+            for stamp_ns, parent, components in self.late:
+                at = bisect_right(self.stamps, stamp_ns)
+                self.stamps.insert(at, stamp_ns)
+                self.parents.insert(at, parent)
+                self.samples.insert(at, components)
+        if self.late:
+            self.late.clear()
+            self.segments.clear()
+
+    def drop(self, count: int) -> None:
+        """Drop the oldest samples."""
+        for column in (self.stamps, self.parents, self.samples):
+            del column[:count]
+        self.segments.clear()
+
 
 PAGE = 512  # samples: a longer page is cut when a late one falls into it
 DEFAULT_AUTHORITY = "default_authority"
@@ -274,7 +320,7 @@ class MovingTrack:
         way = page.segments.get(at)
         if way is None:
             way = self._prepare(page, at)
-        return segment.along(*page.samples[at], *way, (at_ns - begin) / (end - begin), floats)
+        return rigid.along(*page.samples[at], *way, (at_ns - begin) / (end - begin), floats)
 
     def _after(self, page: Page) -> Page:
         return self.pages[bisect_right(self.begins, page.stamps[-1])]
@@ -284,7 +330,7 @@ class MovingTrack:
         here = page.samples[at]
         following, next_at = (page, at + 1) if at + 1 < len(page.stamps) else (self._after(page), 0)
         there = following.samples[next_at] if page.parents[at] == following.parents[next_at] else here
-        way = page.segments[at] = segment.prepare(*here, *there, floats)
+        way = page.segments[at] = rigid.prepare(*here, *there, floats)
         return way
 
     def at_many(self, times: Any) -> Rigid:

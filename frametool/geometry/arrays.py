@@ -11,7 +11,7 @@ import numpy as np
 from numpy import fmod, frexp, ldexp, maximum, minimum, sqrt
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import far_angles, out_array, trig
+from frametool.geometry import out_array, trig
 
 __all__ = [
     "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
@@ -155,7 +155,7 @@ def reduced_exactly(x: Array) -> Two[Array]:
     x = np.atleast_1d(x)
     rest, turns = trig.reduced(x)
     for row in np.argwhere(~(abs(x) < trig.FAR)).tolist():
-        rest[*row], turns[*row] = far_angles.reduced_exactly(float(x[*row]))
+        rest[*row], turns[*row] = trig.reduced_exactly(float(x[*row]))
     return rest, turns
 
 

@@ -68,6 +68,6 @@ def doubled_arctan(tangent: float) -> float:
 
 def reduced_exactly(x: float) -> tuple[float, float]:
     """Return what is left of any angle less the nearest whole number of quarter turns, and that number modulo 2."""
-    from frametool.geometry import far_angles
+    from frametool.geometry import trig
 
-    return far_angles.reduced_exactly(x)
+    return trig.reduced_exactly(x)

@@ -1,6 +1,21 @@
 """Kernels of rigid transforms: translation tx, ty, tz in metres, then the unit quaternion x, y, z, w.
 
 Knows numbers only; components are floats or arrays of one shape.
+
+Kernels of the way between two poses, prepared once and walked at many fractions.
+
+The rotation is that of `quaternion.slerp`, to the bit once it is normalised; what does not depend on the fraction is
+computed once.
+Knows numbers only; components are floats or arrays of one shape.
+
+Kernels of the motions of joints: what a joint does to the frame behind it, as components tx, ty, tz, x, y, z, w.
+
+Knows numbers only.  Axes are unit and plain floats; values are floats or arrays.
+
+Kernels of a chain of joints: the pose so far, carried across one joint, or one fixed piece, after the other.
+
+Axes and fixed pieces are plain floats; zeros among them cost nothing, which is most of them in robots.  What is left
+out depends on them alone, so that floats and arrays take the same steps.  Components are floats or arrays.
 """
 
 from __future__ import annotations
@@ -9,12 +24,28 @@ from math import isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rotvec
-from frametool.geometry.quaternion import cross, either, length
-from frametool.geometry.trig import half_sincos, incline, polynomial
+from frametool.geometry.quaternion import cross, either, length, settled
+from frametool.geometry.trig import half_sincos, half_sincos_deg, incline, polynomial
 
 TYPE_CHECKING = False
+
 if TYPE_CHECKING:
-    from frametool.geometry.types import Components, Functions, N, Seven, Six, Three, Twelve, Two
+    from frametool.geometry.types import (
+        Components,
+        Eight,
+        Functions,
+        N,
+        Namespace,
+        Number,
+        Quaternion,
+        Rigid,
+        Seven,
+        Six,
+        Three,
+        Twelve,
+        Two,
+        Vector,
+    )
 
 SERIES_EXP = 1.5  # rad: above, a - sin(a) loses less than a digit; below, ten terms of its series are exact
 SERIES_LOG = 0.6  # rad: the same for 1 - (a/2) cot(a/2) and six terms
@@ -159,3 +190,114 @@ def log(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Six[N]
     cx, cy, cz = cross(wx, wy, wz, tx, ty, tz)
     dx, dy, dz = cross(wx, wy, wz, cx, cy, cz)
     return tx + (factor * dx - 0.5 * cx), ty + (factor * dy - 0.5 * cy), tz + (factor * dz - 0.5 * cz), wx, wy, wz
+
+
+def prepare(
+    atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
+    btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
+) -> Eight[N]:  # fmt: skip
+    """Return the step dx, dy, dz in metres, then what `quaternion.toward` does: c as x, y, z, w, and half the arc."""
+    cx, cy, cz, cw, half_arc = quaternion.toward(ax, ay, az, aw, bx, by, bz, bw, xp)
+    return btx - atx, bty - aty, btz - atz, cx, cy, cz, cw, half_arc
+
+
+def along(
+    atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
+    dx: N, dy: N, dz: N, cx: N, cy: N, cz: N, cw: N, half_arc: N,
+    fraction: N, xp: Functions[N],
+) -> Seven[N]:  # fmt: skip
+    """Return the pose at a fraction of the way from a, by what `prepare` gave; unit to some eps.
+
+    fraction: 0 to 1, so that the angle never needs to be reduced.
+    """
+    sine, cosine = xp.doubled_sincos(fraction * half_arc)
+    return (
+        atx + fraction * dx, aty + fraction * dy, atz + fraction * dz,
+        cosine * ax + sine * cx, cosine * ay + sine * cy, cosine * az + sine * cz, cosine * aw + sine * cw,
+    )  # fmt: skip
+
+
+def turned(ax: float, ay: float, az: float, angle: N, xp: Functions[N], *, degrees: bool = False) -> Rigid:
+    """Return the motion of a revolute or continuous joint: a turn about its axis, in radians or degrees."""
+    sine, cosine = half_sincos_deg(angle, xp) if degrees else half_sincos(angle, xp)
+    return 0.0, 0.0, 0.0, _times(ax, sine), _times(ay, sine), _times(az, sine), cosine
+
+
+def slid(ax: float, ay: float, az: float, distance: N) -> Rigid:
+    """Return the motion of a prismatic joint: a shift along its axis, in metres."""
+    return _times(ax, distance), _times(ay, distance), _times(az, distance), 0.0, 0.0, 0.0, 1.0
+
+
+def _times(part: float, values: Number) -> Number:
+    """Multiply by a part of an axis, which mostly is 0: then a plain float stays one and costs nothing further on."""
+    return part * values if part else 0.0
+
+
+def turn(pose: Rigid, axis: Vector, angle: Number, xp: Namespace, *, degrees: bool = False) -> Rigid:
+    """Return the pose behind a joint that turns about a unit axis, in radians or degrees.
+
+    Source: the Hamilton product with (axis sine, cosine) of half the angle, the sine taken out.
+    """
+    tx, ty, tz, x, y, z, w = pose
+    ax, ay, az = axis
+    sine, cosine = half_sincos_deg(angle, xp) if degrees else half_sincos(angle, xp)
+    return tx, ty, tz, *settled(
+        x * cosine + sine * _sum((ax, w), (az, y), (-ay, z)),
+        y * cosine + sine * _sum((ay, w), (-az, x), (ax, z)),
+        z * cosine + sine * _sum((az, w), (ay, x), (-ax, y)),
+        w * cosine - sine * _sum((ax, x), (ay, y), (az, z)),
+    )
+
+
+def slide(pose: Rigid, axis: Vector, distance: Number) -> Rigid:
+    """Return the pose behind a joint that slides along a unit axis, in metres."""
+    dx, dy, dz = _rotated(pose[3:], axis)
+    tx, ty, tz = pose[:3]
+    return tx + dx * distance, ty + dy * distance, tz + dz * distance, *pose[3:]
+
+
+def go_on(pose: Rigid, piece: Rigid) -> Rigid:
+    """Return the pose at the end of a fixed piece."""
+    tx, ty, tz, x, y, z, w = pose
+    if any(piece[:3]):
+        dx, dy, dz = _rotated(pose[3:], piece[:3])
+        tx, ty, tz = tx + dx, ty + dy, tz + dz
+    bx, by, bz, bw = piece[3:]
+    if not (bx or by or bz):
+        return tx, ty, tz, x, y, z, w
+    return tx, ty, tz, *settled(
+        _sum((bx, w), (bw, x), (bz, y), (-by, z)),
+        _sum((by, w), (-bz, x), (bw, y), (bx, z)),
+        _sum((bz, w), (by, x), (-bx, y), (bw, z)),
+        _sum((bw, w), (-bx, x), (-by, y), (-bz, z)),
+    )
+
+
+def _rotated(rotation: Quaternion, vector: Vector) -> Vector:
+    """Rotate a constant vector: the columns of the matrix that it needs.
+
+    Divided by the norm actually computed, which keeps multiples of 90 degrees exact.
+    """
+    x, y, z, w = rotation
+    vx, vy, vz = vector
+    scale = 2.0 / (x * x + y * y + z * z + w * w)
+    xs, ys, zs = x * scale, y * scale, z * scale
+    columns = []
+    if vx:
+        columns.append((vx, 1.0 - (y * ys + z * zs), x * ys + w * zs, x * zs - w * ys))
+    if vy:
+        columns.append((vy, x * ys - w * zs, 1.0 - (x * xs + z * zs), y * zs + w * xs))
+    if vz:
+        columns.append((vz, x * zs + w * ys, y * zs - w * xs, 1.0 - (x * xs + y * ys)))
+    first, second, third = (_sum(*((column[0], column[row]) for column in columns)) for row in (1, 2, 3))
+    return first, second, third
+
+
+def _sum(*terms: tuple[float, Number]) -> Number:
+    """Add up numbers times constants, those times 0 left out."""
+    total = None
+    for factor, number in terms:
+        if factor:
+            part = number if factor == 1.0 else factor * number
+            total = part if total is None else total + part
+    return 0.0 if total is None else total

@@ -1,6 +1,8 @@
 """The value of a rotation, or of many: components inside, numpy at its face.
 
 Knows no text and no files; radians only. One item is four Python floats and needs no numpy until it shows an array.
+
+What the two values share: components inside, one item or an array of them, numpy's ways of choosing.
 """
 
 from __future__ import annotations
@@ -8,15 +10,55 @@ from __future__ import annotations
 from functools import cache
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import dispatch, euler, floats, quaternion, validation
-from frametool.geometry.batched import Batched
+from frametool.geometry import euler, floats, quaternion, validation
 from frametool.geometry.representations import checked_axes, notation
 
 TYPE_CHECKING = False
+
 if TYPE_CHECKING:
-    from typing import Any
+    from collections.abc import Iterator
+    from typing import Any, Self
 
     from frametool.geometry.types import Array, Components, Numbers, Quaternion
+
+_new_batched = object.__new__
+
+
+class Batched:
+    """One item, or an array of them of any shape; frozen."""
+
+    __slots__ = ("_components",)
+    __array_ufunc__ = None  # an array times a value is refused, not tried element by element
+    _components: Components
+
+    @classmethod
+    def _of_columns(cls, components: Components) -> Self:
+        """Trust components, all floats or all arrays of one shape."""
+        made = _new_batched(cls)
+        made._components = components  # noqa: SLF001 - its own class
+        return made
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the batch; () for one item."""
+        return getattr(self._components[-1], "shape", ())
+
+    def __len__(self) -> int:
+        """Count along the first axis; one item has no length."""
+        if not self.shape:
+            raise TypeError(f"one {type(self).__name__.lower()} has no length")
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> Self:
+        """Choose elements as numpy does."""
+        if not self.shape:
+            raise TypeError(f"one {type(self).__name__.lower()} has no elements")
+        return self._of_columns(validation.chosen(self._components, index))
+
+    def __iter__(self) -> Iterator[Self]:
+        """Go along the first axis."""
+        return (self[index] for index in range(len(self)))
+
 
 NEAR = 1e-9  # rad: rotations closer than this count as close, three digits above the rounding of long chains
 
@@ -130,7 +172,7 @@ class Rotation(Batched):
         For opposite directions the axis is at right angles to the start and to the coordinate axis farthest from it.
         """
         parts = (*validation.columns(start, 3, "start"), *validation.columns(end, 3, "end"))
-        made = dispatch.checked(quaternion.between, 4, parts, "start, end", quaternion.check_directions)
+        made = validation.checked(quaternion.between, 4, parts, "start, end", quaternion.check_directions)
         return cls._of_columns(made)
 
     @classmethod
@@ -148,7 +190,7 @@ class Rotation(Batched):
     def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
         """Return rows of the columns of a notation, of another shape where one is told, in `out` if given."""
         form = _form(spec)
-        return dispatch.rows(form.from_quaternion, inner or (len(form.columns),), self._components, out=out)
+        return validation.rows(form.from_quaternion, inner or (len(form.columns),), self._components, out=out)
 
     def as_quaternion(self, *, out: Array | None = None) -> Array:
         """Return x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""
@@ -204,7 +246,7 @@ class Rotation(Batched):
             product = _new(Rotation)
             product._components = quaternion.compose(*ours, *theirs)
             return product
-        return self._of_columns(dispatch.run(quaternion.compose, 4, (*ours, *theirs), functions=False))
+        return self._of_columns(validation.run(quaternion.compose, 4, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Rotation:
         """Return the rotation back."""
@@ -212,21 +254,21 @@ class Rotation(Batched):
 
     def canonical(self) -> Rotation:
         """Return the same rotation, its quaternion with the canonical sign."""
-        return self._of_columns(dispatch.run(quaternion.from_quaternion, 4, self._components))
+        return self._of_columns(validation.run(quaternion.from_quaternion, 4, self._components))
 
     def apply(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
         given = validation.columns(vectors, 3, "vectors")
         parts = self._components
-        return dispatch.moved(quaternion.rotate, parts, given, "vectors", flatten=quaternion.to_matrix, out=out)
+        return validation.moved(quaternion.rotate, parts, given, "vectors", flatten=quaternion.to_matrix, out=out)
 
     def angle(self) -> Any:
         """Return the angle of rotation in [0, pi] radians."""
-        return dispatch.number(quaternion.angle, self._components)
+        return validation.number(quaternion.angle, self._components)
 
     def distance(self, other: Rotation) -> Any:
         """Return the angle in [0, pi] radians of the rotation between two."""
-        return dispatch.number(quaternion.distance, (*self._components, *require(other, "other").components))
+        return validation.number(quaternion.distance, (*self._components, *require(other, "other").components))
 
     def is_close(self, other: Rotation, *, angle: float = NEAR) -> Any:
         """Say per element whether two rotations are within an angle in radians; q and -q are one."""
@@ -238,7 +280,7 @@ class Rotation(Batched):
         fraction: a number, or an array that broadcasts with the rotations.
         """
         parts = (*self._components, *require(other, "other").components, validation.scalars(fraction, "fraction"))
-        return self._of_columns(dispatch.run(quaternion.slerp, 4, parts))
+        return self._of_columns(validation.run(quaternion.slerp, 4, parts))
 
     def mean(self, weights: Numbers | None = None) -> Rotation:
         """Return the chordal mean of all elements: the rotation with the least sum of squared matrix differences.
@@ -247,7 +289,7 @@ class Rotation(Batched):
         """
         if not self.shape:
             return self
-        moment = dispatch.second_moment(self._components, dispatch.masses(weights, self.shape))
+        moment = validation.second_moment(self._components, validation.masses(weights, self.shape))
         return Rotation.of(*quaternion.largest_eigenvector(moment, floats)).canonical()
 
     def __repr__(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import dispatch
+from frametool.geometry import validation
 
 if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
@@ -29,17 +29,17 @@ def mean_and_spread(poses: Transform, weights: Numbers | None = None) -> tuple[T
     What has no weight counts for nothing.
     Raises ValueInvalid where weights are none, or the rotations point so many ways that none is the mean.
     """
-    mass = dispatch.masses(weights, poses.shape)
-    moment = dispatch.second_moment(poses.components[3:], mass)
+    mass = validation.masses(weights, poses.shape)
+    moment = validation.second_moment(poses.components[3:], mass)
     _refuse_no_mean(moment)
     mean = poses.mean(weights)
     metres, radians = mean.distance(poses)
     counts = mass > 0.0
-    whole = dispatch.total(mass.copy())
+    whole = validation.total(mass.copy())
     return mean, Spread(
-        (dispatch.total(mass * metres * metres) / whole) ** 0.5,
+        (validation.total(mass * metres * metres) / whole) ** 0.5,
         float(metres[counts].max()),
-        (dispatch.total(mass * radians * radians) / whole) ** 0.5,
+        (validation.total(mass * radians * radians) / whole) ** 0.5,
         float(radians[counts].max()),
     )
 

@@ -6,9 +6,8 @@ Knows no names and no time. `a_from_b` takes points seen in b to the same points
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import dispatch, rigid, spatial, validation
-from frametool.geometry.batched import Batched
-from frametool.geometry.rotation import NEAR, Rotation, require
+from frametool.geometry import rigid, spatial, validation
+from frametool.geometry.rotation import NEAR, Batched, Rotation, require
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -109,12 +108,12 @@ class Transform(Batched):
         Linear part first, as in ROS messages: metres, then radians.
         """
         given = validation.columns(twist, 6, "twist")
-        return cls._of_columns(dispatch.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
+        return cls._of_columns(validation.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
 
     @property
     def xyz(self) -> Array:
         """The translations, shape (..., 3), metres."""
-        return dispatch.rows(lambda x, y, z, _xp: (x, y, z), (3,), self._components[:3])
+        return validation.rows(lambda x, y, z, _xp: (x, y, z), (3,), self._components[:3])
 
     @property
     def xyzw(self) -> Array:
@@ -128,11 +127,11 @@ class Transform(Batched):
 
     def as_matrix(self, *, out: Array | None = None) -> Array:
         """Return homogeneous matrices of shape (..., 4, 4)."""
-        return dispatch.rows(rigid.to_homogeneous, (4, 4), self._components, out=out)
+        return validation.rows(rigid.to_homogeneous, (4, 4), self._components, out=out)
 
     def log(self, *, out: Array | None = None) -> Array:
         """Return the twists (vx, vy, vz, wx, wy, wz), shape (..., 6), whose `exp` this is; angles up to pi."""
-        return dispatch.rows(rigid.log, (6,), self._components, out=out)
+        return validation.rows(rigid.log, (6,), self._components, out=out)
 
     def __matmul__(self, other: Transform) -> Transform:
         """Compose: a_from_b @ b_from_c is a_from_c."""
@@ -143,22 +142,22 @@ class Transform(Batched):
             product = _new(Transform)
             product._components = rigid.compose(*ours, *theirs)
             return product
-        return self._of_columns(dispatch.run(rigid.compose, 7, (*ours, *theirs), functions=False))
+        return self._of_columns(validation.run(rigid.compose, 7, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Transform:
         """Return b_from_a of a_from_b."""
-        return self._of_columns(dispatch.run(rigid.inverse, 7, self._components, functions=False))
+        return self._of_columns(validation.run(rigid.inverse, 7, self._components, functions=False))
 
     def relative(self, other: Transform) -> Transform:
         """Return the pose of the other seen from this one: self.inverse() @ other, near poses keeping their digits."""
         return self._of_columns(
-            dispatch.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
+            validation.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
         )
 
     def apply(self, points: Numbers, *, out: Array | None = None) -> Array:
         """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
         given = validation.columns(points, 3, "points")
-        return dispatch.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix, out=out)
+        return validation.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix, out=out)
 
     def apply_vector(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
@@ -167,12 +166,12 @@ class Transform(Batched):
     def apply_twist(self, twists: Numbers, *, out: Array | None = None) -> Array:
         """Move velocities (vx, vy, vz, wx, wy, wz), shape (..., 6): that of the same body at this side's origin."""
         given = validation.columns(twists, 6, "twists")
-        return dispatch.moved(spatial.move_twist, self._components, given, "twists", out=out)
+        return validation.moved(spatial.move_twist, self._components, given, "twists", out=out)
 
     def apply_wrench(self, wrenches: Numbers, *, out: Array | None = None) -> Array:
         """Move wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to this side's origin."""
         given = validation.columns(wrenches, 6, "wrenches")
-        return dispatch.moved(spatial.move_wrench, self._components, given, "wrenches", out=out)
+        return validation.moved(spatial.move_wrench, self._components, given, "wrenches", out=out)
 
     def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
         """Interpolate: translation along the line, rotation by slerp; fractions 0 and 1 give the ends to the bit.
@@ -180,11 +179,11 @@ class Transform(Batched):
         fraction: a number, or an array that broadcasts with the transforms.
         """
         parts = (*self._components, *_components_of(other), validation.scalars(fraction, "fraction"))
-        return self._of_columns(dispatch.run(rigid.interpolate, 7, parts))
+        return self._of_columns(validation.run(rigid.interpolate, 7, parts))
 
     def distance(self, other: Transform) -> tuple[Any, Any]:
         """Return the metres and the radians between two."""
-        metres, radians = dispatch.run(rigid.distance, 2, (*self._components, *_components_of(other)))
+        metres, radians = validation.run(rigid.distance, 2, (*self._components, *_components_of(other)))
         return metres, radians
 
     def is_close(self, other: Transform, *, angle: float = NEAR, distance: float = NEAR_BY) -> Any:
@@ -201,9 +200,9 @@ class Transform(Batched):
         """Return the weighted mean of all elements: of the translations, and the chordal one of the rotations."""
         if not self.shape:
             return self
-        mass = dispatch.masses(weights, self.shape)
-        x, y, z = (dispatch.total(part * mass) for part in self._components[:3])
-        whole = dispatch.total(mass.copy())
+        mass = validation.masses(weights, self.shape)
+        x, y, z = (validation.total(part * mass) for part in self._components[:3])
+        whole = validation.total(mass.copy())
         return Transform.of(x / whole, y / whole, z / whole, *self.rotation.mean(weights).components)
 
     def __repr__(self) -> str:

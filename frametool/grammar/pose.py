@@ -15,7 +15,7 @@ from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry import rigid
 from frametool.geometry.representations import REPRESENTATIONS
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
-from frametool.grammar.rotation import AGREEMENT, AXES_KEY, ROTATION_KEYS, agreeing_rotation, read_rotation
+from frametool.grammar.rotation_spelling import AGREEMENT, AXES_KEY, ROTATION_KEYS, agreeing_rotation, read_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

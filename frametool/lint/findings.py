@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.json_writer import dump
+from frametool.documents.json import dump
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

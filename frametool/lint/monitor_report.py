@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError
-from frametool.formats.recordings import refuse_unknown_joints
+from frametool.formats.load import refuse_unknown_joints
 from frametool.frames.edge_log import EdgeLog, chain, common_interval
-from frametool.frames.no_data import frames_on
+from frametool.frames.policy import frames_on
 from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import stop
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.formats.recordings import Recording
+    from frametool.formats.load import Recording
     from frametool.grammar.edges import Report
 
 

@@ -13,16 +13,16 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Note
-from frametool.ros.echo_blocks import unit_components
 from frametool.ros.message_parts import STAMPS, stamp_problem
-from frametool.ros.pose_messages import TYPES as POSES
-from frametool.ros.pose_messages import body_of
+from frametool.ros.messages import TYPES as POSES
+from frametool.ros.messages import body_of
+from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from frametool.documents.input_file import InputFile
+    from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Tally
 
 LOST = "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"

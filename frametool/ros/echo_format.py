@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.json_writer import dump as json_dump
+from frametool.documents.json import dump as json_dump
 from frametool.documents.yaml_writer import dump, quoted
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION, format_stamp
@@ -24,7 +24,7 @@ from frametool.ros.messages import MESSAGE_KEYS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import FrameTree
     from frametool.grammar.result import Style
 
 

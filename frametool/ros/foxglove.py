@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.json_writer import dump
+from frametool.documents.json import dump
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
@@ -22,7 +22,7 @@ from frametool.ros.message_parts import frame_of, only, read_rigid, read_stamp
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from frametool.frames.tree import FrameTree
+    from frametool.frames.lookups import FrameTree
     from frametool.grammar.readers import Quaternion, Reading, Vector
     from frametool.grammar.result import Style
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import shown
 from frametool.frames.stamps import BILLION
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
-from frametool.grammar.rotation import read_rotation
+from frametool.grammar.rotation_spelling import read_rotation
 
 if TYPE_CHECKING:
     from frametool.grammar.readers import Path, Quaternion, Reading, Vector

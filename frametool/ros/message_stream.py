@@ -1,27 +1,131 @@
 """Every message of a recording in text, one after the other, whatever form it is in: bounded memory, any length.
 
 Forms are those of `frametool.formats.FORMATS`. A message is plain values, as the document reader gives them.
+
+Transforms out of ROS messages in text: what the echo tools print, their CSV, rosbridge and Foxglove JSON lines.
+
+The CSV of the echo tools, as the messages it was made from.
+
+    %time,field.header.seq,field.header.stamp,field.header.frame_id,field.point.x,..      rostopic echo -p
+    1795206353524626016,1,1795206353524626016,turtle1,1.0,..                               stamps in ns, nothing quoted
+    1683377979,902062451,world,turtle1,5.5,5.5,0.0,0.0,0.0,0.0,1.0                         ros2 topic echo --csv
+
+rostopic names every field once, in the header; later rows may hold more or fewer transforms than it names. The
+other has no header: the kind of message is known by how many fields there are, several transforms follow each other.
+
+What the echo tools or the shell print between messages.
 """
 
 from __future__ import annotations
 
 import re
+from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.chunks import Piece, counted_from, documents, lines
 from frametool.documents.document import parse_documents
-from frametool.documents.json_reader import strict_json
+from frametool.documents.json import strict_json
 from frametool.documents.source import Source, check_text
-from frametool.errors import FormatError
-from frametool.grammar.readers import Misfit
-from frametool.ros import topic_csv
-from frametool.ros.noise import NOISE
+from frametool.errors import FormatError, shown
+from frametool.frames.stamps import BILLION
+from frametool.grammar.edges import Edge
+from frametool.grammar.readers import Misfit, Reading, as_mapping
+from frametool.ros import messages
+from frametool.ros.messages import body_of, is_pose, read_pose
+from frametool.ros.plain_messages import Blocks, plain_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from typing import BinaryIO
 
-    from frametool.grammar.edges import Tally
+    from frametool.documents.source import InputFile
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Options, Tally
+    from frametool.grammar.readers import Path
+
+
+def _axes(part: str, axes: str = "xyz") -> list[str]:
+    return [f"{part}.{axis}" for axis in axes]
+
+
+_RIGID = ["child_frame_id", *_axes("transform.translation"), *_axes("transform.rotation", "xyzw")]
+_HEADER2 = ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id"]
+TRANSFORM1 = ["header.seq", "header.stamp", "header.frame_id", *_RIGID]
+TRANSFORM2 = [*_HEADER2, *_RIGID]
+_TWIST = [*_axes("linear"), *_axes("angular")]
+_POINT = [*_HEADER2, *_axes("point")]
+_POSE = [*_HEADER2, *_axes("pose.position"), *_axes("pose.orientation", "xyzw")]
+_MANY = re.compile(r"field\.(\w*?)0\.header\.seq")
+
+
+def message1(cells: Sequence[str], header: Sequence[str]) -> dict[str, Any]:
+    """Return the message of one row under a header of `rostopic echo -p`.
+
+    Raises Misfit with the column.
+    """
+    if len(header) > 1 and (many := _MANY.fullmatch(header[1])):
+        return {many[1]: _entries(cells[1:], TRANSFORM1)}
+    if len(cells) != len(header):
+        raise Misfit(f"expected {len(header)} cells, found {len(cells)}")
+    return _nested([name.removeprefix("field.") for name in header[1:]], cells[1:])
+
+
+def message2(cells: Sequence[str]) -> dict[str, Any]:
+    """Return the message of one row of `ros2 topic echo --csv`.
+
+    Raises Misfit for a row that none of the known messages gives.
+    """
+    if len(cells) == 6:
+        return _nested(_TWIST if _is_number(cells[2]) else _POINT, cells)
+    if len(cells) == 10:
+        return _nested(_POSE, cells)
+    return {"transforms": _entries(cells, TRANSFORM2)}
+
+
+def _entries(cells: Sequence[str], names: Sequence[str]) -> list[dict[str, Any]]:
+    """Take the transforms of one row apart."""
+    size = len(names)
+    if not cells or len(cells) % size:
+        raise Misfit(
+            f"expected {size} cells for each transform, found {len(cells)} (nothing is quoted: a comma in a name?)"
+        )
+    return [_nested(names, cells[at : at + size]) for at in range(0, len(cells), size)]
+
+
+def _nested(names: Sequence[str], cells: Sequence[str]) -> dict[str, Any]:
+    """Put cells where their dotted names say; a stamp in nanoseconds becomes secs and nsecs."""
+    message: dict[str, Any] = {}
+    for name, cell in zip(names, cells, strict=True):
+        *outer, last = name.split(".")
+        inner = message
+        for step in outer:
+            inner = inner.setdefault(step, {})
+        inner[last] = _stamp1(cell) if last == "stamp" else cell
+    return message
+
+
+def _stamp1(cell: str) -> dict[str, str]:
+    """Split integer nanoseconds."""
+    if not (cell.isascii() and cell.isdigit()):
+        raise Misfit(f"stamp must be whole nanoseconds, found {shown(cell)}")
+    seconds, nanoseconds = divmod(int(cell), BILLION)
+    return {"secs": str(seconds), "nsecs": str(nanoseconds)}
+
+
+def _is_number(cell: str) -> bool:
+    return not cell.strip("-+.0123456789eE")
+
+
+# what the tools or the shell print between messages; the note about lost messages is the one that ends a document
+NOISE = re.compile(
+    r"""(?x) \ufeff? (?:
+      A\ message\ was\ lost!!! | \ttotal\ count\ change:\ ?\d+ | \ttotal\ count:\ ?\d+(?:---)?
+    | WARNING:\ .* | Is\ /clock\ being\ published\?
+    | \[\ ?(?:DEBUG|INFO|WARN|ERROR|FATAL)\ ?\].*
+    | \d{4}-\d\d-\d\d\ [\d:.]+\ \[[A-Z_]+\ \w+\].* | selected\ interface\ .*\ multicast.*
+    | \$\ .* | \[exit\ \d+\] | \^C.* )""",
+).fullmatch
+
 
 _SEPARATOR = re.compile(r"^.*---[ \t]*$\n?", re.MULTILINE)
 _ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^\ufeff])", re.MULTILINE)  # no key that ROS prints begins so
@@ -142,9 +246,148 @@ def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Messa
             header = cells
             continue
         try:
-            value = topic_csv.message1(cells, header) if form == "csv1" else topic_csv.message2(cells)
+            value = message1(cells, header) if form == "csv1" else message2(cells)
         except Misfit as misfit:
             yield FormatError(str(misfit), source=name, line=number)
             continue
         received = int(cells[0]) if form == "csv1" and cells[0].isdecimal() else None
         yield Message(value, Source(name, line), number, cells=True, received_ns=received)
+
+
+_HEADER = re.compile(r"\bheader\b")
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the transforms of every message, in the order they were recorded."""
+    if file.form == "echo":
+        for piece in documents(file.stream, file.name):
+            yield from _echo(piece, file.name, options)
+    elif file.form == "jsonl":
+        for piece in lines(file.stream, file.name):
+            yield from _json_lines(piece, file.name, options)
+    else:
+        for message in read_messages(file.stream, file.name, file.form, options.tally):
+            yield from _message_edges(message, options)
+
+
+def _echo(piece: Piece, name: str, options: Options) -> Iterator[Edge]:
+    """Read plain documents fast and the others in full."""
+    blocks = Blocks(piece.text, piece.line, options.tally, normalize=options.normalize)
+    while True:
+        if not options.raw:
+            yield from blocks.edges()
+        if blocks.at >= len(piece.text):
+            return
+        text = piece.text[blocks.at : end_of_document(piece.text, blocks.at)]
+        for message in document_messages(Piece(text, blocks.line), name, options.tally):
+            yield from _message_edges(message, options)
+        blocks.at += len(text)
+        blocks.line += text.count("\n")
+
+
+def _json_lines(piece: Piece, name: str, options: Options) -> Iterator[Edge]:
+    """Read plain lines fast and the others in full."""
+    at, text = 0, piece.text
+    plains = not options.raw and not options.topics.chosen
+    for line in count(piece.line):
+        if at >= len(text):
+            return
+        if plains and (plain := plain_line(text, at, line, options.tally, normalize=options.normalize)):
+            topic, edges, at = plain
+            for edge in edges:
+                if not topic:
+                    yield edge
+                elif options.topics.takes(topic):
+                    yield _on_topic(edge, topic, name, options)
+        else:
+            end = text.find("\n", at) + 1 or len(text) + 1
+            for message in line_messages(text[at : end - 1], line, name, options.tally):
+                yield from _message_edges(message, options)
+            at = end
+
+
+def _message_edges(message: Message | FormatError, options: Options) -> Iterator[Edge]:
+    """Yield the edges of one message; what is wrong with one of them does not touch the others."""
+    if isinstance(message, FormatError):
+        options.report(message)
+        return
+    try:
+        found = list(_transforms(message.value, (), options))
+    except Misfit as misfit:
+        options.report(message.error(misfit))
+        return
+    numbers = _header_lines(message, len(found))
+    topic = messages.topic_of(message.value)
+    for (transform, path), line in zip(found, numbers, strict=True):
+        if topic and not options.topics.takes(topic):
+            continue
+        reading = Reading(message.source, normalize=options.normalize)
+        try:
+            parent, child, components, stamp_ns = _read(transform, reading, options, line, topic)
+        except Misfit as misfit:
+            options.report(message.error(misfit.below(*path)))
+            continue
+        edge = Edge(parent, child, components, stamp_ns, line, message.received_ns)
+        yield _on_topic(edge, topic, message.source.name, options) if topic else edge
+
+
+def _on_topic(edge: Edge, topic: str, name: str, options: Options) -> Edge:
+    """Keep the topic that an edge came by: what comes by tf_static has no stamp; one frame by two topics is a fault."""
+    if problem := options.topics.conflict(topic, edge.child):
+        options.report(FormatError(problem, source=name, line=edge.line, column=1, rule="two-topics"))
+    return edge._replace(topic=topic, stamp_ns=None if topic.endswith("tf_static") else edge.stamp_ns)
+
+
+def _read(
+    transform: dict[str, Any], reading: Reading, options: Options, line: int, topic: str
+) -> tuple[str, str, Rigid, int | None]:
+    """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
+    if options.raw and "header" in transform:
+        from frametool.ros.tf2_input import read_transform
+
+        return read_transform(transform)
+    if is_pose(transform):
+        found = read_pose(transform, reading, body_of(topic, options.answers))
+    else:
+        found = messages.read_transform(transform, reading)
+    parent, child, position, rotation, stamp_ns = found
+    for note in reading.notes:
+        options.tally.note(note, line)
+    return parent, child, (*position, *rotation), stamp_ns
+
+
+def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict[str, Any], Path]]:
+    """Yield every transform of a message, or of a list of messages; count messages that hold none.
+
+    A pose counts where its topic was chosen, or where topics are not named.
+    """
+    if type(value) is list:
+        for index, item in enumerate(value):
+            yield from _transforms(item, (*path, index), options)
+        return
+    tally = options.tally
+    mapping = as_mapping(value, "a message with transforms")
+    enveloped = messages.is_envelope(mapping)
+    inner = mapping["msg"] if enveloped else mapping
+    topic = messages.topic_of(mapping)
+    options.topics.seen.add(topic)
+    if is_pose(inner) and (not enveloped or options.topics.chooses(topic)):
+        yield inner, (*path, "msg") if enveloped else path
+    elif not is_pose(inner) and messages.is_message(inner):
+        yield from messages.messages(mapping, path)
+    elif "op" in mapping:
+        topic = str(mapping.get("topic") or f"op {mapping['op']}")
+        tally.others[topic] = tally.others.get(topic, 0) + 1
+    else:
+        keys = ", ".join(map(shown, list(mapping)[:8]))
+        raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
+
+
+def _header_lines(message: Message, count: int) -> list[int]:
+    """Return the lines on which the transforms of a message begin."""
+    if message.source.text.count("\n") > 1:
+        text = message.source.text
+        offsets = [match.start() for match in _HEADER.finditer(text)]
+        if len(offsets) == count:
+            return [message.line + text.count("\n", 0, offset) for offset in offsets]
+    return [message.line] * count

@@ -4,6 +4,13 @@
 
 Quaternions x, y, z, w; metres; header.frame_id is the parent: parent_from_child. Stamps become int nanoseconds.
 Also read: the envelope of rosbridge, and Foxglove's FrameTransform.
+
+Messages that are poses of a body over time: PoseStamped, PoseWithCovarianceStamped, Odometry.
+
+    {header: {stamp: .., frame_id: map}, pose: {position: {x, y, z}, orientation: {x, y, z, w}}}        PoseStamped
+    {header: {..}, child_frame_id: base, pose: {pose: {..}, covariance: [..]}, twist: {..}}             Odometry
+
+The pose of the body in header.frame_id: Odometry names the body, the others do not. Metres, quaternion x, y, z, w.
 """
 
 from __future__ import annotations
@@ -12,13 +19,14 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import shown
 from frametool.grammar.readers import Misfit, as_mapping, within
-from frametool.grammar.rotation import read_rotation
+from frametool.grammar.rotation_spelling import read_rotation
 from frametool.ros import foxglove
 from frametool.ros.message_parts import PARTS, frame_of, header_stamp, only, part, read_rigid, whole_list
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from frametool.grammar.edges import Answers
     from frametool.grammar.readers import Path, Quaternion, Reading, Vector
 
 LISTS = ("transforms", "static_transforms")
@@ -95,3 +103,37 @@ def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) ->
     apart = degrees(quaternion.distance(*rotation, *angles, floats))
     if apart > STALE_DEGREES:
         reading.note(f"{STALE} differs from the quaternion by {apart:.3g} degrees; the quaternion is used", *path)
+
+
+HAS = "a message with a pose has header, pose"
+TYPES = frozenset(
+    f"{package}/msg/{name}"
+    for package, name in (
+        ("geometry_msgs", "PoseStamped"), ("geometry_msgs", "PoseWithCovarianceStamped"), ("nav_msgs", "Odometry"),
+    )
+)  # fmt: skip
+
+
+def is_pose(value: Any) -> bool:
+    """Tell whether a message has a header and a pose."""
+    return type(value) is dict and "header" in value and type(value.get("pose")) is dict
+
+
+def body_of(topic: str, answers: Answers) -> str:
+    """Name a body that its messages do not name: as --frames does, else by its topic."""
+    return answers.frames[-1] if answers.frames else topic.strip("/") or "body"
+
+
+def read_pose(
+    message: dict[str, Any], reading: Reading, body: str
+) -> tuple[str, str, Vector, Quaternion, int | None]:
+    """Read one message as (parent, child, position, rotation, stamp_ns); `body` is the child where it names none."""
+    header = part(message, "header", HAS)
+    pose = part(message, "pose", HAS)
+    path: Path = ("pose",)
+    if "pose" in pose:
+        pose, path = within(path, part, pose, "pose", "with a covariance beside it"), ("pose", "pose")
+    position, rotation = within(path, read_rigid, pose, ("position", "orientation"), reading)
+    parent = frame_of(header, "frame_id", ("header",), reading)
+    child = frame_of(message, "child_frame_id", (), reading) if message.get("child_frame_id") else body
+    return parent, child, position, rotation, header_stamp(header)

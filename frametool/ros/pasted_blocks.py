@@ -18,13 +18,11 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.json_reader import looks_like_json, parse_json
-from frametool.documents.json_writer import Verbatim, dump
+from frametool.documents.json import Verbatim, dump, looks_like_json, parse_json
 from frametool.documents.source import Pasted, Source
 from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.frames.stamps import parse_stamp
-from frametool.grammar.pasted import pasted_poses
-from frametool.grammar.pasted_rows import DECIMAL, NUMBER
+from frametool.grammar.pasted import DECIMAL, NUMBER, pasted_poses
 from frametool.grammar.readers import Reading
 from frametool.ros.publisher import CALL, read_call
 

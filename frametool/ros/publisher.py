@@ -21,12 +21,12 @@ from frametool.grammar.edges import Edge
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, Reading, read_number
 from frametool.grammar.result import rotation_numbers
-from frametool.grammar.rotation import ROTATION_KEYS, rotation_of
+from frametool.grammar.rotation_spelling import ROTATION_KEYS, rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.documents.input_file import InputFile
+    from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Result, Style

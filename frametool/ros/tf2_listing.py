@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.frames.report import cache_entries
+from frametool.frames.edge_log import cache_entries
 
 if TYPE_CHECKING:
+    from frametool.frames.edge_log import CacheEntry
     from frametool.frames.lookups import Frames
-    from frametool.frames.report import CacheEntry
     from frametool.grammar.result import Style
 
 

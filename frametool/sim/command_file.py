@@ -20,7 +20,7 @@ from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.readers import Misfit, read_numbers, within
-from frametool.ros.noise import NOISE
+from frametool.ros.message_stream import NOISE
 from frametool.sim.field_readers import known_keys, read_number, read_stamp
 from frametool.sim.leaders import KEYS
 from frametool.sim.turtle import Twist

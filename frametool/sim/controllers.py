@@ -1,4 +1,7 @@
-"""The follower's law: from where the target is, seen by the turtle, to a velocity command."""
+"""The follower's law: from where the target is, seen by the turtle, to a velocity command.
+
+What a follower looks at: the leader itself, or a carrot frame that hangs on it.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import math
 
 from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION
+from frametool.geometry.transform import Transform
 from frametool.sim.turtle import Twist
 
 # law -> rate in Hz, linear gain in 1/s, angular gain in 1/s: turtle_tf2_listener of each ROS
@@ -78,3 +82,31 @@ def _checked(name: str, value: float, least: float = -math.inf, most: float = ma
         bounds = f"{least:g} or more" if most == math.inf else f"{least:g} .. {most:g} Hz"
         raise ValueInvalid(f"{name} must be {bounds}, found {value:g}")
     return float(value)
+
+
+TARGETS = ("leader", "carrot", "moving-carrot")
+CARROT_NS = BILLION // 10  # between two broadcasts of a carrot
+CARROT_ASIDE = 2.0  # metres
+CARROT_CIRCLE = 10.0  # metres
+
+
+def frame_of(turtle: str, target: str) -> str:
+    """Name the frame that is looked up: the turtle, or its carrot (turtle1's is carrot1)."""
+    if target == "leader":
+        return turtle
+    return f"carrot{turtle[6:]}" if turtle[:6] == "turtle" and turtle[6:].isdigit() else f"{turtle}_carrot"
+
+
+def offset(target: str, now_ns: int) -> tuple[float, float]:
+    """Return where a target stands in its leader's frame, in metres."""
+    if target == "leader":
+        return 0.0, 0.0
+    if target == "carrot":
+        return 0.0, CARROT_ASIDE
+    angle = now_ns / BILLION * math.pi
+    return CARROT_CIRCLE * math.sin(angle), CARROT_CIRCLE * math.cos(angle)
+
+
+def planar(x: float, y: float, theta: float) -> Transform:
+    """Return a pose in the plane as a transform."""
+    return Transform.of(x, y, 0.0, 0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0))

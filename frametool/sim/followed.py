@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING
 
-from frametool.calc.explain.follow import FollowStep, PlanarSample, Sighting
 from frametool.errors import ValueInvalid
+from frametool.explain.follow import FollowStep, PlanarSample, Sighting
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.sim.controllers import ARRIVED
+from frametool.sim.controllers import ARRIVED, frame_of
 from frametool.sim.simulate import CACHE_NS, simulate
-from frametool.sim.targets import frame_of
 
 if TYPE_CHECKING:
     from frametool.sim.scene import Follow, Scene

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION, FURTHEST_NS
-from frametool.sim.controllers import FollowController
+from frametool.sim.controllers import TARGETS, FollowController
 from frametool.sim.leaders import built_in
-from frametool.sim.targets import TARGETS
 from frametool.sim.turtle import CENTRE, TICK_NS
 
 if TYPE_CHECKING:

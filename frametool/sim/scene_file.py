@@ -19,13 +19,11 @@ from frametool.errors import alternatives, shown
 from frametool.grammar.readers import Misfit, as_mapping, kind, within
 from frametool.sim import field_readers as fields
 from frametool.sim.command_file import read_entries, read_script
-from frametool.sim.controllers import LAWS, FollowController
+from frametool.sim.controllers import LAWS, TARGETS, FollowController
 from frametool.sim.field_readers import field, guarded, known_keys, one_of
 from frametool.sim.leaders import LEADERS, built_in, scripted
 from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall
-from frametool.sim.targets import TARGETS
-from frametool.sim.turtle import CENTRE
-from frametool.sim.world import SERVICES, VARIANTS, complete
+from frametool.sim.turtle import CENTRE, SERVICES, VARIANTS, complete
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -2,6 +2,8 @@
 
 At equal times: tick, then carrots, service calls, leaders, controllers. Commands and calls act at the first tick
 strictly later. Poses enter the buffer as float32, the stamp is the tick's time, nothing is late on its way.
+
+What a run comes to: how near each follower is, how soon it was there, how often a wall was hit.
 """
 
 from __future__ import annotations
@@ -11,14 +13,13 @@ from heapq import heapify, heappop, heapreplace
 from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import LookupFailed, ValueInvalid
+from frametool.errors import LookupFailed, ValueInvalid, printable
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
+from frametool.sim.controllers import CARROT_NS, frame_of, offset, planar
 from frametool.sim.leaders import EndOfRun, Heading
 from frametool.sim.scene import Follow
-from frametool.sim.targets import CARROT_NS, frame_of, offset, planar
-from frametool.sim.turtle import TICK_NS, TurtlePose, TurtleState
-from frametool.sim.world import ServiceRefused, World
+from frametool.sim.turtle import TICK_NS, ServiceRefused, TurtlePose, TurtleState, World
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,8 +27,7 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
     from frametool.sim.leaders import Leader
     from frametool.sim.scene import Scene, ServiceCall
-    from frametool.sim.turtle import Pen, Twist
-    from frametool.sim.world import WallHit
+    from frametool.sim.turtle import Pen, Twist, WallHit
 
     Process = Iterator[int]  # yields the nanoseconds at which it is to be resumed; ends when it has nothing more to do
 
@@ -269,3 +269,67 @@ class FollowerNode:
             return buffer.lookup(self.turtle, self.frame).components[:2]
         past_ns = now_ns - self.follow.delay_ns
         return buffer.lookup_across(self.turtle, None, self.frame, past_ns, WORLD).components[:2]
+
+
+class RunSummary:
+    """Watch the steps of a scene and sum them up; memory does not grow.
+
+    reach: metres within which a follower counts as having come to its target.
+    """
+
+    def __init__(self, scene: Scene, reach: float = 0.5) -> None:
+        """Create the summary of a run that has not begun."""
+        self.reach = reach
+        self.t_ns: int | None = None  # of the last step
+        self.walls: dict[str, int] = {}
+        self.distances: dict[str, float] = {}
+        self.reached_ns: dict[str, int] = {}
+        self.gone: dict[str, tuple[str, int]] = {}  # follower -> who of the two left the world, and when
+        self._follows = scene.followers
+
+    def watch(self, step: SimulationStep) -> None:
+        """Count a step in."""
+        self.t_ns = step.t_ns
+        for hit in step.walls:
+            self.walls[hit.turtle] = self.walls.get(hit.turtle, 0) + 1
+        for name, follow in self._follows.items():
+            if name in step.states and follow.leader in step.states:
+                distance = step.states[name].distance(goal(step.states[follow.leader], follow, step.t_ns))
+                self.distances[name] = distance
+                if distance <= self.reach:
+                    self.reached_ns.setdefault(name, step.t_ns)
+            elif step.is_tick and name in self.distances:
+                del self.distances[name]
+                self.gone[name] = (follow.leader if name in step.states else name, step.t_ns)
+
+    def lines(self) -> Iterator[str]:
+        """Yield the summary: one line a follower, then the walls; names as a terminal may show them."""
+        if self.t_ns is None:
+            yield "ended before the first step"
+            return
+        yield from (printable(self._line(name, follow)) for name, follow in self._follows.items())
+        hits = ", ".join(f"{printable(name)} {count}" for name, count in sorted(self.walls.items()))
+        yield f"{_seconds(self.t_ns)} simulated; wall hits: {sum(self.walls.values())}" + (f" ({hits})" if hits else "")
+
+    def _line(self, name: str, follow: Follow) -> str:
+        target = follow.leader if follow.target == "leader" else f"the {follow.target} of {follow.leader}"
+        if name not in self.distances and name not in self.gone:
+            return f"{name}: never in the world together with {follow.leader}"
+        reached = self.reached_ns.get(name)
+        near = f"within {self.reach:g} m"
+        soon = f"never {near}" if reached is None else f"{near} after {_seconds(reached)}"
+        if name in self.distances:
+            return f"{name}: final distance to {target} {self.distances[name]:.4f} m; {soon}"
+        who, when_ns = self.gone[name]
+        return f"{name}: no final distance, {who} left the world at {_seconds(when_ns)}; {soon}"
+
+
+def goal(leader: TurtleState, follow: Follow, now_ns: int) -> TurtleState:
+    """Return where a follower's target is, in the world."""
+    x, y = offset(follow.target, now_ns)
+    cosine, sine = math.cos(leader.theta), math.sin(leader.theta)
+    return TurtleState(leader.x + cosine * x - sine * y, leader.y + sine * x + cosine * y, leader.theta)
+
+
+def _seconds(t_ns: int) -> str:
+    return f"{t_ns / BILLION:.3f}".rstrip("0").rstrip(".") + " s"

@@ -12,10 +12,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.json_writer import dump
+from frametool.documents.json import dump
 from frametool.documents.yaml_writer import flow
 from frametool.errors import ValueInvalid, printable
-from frametool.formats.csv_format import row, write_points
+from frametool.formats.rows.csv import row, write_points
 from frametool.frames.stamps import BILLION
 from frametool.ros.echo_format import message_text
 

@@ -11,35 +11,32 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.documents.input_file import InputFile
+from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, warn
-from frametool.formats import FORMATS
-from frametool.formats.pose_rows import HALF_TURN, IMAGE, NUMBER
-from frametool.formats.trajectory import StampFile, blocks, describe
+from frametool.formats.rows.pose_rows import HALF_TURN, IMAGE, NUMBER
+from frametool.formats.rows.trajectory import StampFile, blocks, describe
+from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
-from frametool.stream.blocks import Plan, Run, State
 from frametool.stream.column_stream import ColumnRows, move_along
-from frametool.stream.column_writer import ArrayWriter
+from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused
-from frametool.stream.point_writer import PointWriter
-from frametool.stream.pose_values import chosen_poses, kept, spans_of
-from frametool.stream.pose_writer import PoseWriter
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
+from frametool.stream.row_poses import RowPoses, TablePoses, chosen_poses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, RowNote, notes_of
-from frametool.stream.table_names import rename_of
-from frametool.stream.table_poses import RowPoses, TablePoses
+from frametool.stream.table import rename_of
 from frametool.stream.table_samples import FORMS, TABLE
 from frametool.stream.table_stream import DELIMITERS, begin_table, moves_in_time, settle_stamps
+from frametool.stream.writers import ArrayWriter, PointWriter, PoseWriter
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
     from io import BufferedReader
 
-    from frametool.formats.trajectory import PoseBlock, Poses
+    from frametool.formats.rows.trajectory import PoseBlock, Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
     from frametool.stream.request import Request

@@ -1,40 +1,45 @@
-"""Files of columns of numbers as streams: planned as tables are, evaluated in the same blocks, no text in between."""
+"""Files of columns of numbers as streams: planned as tables are, evaluated in the same blocks, no text in between.
+
+Clouds of messages as files of columns: each moved by one pose, and written as a file of its own.
+"""
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, warn
-from frametool.formats.column_file import FLOATS, Made, MovesAlong, OutColumn
-from frametool.formats.structured import not_finite
-from frametool.stream.blocks import Run, State
+from frametool.formats.rows.column_file import FLOATS, Made, MovesAlong, OutColumn
+from frametool.formats.rows.pcd import NORMALS, PcdWriter, viewpoint_words
+from frametool.formats.rows.structured import StructuredBatch, is_number, not_finite, rows_of_batch
+from frametool.formats.table import FORMATS
+from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused
 from frametool.stream.header import XYZ
-from frametool.stream.output_columns import NAME, PARENT, Kept, New, quoted
-from frametool.stream.pose_values import spans_of, texts_of
+from frametool.stream.layout import NAME, PARENT, Kept, New, quoted
+from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
+from frametool.stream.row_poses import RowPoses, spans_of, texts_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, RowNote, notes_of
 from frametool.stream.stamp_source import in_nanoseconds
-from frametool.stream.table import Table
-from frametool.stream.table_names import Naming, rename_of
+from frametool.stream.table import Naming, Table, rename_of, stamp_column
 from frametool.stream.table_plan import plan_table
-from frametool.stream.table_poses import RowPoses
 from frametool.stream.table_stream import moves_in_time, settle_stamps
-from frametool.stream.trajectory_columns import stamp_column
 from frametool.text.cells import Cells
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Mapping, Sequence
 
-    from frametool.formats.column_file import Batch, ColumnFile, ColumnWriter, Kind
+    from frametool.formats.rows.column_file import Batch, ColumnFile, ColumnWriter, Kind
+    from frametool.geometry.types import Rigid
     from frametool.grammar.result import Style
-    from frametool.stream.request import Request
-    from frametool.stream.table_names import BlockNames
-    from frametool.text.array_types import Flags, Floats, Ints
+    from frametool.ros.point_clouds import PointCloud
+    from frametool.stream.table import BlockNames
+    from frametool.text.spans import Flags, Floats, Ints
 
 NOTHING = np.zeros((0, 0), np.int64)
 DOUBLE = np.dtype(np.float64)
@@ -467,3 +472,59 @@ def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults)
         elif not isinstance(given, Kept):
             made.append(Made(results.names.get(given.role, ())))
     return made
+
+
+class MessageColumns:
+    """The points of a message as a file of columns."""
+
+    vectors = NORMALS
+    gaps = True
+
+    def __init__(self, cloud: PointCloud) -> None:
+        """Take the cloud."""
+        self.cloud = cloud
+        self.names: tuple[str, ...] | None = cloud.names
+        self.width = len(cloud.names)
+
+    def kind(self, place: int) -> Kind | None:
+        """Return the type of a column's numbers."""
+        kind = self.cloud.rows.dtype[place]
+        return kind if is_number(kind) else None
+
+    def batches(self) -> Iterator[StructuredBatch]:
+        """Yield the points."""
+        rows, fields = self.cloud.rows, self.cloud.rows.dtype.names or ()
+        step = rows_of_batch(rows.dtype.itemsize)
+        for first in range(0, len(rows), step):
+            yield StructuredBatch(rows[first : first + step], fields)
+
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
+        """Refuse: messages are written in other forms."""
+        raise NotImplementedError
+
+
+class _GridOfForm:
+    """A form in which the grid of a cloud is kept, and the pose of its sensor, where it has room for them."""
+
+    def __init__(self, form: str, cloud: PointCloud, pose: Rigid) -> None:
+        """Take the cloud and the pose that moves it."""
+        self.module: Any = import_module(FORMATS[form].writer)
+        self.cloud = cloud
+        self.pose = pose
+        self.HOLDS_TEXTS = getattr(self.module, "HOLDS_TEXTS", False)
+
+    def create(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
+        """Return what writes the points."""
+        del count
+        writer: ColumnWriter = self.module.create(columns, len(self.cloud.rows), style)
+        if isinstance(writer, PcdWriter):
+            writer.words |= {"WIDTH": str(self.cloud.width), "HEIGHT": str(self.cloud.height)}
+            writer.words["VIEWPOINT"] = viewpoint_words(self.pose)
+        return writer
+
+
+def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> Iterator[Outcome]:
+    """Yield what a cloud becomes when a pose moves it, in the form of a style."""
+    request = Request(Operation(left=pose, moves=True))
+    into = _GridOfForm(style.form, cloud, pose)
+    yield from run_columns(MessageColumns(cloud), request, style, source=source, into=into)

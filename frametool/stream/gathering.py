@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components
     from frametool.grammar.pose import Pose
     from frametool.stream.row_layout import Shape
-    from frametool.text.array_types import Flags, Floats
+    from frametool.text.spans import Flags, Floats
 
 
 class Gathered:

@@ -15,7 +15,7 @@ from frametool.geometry.representations import NAMED, REPRESENTATIONS
 from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, Shape
-from frametool.text.units import ANGLES, BRACKETS, LENGTHS
+from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -1,28 +1,40 @@
-"""Forward kinematics over rows: values of joints in columns or under keys, a pose beside them."""
+"""Forward kinematics over rows: values of joints in columns or under keys, a pose beside them.
+
+Forward kinematics over the CSV of the echo tools, where each row is a JointState that names its joints.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
+from frametool.documents.source import Source
 from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
-from frametool.formats import FORMATS
-from frametool.formats.joint_columns import find_joint_columns
-from frametool.formats.joints import TURNING, JointValue
+from frametool.formats.robots.joints import TURNING, JointValue
+from frametool.formats.robots.posture import find_joint_columns
+from frametool.formats.table import FORMATS
+from frametool.geometry import floats
+from frametool.grammar.edges import Tally
+from frametool.grammar.pose import Pose
 from frametool.grammar.readers import Misfit
+from frametool.grammar.result import Result
 from frametool.ros import joint_state, messages
-from frametool.stream.faults import Misused
+from frametool.ros.message_stream import Message, line_texts, read_messages
+from frametool.stream.faults import Fault, Misused
 from frametool.stream.record_stream import without_noise
 from frametool.stream.row_layout import POSE
 from frametool.stream.splitter import Splitter
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
+    from typing import BinaryIO
 
-    from frametool.formats.joints import Joint
-    from frametool.formats.posture import Posture
-    from frametool.formats.robot import Robot
+    from frametool.formats.robots.joints import Joint
+    from frametool.formats.robots.posture import Posture
+    from frametool.formats.robots.robot import Robot
     from frametool.geometry.types import Components, Namespace, Number
+    from frametool.stream.faults import BadRows
 
 SLACK = 1e-9  # by which a value may lie beyond a limit
 
@@ -187,3 +199,48 @@ def _flat_keys(value: dict[str, Any], prefix: str = "") -> dict[str, None]:
         else:
             found[prefix + key] = None
     return found
+
+
+def joint_poses(stream: BinaryIO, rows: JointRows, bad: BadRows, *, numbered: bool) -> Iterator[Result]:
+    """Yield the pose for each row with its stamp; rows without one go to `bad`.
+
+    numbered: they are those of `rostopic echo -p`, under its header; else those of `ros2 topic echo --csv`
+    """
+    count = 0
+    for message in _messages(stream, bad.source, numbered=numbered):
+        count += 1
+        try:
+            if isinstance(message, FormatError):
+                raise message
+            state = _state(message.value, numbered=numbered)
+            yield Result(Pose.of(_pose(state, rows), rows.tip, rows.base), _stamp(state))
+        except (FormatError, ValueInvalid) as error:
+            line = error.line if isinstance(error, FormatError) else getattr(message, "line", 0)
+            reason = error.message if isinstance(error, FormatError) else str(error)
+            bad.take([Fault(line, "", reason)])
+    bad.finish(count)
+
+
+def _messages(stream: BinaryIO, name: str, *, numbered: bool) -> Iterator[Message | FormatError]:
+    if numbered:
+        return read_messages(stream, name, "csv1", Tally())
+    return (Message(text, Source(name, text), line, cells=True) for line, text in line_texts(stream, name, Tally()))
+
+
+def _state(value: Any, *, numbered: bool) -> dict[str, Any]:
+    if numbered:
+        return joint_state.of_numbered(value)
+    return joint_state.of_row(joint_state.unquoted(value))
+
+
+def _stamp(state: dict[str, Any]) -> dict[str, Any]:
+    stamp_ns = joint_state.stamp_of_state(state)
+    return {} if stamp_ns is None else {"stamp_ns": stamp_ns}
+
+
+def _pose(state: dict[str, Any], rows: JointRows) -> Any:
+    """Return the pose for one message."""
+    found = {joint: parse_number(text) for joint, text, _ in joint_state.positions(state)}
+    if missing := [joint for joint in rows.columns if joint not in found]:
+        raise Misfit(f"no position of {listing(missing)} in it")
+    return rows.result("", (), [found[joint] for joint in rows.columns], None, floats)

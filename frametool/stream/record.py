@@ -16,7 +16,7 @@ from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position, unknown_keys
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
-from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
+from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
 from frametool.ros.message_parts import read_stamp, whole_list
 from frametool.stream.row_layout import COVARIANCE, POINT, POSE, TWIST, VECTOR, WRENCH, Shape
 from frametool.stream.stamp_source import key_path
@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from frametool.errors import FormatError
     from frametool.grammar.readers import Path
     from frametool.stream.header import Columns, PoseColumns
-    from frametool.stream.operation import Formula
-    from frametool.stream.request import Request
+    from frametool.stream.request import Formula, Request
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "msg", "message")

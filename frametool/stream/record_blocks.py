@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.stream.blocks import Plan, Run, State
+from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault
 from frametool.stream.record_stream import attempt, null_of
 from frametool.stream.rows import Block, texts_as_rows, written
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part, Splitter
     from frametool.stream.template import Template
-    from frametool.text.array_types import Bytes, Ints
+    from frametool.text.spans import Bytes, Ints
 
     Places: TypeAlias = Sequence[tuple[int, int]]
 

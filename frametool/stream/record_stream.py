@@ -7,14 +7,13 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, FrametoolError
-from frametool.ros.noise import NOISE
+from frametool.ros.message_stream import NOISE
 from frametool.stream.faults import SKIP, STOP, Fault
 from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.scalar import result_of
 from frametool.stream.splitter import ARRAY, Splitter
 from frametool.stream.template import learn, nulled
-from frametool.text.lines import BLOCK_BYTES, read_blocks
-from frametool.text.ranges import blocks_behind, extent_in_file
+from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part
     from frametool.stream.template import Template
-    from frametool.text.lines import ByteStream
-    from frametool.text.ranges import ByteRange
+    from frametool.text.lines import ByteRange, ByteStream
 
 FEW = 16  # records at the end of which a stream that is already complete needs no numpy
 SMALL = 1 << 14  # bytes

@@ -10,20 +10,18 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import parse_documents
-from frametool.documents.json_reader import JSON_NUMBER
-from frametool.documents.json_writer import Verbatim
+from frametool.documents.json import JSON_NUMBER, Verbatim
 from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
-from frametool.formats import is_trajectory
-from frametool.formats.tree_reader import tell
+from frametool.formats.table import is_trajectory
+from frametool.formats.trees.tree_reader import tell
 from frametool.frames.stamps import BILLION, parse_stamp
 from frametool.geometry import floats
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, Reading
 from frametool.grammar.result import Result
-from frametool.stream.memory import Memory
 from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, placed, value_at
-from frametool.stream.request import Request
+from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import COVARIANCE, POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
 from frametool.stream.stamp_source import in_nanoseconds, key_path, read_header_stamp, read_stamp, stamp_keys
@@ -31,8 +29,7 @@ from frametool.stream.stamp_source import in_nanoseconds, key_path, read_header_
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.documents.document import Document
-    from frametool.documents.nodes import Node
+    from frametool.documents.document import Document, Node
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
@@ -109,7 +106,7 @@ def results(source: Source, request: Request, style: Style, memory: Memory | Non
     memory: of the records before this text.
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
-    from frametool.documents.nodes import NOTHING, parse_nodes
+    from frametool.documents.document import NOTHING, parse_nodes
 
     nodes: list[Node] = []
     found = False

@@ -1,19 +1,209 @@
-"""What is asked of a stream, whatever its format: the operation, how rows are read, how results are written."""
+"""What is asked of a stream, whatever its format: the operation, how rows are read, how results are written.
+
+What is done to each row: one object an operation, the same for floats and for arrays.
+
+What a row is compared with when that comes from the rows before: one record at a time, with plain floats.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from frametool.errors import ValueInvalid
+from frametool.frames.stamps import BILLION, format_stamp
+from frametool.geometry import quaternion, rigid, rotvec, spatial
+from frametool.geometry.trig import RADIAN
+from frametool.grammar.pose import VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.operation import Operation
+from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from frametool.geometry.representations import Notation
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.gathering import Gathered
+    from frametool.stream.row_layout import Shape
     from frametool.stream.stamp_source import Timed
+
+RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
+START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
+
+
+def _turn(_x: Number, _y: Number, _z: Number, *numbers: Number) -> Components:
+    return quaternion.rotate(*numbers)
+
+
+MOVERS: dict[str, Callable[..., Components]] = {
+    POINT: rigid.apply,
+    VECTOR: _turn,
+    TWIST: spatial.move_twist,
+    WRENCH: spatial.move_wrench,
+}  # a pose is composed: `Operation.pose`
+
+
+class Formula(Protocol):
+    """An expression over rows: what it reads of each, what kind of thing it makes of it, and its numbers.
+
+    The kind of a row is that of its shape, "" where it holds neither point nor pose.
+    """
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name the columns, or keys, whose numbers it reads."""
+
+    @property
+    def reads_row(self) -> bool:
+        """Tell whether it reads the row's own point or pose."""
+
+    @property
+    def needs_time(self) -> bool:
+        """Tell whether it reads the row's own time."""
+
+    @property
+    def adds(self) -> bool:
+        """Tell whether rows stay as they are and results stand beside them."""
+
+    def kind(self, row: str) -> str:
+        """Return whether a row becomes a pose, a point or a vector; "" for numbers alone, which are `extras`."""
+
+    def extras(self, row: str) -> tuple[str, ...]:
+        """Name the numbers that come beside a pose or point."""
+
+    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
+        """Return the frames of the result of a row with these; raise FrametoolError where they do not fit."""
+
+    def result(
+        self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
+    ) -> Components:
+        """Return the components of the result and then the extras; of floats raises FrametoolError where none are."""
+
+
+class Operation(NamedTuple):
+    """What is done to each row: turned around if asked for, then multiplied with fixed poses, then compared.
+
+    left, right: applied as left @ row @ right[0] @ right[1] ..
+    inverse: the row itself is inverted first
+    of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
+        "pair" the two poses of a row, "previous" the row before and this one, "start" the first row and this one
+    velocity: of "previous" also the twist that leads from one row to the next in the time between them
+    fixed: the pose that "first" and "second" need
+    moves: the row is moved rather than composed: points and vectors are allowed
+    turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
+    mirrors: the row is seen in a mirror across y, before all that stands on its left
+    before: each pose is multiplied with this one from the right before anything else: the axes of a camera
+    formula: an expression, instead of all this
+    """
+
+    left: Rigid | None = None
+    right: tuple[Rigid, ...] = ()
+    inverse: bool = False
+    of: str = ""
+    fixed: Rigid | None = None
+    moves: bool = False
+    turns: bool = False
+    mirrors: bool = False
+    velocity: bool = False
+    before: Rigid | None = None
+    formula: Formula | None = None
+
+    def extras(self, kind: str) -> tuple[str, ...]:
+        """Name the numbers that come beside the result of a row of some kind."""
+        if self.formula is not None:
+            return self.formula.extras(kind)
+        return RELATIVE_EXTRAS + VELOCITY * self.velocity if self.of and kind == POSE else ()
+
+    def result_kind(self, kind: str) -> str:
+        """Return what a row of some kind becomes; "" for numbers alone."""
+        return kind if self.formula is None else self.formula.kind(kind)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name the columns whose numbers are read beside those of points and poses."""
+        return () if self.formula is None else self.formula.columns
+
+    @property
+    def only_adds(self) -> bool:
+        """Tell whether rows stay as they are and results stand beside them."""
+        return self.formula is not None and self.formula.adds
+
+    @property
+    def looks_back(self) -> bool:
+        """Tell whether a row's result depends on the rows before it."""
+        return self.of in (START, PREVIOUS)
+
+    @property
+    def changes_nothing(self) -> bool:
+        """Tell whether rows only change their notation."""
+        return self._is_bare and not self.inverse
+
+    @property
+    def keeps_position(self) -> bool:
+        """Tell whether positions stay as they are written."""
+        return self.changes_nothing or (self.turns and self.left is None and not self.mirrors)
+
+    @property
+    def only_inverts(self) -> bool:
+        """Tell whether rows are turned around and nothing else."""
+        return self._is_bare and self.inverse
+
+    @property
+    def _is_bare(self) -> bool:
+        return not (self.left or self.right or self.of or self.moves or self.mirrors or self.before)
+
+    def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
+        """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
+        mover = edge or self.left
+        if mover is None:
+            return numbers
+        own = shape.own_size
+        moved: Components = MOVERS[shape.kind](*mover, *numbers[:own])
+        return (*moved, *self.covariance(shape, numbers[own:], mover))
+
+    def covariance(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
+        """Move the covariance of a pose or a twist by `edge`, else by `left`; nothing where there is none."""
+        mover = edge or self.left
+        if not shape.covariance or mover is None:
+            return numbers
+        if shape.kind == POSE:
+            return tuple(spatial.rotate_covariance(*mover[3:], numbers))
+        return tuple(spatial.move_twist_covariance(*mover, numbers))
+
+    def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
+        """Return the resulting pose, and what else is known about it."""
+        if self.before is not None:
+            poses = [rigid.compose(*pose, *self.before) for pose in poses]
+        result: Rigid = rigid.inverse(*poses[0]) if self.inverse else poses[0]
+        if self.mirrors:
+            result = rigid.mirrored(*result)
+        left = edge or self.left
+        if left is not None:
+            result = rigid.compose(*left, *result)
+        for right in self.right:
+            result = rigid.compose(*result, *right)
+        return self._relative([result, *poses[1:]], xp) if self.of else result
+
+    def _relative(self, poses: Sequence[Rigid], xp: Namespace) -> Components:
+        first, second = self._pair(poses)
+        result = rigid.relative(*first, *second)
+        metres, angle = rigid.extent(*result, xp)
+        return *result, metres, angle, angle * RADIAN
+
+    @staticmethod
+    def with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Components:
+        """Add the body twist that makes this step in so many seconds, seen in the first of the two frames.
+
+        Linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt: position and rotation on their own.
+        """
+        turned = rotvec.from_quaternion(parts[3], parts[4], parts[5], parts[6], xp)
+        return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
+
+    def _pair(self, poses: Sequence[Rigid]) -> tuple[Rigid, Rigid]:
+        if self.of == "first" and self.fixed is not None:
+            return self.fixed, poses[0]
+        if self.of == "second" and self.fixed is not None:
+            return poses[0], self.fixed
+        return poses[0], poses[1]
 
 
 class Request(NamedTuple):
@@ -84,3 +274,36 @@ class Request(NamedTuple):
     def in_degrees(self, form: Notation) -> bool:
         """Tell whether a notation's angles are degrees: its own word wins."""
         return self.degrees if form.degrees is None else form.degrees
+
+
+class Memory:
+    """The pose before, or the first of all, and its stamp."""
+
+    __slots__ = ("pose", "stamp_ns")
+
+    def __init__(self) -> None:
+        """Begin before the first row."""
+        self.pose: Rigid | None = None
+        self.stamp_ns: int | None = None
+
+    def pair(self, of: str, pose: Rigid) -> list[Rigid]:
+        """Return what a pose is compared with, and the pose; the very first one's is itself."""
+        before = self.pose or pose
+        if of == PREVIOUS or self.pose is None:
+            self.pose = pose
+        return [before, pose]
+
+    def step(self, stamp_ns: int) -> float | None:
+        """Return the seconds since the row before, None for the first; raises ValueInvalid if time stands still."""
+        before, self.stamp_ns = self.stamp_ns, stamp_ns
+        if before is None:
+            return None
+        if stamp_ns <= before:
+            raise ValueInvalid(no_step(before, stamp_ns))
+        return (stamp_ns - before) / BILLION
+
+
+def no_step(before: int, stamp_ns: int) -> str:
+    """Say why there is no velocity between two stamps."""
+    what = "is that of the row before" if stamp_ns == before else f"is before {format_stamp(before)}, of the row before"
+    return f"stamp {format_stamp(stamp_ns)} {what}: there is no velocity"

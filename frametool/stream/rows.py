@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.stream.text_parts import Const, IfLocked, In, Instead, Out
-from frametool.text.fixed import fixed_spans
-from frametool.text.shortest import shortest_spans
 from frametool.text.spans import MARGIN, Spans, framed, join
+from frametool.text.write import fixed_spans, shortest_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from frametool.errors import FrametoolError
     from frametool.stream.text_parts import Piece
-    from frametool.text.array_types import Floats, Ints
+    from frametool.text.spans import Floats, Ints
 
 
 class Broken(NamedTuple):

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import shown, warn
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
-from frametool.text.ranges import ByteRange, content
+from frametool.text.lines import ByteRange, content
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.stream.blocks import Run
+    from frametool.stream.evaluate import Run
     from frametool.stream.faults import BadRows, Fault
     from frametool.stream.rows import Block
 

@@ -15,10 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Components, Quaternion, Rigid
-    from frametool.stream.memory import Memory
-    from frametool.stream.operation import Formula
     from frametool.stream.record import Record
-    from frametool.stream.request import Request
+    from frametool.stream.request import Formula, Memory, Request
     from frametool.stream.row_layout import Shape
     from frametool.stream.template import Template
 

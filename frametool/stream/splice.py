@@ -12,7 +12,7 @@ from frametool.documents.yaml_writer import quoted
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
-from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
+from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import PARENT_KEYS, POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, Target
 from frametool.stream.text_parts import Const, IfLocked, Out
@@ -20,7 +20,7 @@ from frametool.stream.text_parts import Const, IfLocked, Out
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.documents.nodes import Node
+    from frametool.documents.document import Node
     from frametool.stream.record import Name, Record
     from frametool.stream.request import Request
     from frametool.stream.text_parts import Piece
@@ -266,7 +266,7 @@ class Splicer:
             return "'" + name.replace("'", "''") + "'"
         if node.quote != '"' or not node.value:
             return self._text(name) if name or self.json else "''"
-        from frametool.documents.json_writer import dump
+        from frametool.documents.json import dump
 
         return dump(name)
 
@@ -291,7 +291,7 @@ class Splicer:
             return MARK
 
         if self.json:
-            from frametool.documents.json_writer import dump
+            from frametool.documents.json import dump
 
             return dump(value, number) if value is not True else "true"
         if type(value) is str:

@@ -1,4 +1,9 @@
-"""Stamps in bulk: decimal seconds or nanoseconds as text to integer nanoseconds, never through a float."""
+"""Stamps in bulk: decimal seconds or nanoseconds as text to integer nanoseconds, never through a float.
+
+What stands in the rows of a block beside their poses: the stamps of velocities, the weights of a mean.
+
+The poses that move the rows of a block: by the frame each row is given in, and at the time it says.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +11,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frametool.errors import ValueInvalid
+from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION
-from frametool.stream.stamp_source import read_header_stamp, read_stamp
+from frametool.stream.request import no_step
+from frametool.stream.row_layout import IDENTITY
+from frametool.stream.stamp_source import in_nanoseconds, read_header_stamp, read_stamp
 from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
-from frametool.text.parse import LOWEST, trimmed
+from frametool.text.numbers import parse_number
+from frametool.text.parse import LOWEST, parse_floats, trimmed
 from frametool.text.spans import windows
 
 if TYPE_CHECKING:
-    from frametool.text.array_types import Bytes, Flags, Ints, Words
-    from frametool.text.spans import Spans
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.types import Rigid
+    from frametool.stream.rows import Block
+    from frametool.stream.stamp_source import Timed
+    from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words
+
+    Blame = Callable[[int, str, str | FrametoolError], None]
 
 _WORDS = 3
 _LONGEST = 8 * _WORDS
@@ -100,3 +114,136 @@ def _fraction(data: Bytes, starts: Ints, length: Ints) -> tuple[Ints, Flags]:
     rest = read_eight_digits(second)
     nanoseconds = read_eight_digits(first) * np.uint64(10) + rest // _BELOW_NS
     return nanoseconds.view(np.int64), sure & (rest % _BELOW_NS == 0) & (length <= 16)
+
+
+def stamps_of(block: Block, name: str, blame: Blame) -> Ints:
+    """Return the stamps of rows in nanoseconds; a row without one is bad."""
+    count = len(block.places)
+    if not count:
+        return np.zeros(0, np.int64)
+    if block.times is not None:
+        return block.times
+    if not block.stamps or not block.stamps[0]:
+        raise ValueInvalid("rows have no stamps; there is no velocity")
+    spans = block.stamps[0]
+    if len(spans) == 2:
+        stamps, reasons = parse_header_stamps(*spans)
+    else:
+        stamps, reasons = parse_stamps(*spans, in_ns=in_nanoseconds(name))
+    for row, reason in reasons.items():
+        blame(row, name, reason)
+    return stamps
+
+
+def seconds_before(stamps: Ints, good: Sequence[int], before_ns: int | None, name: str, blame: Blame) -> Floats:
+    """Return the seconds since the good row before each row; a row at which time stands still or turns back is bad.
+
+    before_ns: the stamp of the last good row of the block before; None for the first block, whose first row gets 1.
+    """
+    seconds = np.ones(len(stamps))
+    rows = np.array(good, np.int64)
+    if not len(rows):
+        return seconds
+    at = stamps[rows]
+    before = np.concatenate([[at[0] - BILLION if before_ns is None else before_ns], at[:-1]])
+    steps = at - before
+    for index in np.flatnonzero(steps <= 0).tolist():
+        blame(good[index], name, no_step(int(before[index]), int(at[index])))
+    seconds[rows] = np.where(steps > 0, steps, BILLION) / BILLION
+    return seconds
+
+
+def weights_of(block: Block, name: str, blame: Blame) -> Floats:
+    """Return the weights of rows; a row with none, or a negative one, is bad."""
+    if not len(block.places):
+        return np.zeros(0)
+    weights = _parsed(block.stamps[0][0], name, blame) if block.weights is None else block.weights
+    for row in np.flatnonzero(weights < 0.0).tolist():
+        blame(row, name, f"weight {weights[row]:g} is negative")
+    return weights
+
+
+def _parsed(cells: Spans, name: str, blame: Blame) -> Floats:
+    """Read cells as numbers; a row with another cell is bad."""
+    numbers, bad = parse_floats(cells)
+    for row in bad.tolist():
+        try:
+            numbers[row] = parse_number(cells.text(row).decode("utf-8", "replace").strip(" \t\"'"))
+        except ValueInvalid as error:
+            blame(row, name, str(error))
+    return numbers
+
+
+NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
+
+
+def by_frame(edge_of: Callable[..., Rigid], frames: Sequence[str | None], blame: Blame, column: str = "") -> Rigid:
+    """Return the pose of each row by its frame's name; a row whose frame has none is bad."""
+    table: list[Rigid] = []
+    known: dict[str | None, tuple[int, FrametoolError | None]] = {}
+    for row, name in enumerate(frames):
+        if name not in known:
+            edge, error = _edge(edge_of, name)
+            known[name] = len(table), error
+            table.append(edge)
+        if problem := known[name][1]:
+            blame(row, column, problem)
+    chosen_rows = np.array([known[name][0] for name in frames], np.int64)
+    return tuple(np.array(column)[chosen_rows] for column in zip(*table, strict=True))  # type: ignore[return-value]
+
+
+def _edge(edge_of: Callable[..., Rigid], name: str | None) -> tuple[Rigid, FrametoolError | None]:
+    """Return the edge of a frame, or why there is none."""
+    try:
+        return edge_of(name), None
+    except FrametoolError as error:
+        return NOWHERE, error
+
+
+def by_time(
+    timed: Timed, stamps: tuple[Spans, ...] | Ints, frames: Sequence[str | None], blame: Blame, column: str = ""
+) -> Rigid:
+    """Return the pose of each row at its stamp; a row without a stamp or without data then is bad.
+
+    stamps: one for each row, or its seconds and nanoseconds; or the nanoseconds themselves
+    frames: one a row, or one for all (None: the one SOURCE); column: the one that names them
+    """
+    if isinstance(stamps, np.ndarray):
+        times, reasons = stamps, dict[int, str]()
+    else:
+        times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=timed.in_ns)
+    for row, reason in reasons.items():
+        blame(row, timed.column, reason)
+    poses = np.full((7, len(times)), np.nan)
+    for frame, rows in _by_frame(frames, np.delete(np.arange(len(times)), list(reasons))):
+        _fill(poses, timed, frame, rows, times, blame, column)
+    return tuple(poses)  # type: ignore[return-value]
+
+
+def _by_frame(frames: Sequence[str | None], rows: Ints) -> list[tuple[str | None, Ints]]:
+    """Part rows by their frames."""
+    if len(set(frames)) == 1:
+        return [(frames[0], rows)]
+    numbers = {frame: number for number, frame in enumerate(dict.fromkeys(frames))}
+    of_row = np.fromiter((numbers[frame] for frame in frames), np.int64, len(frames))[rows]
+    return [(frame, rows[of_row == number]) for frame, number in numbers.items()]
+
+
+def _fill(poses: Floats, timed: Timed, frame: str | None, rows: Ints, times: Ints, blame: Blame, column: str) -> None:
+    """Look the rows of one frame up at once, then ask singly why some have no data."""
+    try:
+        poses[:, rows] = timed.many(frame, times[rows])
+    except FrametoolError as error:
+        for row in rows.tolist():
+            blame(row, column, error)
+    else:
+        for row in rows[np.isnan(poses[6, rows])].tolist():
+            blame(row, timed.column, _reason(timed, frame, int(times[row])))
+
+
+def _reason(timed: Timed, frame: str | None, stamp_ns: int) -> str | FrametoolError:
+    try:
+        timed.one(frame, stamp_ns)
+    except FrametoolError as error:
+        return error
+    return "no data"

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 from frametool.errors import FormatError, alternatives, shown
 from frametool.geometry.representations import REPRESENTATIONS
 from frametool.geometry.representations import notation as parse_notation
-from frametool.stream.blocks import Plan
+from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
 from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape
-from frametool.stream.output_columns import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
+from frametool.stream.layout import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
 from frametool.stream.row_layout import POSE, Shape, Target
-from frametool.stream.table_names import rename_of
+from frametool.stream.table import rename_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frametool.geometry.representations import Notation
     from frametool.stream.header import Columns
-    from frametool.stream.output_columns import Column, Layout
+    from frametool.stream.layout import Column, Layout
     from frametool.stream.request import Request
     from frametool.stream.table import Table
 

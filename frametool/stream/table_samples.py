@@ -12,23 +12,23 @@ from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import not_text
 from frametool.errors import FormatError
-from frametool.formats.pose_rows import with_axes_turned
-from frametool.formats.trajectory import Poses, StampFile, describe
+from frametool.formats.rows.pose_rows import with_axes_turned
+from frametool.formats.rows.trajectory import Poses, StampFile, describe
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
 from frametool.stream.faults import BadRow
 from frametool.stream.request import Request
-from frametool.stream.table_poses import TablePoses
+from frametool.stream.row_poses import TablePoses
 from frametool.stream.table_stream import begin_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.documents.input_file import InputFile
+    from frametool.documents.source import InputFile
     from frametool.geometry.types import Components
     from frametool.grammar.edges import Options
-    from frametool.stream.table_poses import RowPoses
+    from frametool.stream.row_poses import RowPoses
     from frametool.text.lines import ByteStream
 
 FORMS = {

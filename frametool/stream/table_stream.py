@@ -8,28 +8,34 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, FrametoolError, listing
-from frametool.stream.blocks import Run, State
+from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault, Misused
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, RowNote, mapped, notes_of
-from frametool.stream.table import BYTE_ORDER_MARK, COMMENT, UNCLOSED, open_table, table_block
-from frametool.stream.table_names import Naming
+from frametool.stream.table import (
+    BYTE_ORDER_MARK,
+    COMMENT,
+    STAMPS,
+    UNCLOSED,
+    Naming,
+    as_trajectory,
+    has_header,
+    open_table,
+    table_block,
+)
 from frametool.stream.table_plan import plan_table
-from frametool.stream.trajectory_columns import STAMPS, as_trajectory, has_header
 from frametool.text.cells import RecordEnds, torn_record
-from frametool.text.lines import BLOCK_BYTES, read_blocks, whole_lines
-from frametool.text.ranges import blocks_behind, extent_in_file
+from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks, whole_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
 
-    from frametool.stream.blocks import Plan
-    from frametool.stream.output_columns import Layout
+    from frametool.stream.evaluate import Plan
+    from frametool.stream.layout import Layout
     from frametool.stream.request import Request
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
-    from frametool.text.lines import ByteStream
-    from frametool.text.ranges import ByteRange
+    from frametool.text.lines import ByteRange, ByteStream
 
 
 DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b"", "kitti": b"", "euroc": b","}

@@ -11,14 +11,13 @@ from functools import cached_property
 from itertools import accumulate, islice
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.document import Document, parse_documents
-from frametool.documents.json_reader import JSON_NUMBER, strict_json
-from frametool.documents.nodes import Node, parse_nodes
+from frametool.documents.document import Document, Node, parse_documents, parse_nodes
+from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
 from frametool.grammar.pose import POSE_KEYS
 from frametool.grammar.readers import Misfit, Reading, within
-from frametool.grammar.rotation import AXES_KEY, ROTATION_KEYS
+from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_records, lost_name, placed
 from frametool.stream.row_layout import COVARIANCE
 from frametool.stream.run import RowNote

@@ -22,8 +22,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, FrametoolWarning, heard_by, warn
-from frametool.text.lines import BLOCK_BYTES, BULK_BYTES
-from frametool.text.ranges import ByteRange
+from frametool.text.lines import BLOCK_BYTES, BULK_BYTES, ByteRange
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator

@@ -15,7 +15,7 @@ import numpy as np
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
-    from frametool.text.array_types import Bytes, Flags, Ints
+    from frametool.text.spans import Bytes, Flags, Ints
 
 _NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
 _CLOSING_QUOTE = re.compile(rb'(?:[^"]++|"")*+"')

@@ -2,6 +2,8 @@
 
 A number is what YAML 1.2 and JSON call one (`1e-3`, `-.5`, `5.`, `010` is ten); what YAML 1.1 would add (base 60,
 octal, hexadecimal, underscores) is refused with the reason.  An angle may also say its unit or a multiple of pi.
+
+Units in the names of columns and behind numbers: `x_mm`, `yaw [deg]`, `2cm`.
 """
 
 from __future__ import annotations
@@ -10,13 +12,18 @@ import math
 import re
 
 from frametool.errors import ValueInvalid, shown
-from frametool.text.units import LENGTHS
 
 TYPE_CHECKING = False
+
 if TYPE_CHECKING:
     from typing import TypeAlias
 
     Angle: TypeAlias = tuple[float, str | None]  # value; "deg", "rad", or None where the text does not say
+
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0, "um": 1e6}  # how many make a metre
+ANGLES = {"deg": True, "degree": True, "degrees": True, "°": True, "rad": False, "radian": False, "radians": False}
+BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
+
 
 # float() reads more than a decimal number (blanks, underscores, nan, other scripts' digits), but nothing else of these
 _DECIMAL_CHARACTERS = "0123456789.-+eE"

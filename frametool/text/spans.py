@@ -2,18 +2,19 @@
 
 A span is a start and an end in `data`; columns of text are arrays of spans, so that text which only passes through is
 never decoded. Knows nothing of what the text means.
+
+Names for the kinds of arrays the text layer passes around, and how it walks long ones.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from frametool.text.array_types import Bytes, Ints
 
 # Around every span this many bytes of `data` may be read, whatever they hold: copies go by whole windows.
 MARGIN = 64
@@ -109,3 +110,10 @@ def _keep_heap() -> None:
 
 
 _keep_heap()
+
+
+Bytes: TypeAlias = NDArray[np.uint8]
+Floats: TypeAlias = NDArray[np.float64]
+Ints: TypeAlias = NDArray[np.int64]
+Words: TypeAlias = NDArray[np.uint64]
+Flags: TypeAlias = NDArray[np.bool_]

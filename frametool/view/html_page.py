@@ -2,6 +2,10 @@
 
 Its script and style stand as plain files in the folder `page`, one after another in the order of SCRIPTS; the page
 lets nothing else run.  Poses go in as doubles, stamps as doubles of nanoseconds since the first.
+
+What the page needs to move the joints of a robot: where each stands, between which limits, and which it follows.
+
+A run of turtles as the page of `view`: their frames over time, as their followers saw them in tf.
 """
 
 from __future__ import annotations
@@ -16,12 +20,17 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from frametool import __version__
+from frametool.formats.robots.joints import JointValue
+from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from frametool.formats.robots.joints import Value
+    from frametool.formats.robots.robot import Robot
     from frametool.frames.track import MovingTrack
+    from frametool.sim.simulate import SimulationStep
     from frametool.view.frame_scene import FrameScene
 
 FOLDER = os.path.join(os.path.dirname(__file__), "page")
@@ -128,3 +137,47 @@ def _data(scene: FrameScene) -> tuple[dict[str, Any], array[float]]:
 def _parents(track: MovingTrack, index: dict[str, int]) -> int | list[int]:
     """Return the parent of all samples, or that of each where it changes."""
     return [index[parent] for _, parent, _ in track.walk()] if track.varies else index[track.parent]
+
+
+def joint_sliders(robot: Robot, values: Mapping[str, Value], names: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the joints that turn or slide and stand still, as the page has them.
+
+    values: of the joints, by name.  names: of the frames of the page, in its order.
+    """
+    index = {name: number for number, name in enumerate(names)}
+    links = {child: link for child, link in robot.links.items() if link.joint and child in index}
+    found: list[dict[str, Any]] = []
+    for child, link in links.items():
+        joint = link.joint
+        value = values.get(joint.name) if joint else None
+        if joint and not joint.posed and isinstance(value, JointValue):
+            found.append({
+                "name": joint.name, "frame": index[child], "kind": joint.kind, "axis": joint.axis,
+                "origin": link.origin, "lower": joint.lower, "upper": joint.upper, "value": float(value.plain),
+            })  # fmt: skip
+    places = {str(each["name"]): number for number, each in enumerate(found)}
+    for name, each in zip(places, found, strict=True):
+        mimic = robot.joints[name].mimic
+        if mimic and mimic.joint in places:
+            each["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
+    return found
+
+
+class RunPage:
+    """Collect the transforms of a run, all of them, for a page."""
+
+    def __init__(self) -> None:
+        """Create the page of a run that has not begun."""
+        self.buffer = TransformBuffer(name="run")
+
+    def watch(self, step: SimulationStep) -> None:
+        """Add the transforms of a step."""
+        for stamp_ns, parent, child, transform in step.broadcasts:
+            self.buffer.insert(parent, child, transform, stamp_ns)
+
+    def content(self) -> str:
+        """Return the page, seen from above."""
+        from frametool.view.frame_scene import FrameScene
+        from frametool.view.projection import EYES
+
+        return write_page(FrameScene(self.buffer), title="turtles", file="tf.yaml", eye=EYES["top"])

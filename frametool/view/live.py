@@ -14,8 +14,8 @@ from rich.text import Text
 from frametool.errors import printable
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE
-from frametool.view.canvas import Canvas
-from frametool.view.drawing import colours_of
+from frametool.view.run_plot import colours_of
+from frametool.view.terminal import Canvas
 
 if TYPE_CHECKING:
     from types import TracebackType

@@ -1,16 +1,28 @@
-"""What `monitor` tells, for a person: a table of the edges, then a sentence about the chain."""
+"""What `monitor` tells, for a person: a table of the edges, then a sentence about the chain.
+
+What differs between two trees, for a person: what only one has, other parents, then tables of what moved.
+
+The forms of text for a person: a list of all, or all there is to say of one, within 80 columns.
+"""
 
 from __future__ import annotations
 
+import re
+from importlib import import_module
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
+from frametool.errors import printable
+from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS
 from frametool.frames.stamps import format_stamp
 from frametool.view.pose_text import in_width
+from frametool.view.tree_text import cells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.grammar.result import Style
+    from frametool.lint.tree_diff import Apart, Difference
 
 
 def _seconds(value: float | None) -> str:
@@ -62,3 +74,196 @@ def _chain(entry: dict[str, Any]) -> str:
     else:
         said = f"all edges have data from {format_stamp(first)} to {format_stamp(last)} ({(last - first) / 1e9:.3f} s)"
     return in_width(f"{entry['parents']}:", said)
+
+
+WIDTH = 80
+NUMBER = 11  # columns of each number
+LABEL = WIDTH - 4 * NUMBER
+
+
+def write_diff(found: Iterable[Difference]) -> str:
+    """Return differences in parts with a heading each."""
+    kinds: dict[str, list[Difference]] = {}
+    for each in found:
+        kinds.setdefault(each.kind, []).append(each)
+    moved = [*kinds.pop("moved", ()), *kinds.pop("same", ())]
+    parts = [_list(kind, found) for kind, found in kinds.items()]
+    starts = dict.fromkeys(each.seen_from for each in moved)
+    parts += (_table(start, [each for each in moved if each.seen_from == start]) for start in starts)
+    return "\n".join(parts)
+
+
+_HEADINGS = {"only-in-a": "only in A", "only-in-b": "only in B", "parent": "other parent", "motion": "stands or moves",
+             "no-data": "no data", "samples": "other samples"}  # fmt: skip
+
+
+def _list(kind: str, found: Iterable[Difference]) -> str:
+    """Return a heading and the lines of differences that are said in words."""
+    return f"{_HEADINGS[kind]}:\n" + "".join(f"{line}\n" for each in found for line in _said(each))
+
+
+def _said(each: Difference) -> Iterator[str]:
+    """Yield the lines about one frame."""
+    text = short(each.frame, WIDTH - 4)
+    if each.kind in ("only-in-a", "only-in-b"):
+        parent = each.parent_a if each.kind == "only-in-a" else each.parent_b
+        text += f" in {short(parent, WIDTH - 8)}" if parent is not None else ", a root"
+    elif each.kind == "parent":
+        in_a, in_b = ("none" if name is None else short(name, WIDTH // 2) for name in (each.parent_a, each.parent_b))
+        text += f": {in_a} in A, {in_b} in B"
+    elif each.own:
+        text += f" by up to {each.own}"
+    text += f": {each.note}" if each.note else ""
+    yield from _folded(text)
+    if each.kind == "parent" and each.seen:
+        yield f"    moved {each.seen}, seen from {short(str(each.seen_from), WIDTH // 2 - 10)}"
+
+
+def _folded(text: str) -> Iterator[str]:
+    """Yield the words of a text in lines, by the cells they take; all but the first line further in."""
+    line = " "
+    for word in (short(word, WIDTH - 4) for word in text.split(" ")):
+        if cells(line) + cells(word) >= WIDTH and line.strip():
+            yield line
+            line = "   "
+        line += f" {word}"
+    yield line
+
+
+def _table(start: str | None, found: Sequence[Difference]) -> str:
+    """Return the table of the frames that moved, as far as they are seen from one frame."""
+    seen = f"seen from {start}" if start is not None else "seen from elsewhere"
+    both = 2 * NUMBER
+    head = f"{'moved':<{LABEL}}{'in its parent':>{both}}{_padded(short(seen, both - 2), both)}\n"
+    units = f"{'':{LABEL}}" + 2 * f"{'mm':>{NUMBER}}{'deg':>{NUMBER}}" + "\n"
+    return head + units + "".join(map(_row, found))
+
+
+def _row(each: Difference) -> str:
+    """Return the line of one frame; two if its name is long."""
+    label = f"  {each.frame} in {each.parent_a}" if each.parent_a is not None else f"  {each.frame}"
+    numbers = "".join(f"{text:>{NUMBER}}" for text in (*_numbers(each.own), *_numbers(each.seen)))
+    label = short(label, WIDTH)
+    gap = LABEL - cells(label)
+    return f"{label}{' ' * gap}{numbers}\n" if gap > 0 else f"{label}\n{'':{LABEL}}{numbers}\n"
+
+
+def _numbers(apart: Apart | None) -> tuple[str, str]:
+    """Write how far two poses are apart in mm and degrees; what is rounding as 0."""
+    if apart is None:
+        return "-", "-"
+    metres = 0.0 if apart.metres <= apart.rounding else apart.millimetres
+    turn = 0.0 if apart.radians <= apart.turn_rounding else apart.degrees
+    return _number(metres, 3), _number(turn, 4)
+
+
+def _number(value: float, decimals: int) -> str:
+    """Write a number with some decimals, or with its power of ten where they would not show it."""
+    fits = value == 0.0 or 0.5 * 10.0**-decimals <= value < 1e6
+    return f"{value:.{decimals}f}" if fits else f"{value:.2e}"
+
+
+def _padded(text: str, width: int) -> str:
+    return " " * (width - cells(text)) + text
+
+
+def short(name: str, width: int) -> str:
+    """Return a name on one line within so many columns; of a longer one both ends."""
+    name = printable(name)
+    if cells(name) <= width:
+        return name
+    keep = width // 2 - 2 if name.isascii() else width // 4 - 1
+    return f"{name[:keep]}...{name[-keep:]}"
+
+
+LIST_WIDTH = 80
+LIST_LABEL = 15  # columns, the indent included
+CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH}
+
+
+def form_entry(name: str) -> dict[str, Any]:
+    """Return what the table says of a form, as plain values; None where it says nothing."""
+    row = FORMATS[name]
+    return {
+        "name": name,
+        "summary": row.summary,
+        "suffixes": row.suffixes,
+        "reads": row.reads,
+        "writes": row.writes,
+        "states": row.states or None,
+        "asks": tuple(map(option_of, row.asks)),
+        "instead": row.instead or None,
+    }
+
+
+def option_of(ask: str) -> str:
+    """Return how an option that answers a question is written: `--dh standard|modified`."""
+    choices = "|".join(CHOICES.get(ask, ()))
+    return f"--{ask.replace('_', '-')}{' ' * bool(choices)}{choices}"
+
+
+def write_forms(entries: Iterable[dict[str, Any]]) -> str:
+    """Return a list of forms: those that are read first, then those only written, then those only known."""
+    parts: dict[str, list[str]] = {}
+    for entry in entries:
+        kind = _READ if entry["reads"] else _WRITTEN if entry["writes"] else _KNOWN
+        said = [f"{entry['summary']}{_in_brackets(entry['suffixes'])}", _uses(entry), entry["states"]]
+        said += [f"asks for {option}" for option in entry["asks"]]
+        parts.setdefault(kind, []).append(_labelled(entry["name"], [*said, entry["instead"]]))
+    return "\n".join(f"{kind}:\n{''.join(parts[kind])}" for kind in (_READ, _WRITTEN, _KNOWN) if kind in parts)
+
+
+_READ, _WRITTEN, _KNOWN = "read", "only written", "known and not read; what to do"
+
+
+def write_form(entry: dict[str, Any]) -> str:
+    """Return all there is to say of one form, with an example if its module shows one."""
+    name = entry["name"]
+    said = {
+        "suffixes": " ".join(entry["suffixes"]),
+        "read as": ", ".join(entry["reads"]),
+        "written from": ", ".join(entry["writes"]),
+        "means": entry["states"],
+        "asks for": ", ".join(entry["asks"]),
+        "known by": ", ".join(_signs(name)),
+        "instead": entry["instead"],
+    }
+    lines = "".join(_labelled(label, [text]) for label, text in said.items() if text)
+    example = "".join(f"    {line}\n" for line in example_of(name))
+    return f"{name}: {entry['summary']}\n{lines}" + (f"  example\n{example}" if example else "")
+
+
+def example_of(name: str) -> list[str]:
+    """Return the lines that stand indented in the docstring of what reads a form, or else of what writes it."""
+    for module in filter(None, (FORMATS[name].reader, FORMATS[name].writer)):
+        text = import_module(module).__doc__ or ""
+        if lines := [line[4:] for line in text.split("\n") if line.startswith("    ")]:
+            return [line if len(line) <= LIST_WIDTH - 4 else f"{line[: LIST_WIDTH - 7].rstrip()} .." for line in lines]
+    return []
+
+
+def _in_brackets(words: Iterable[str]) -> str:
+    return f" ({' '.join(words)})" if words else ""
+
+
+def _uses(entry: dict[str, Any]) -> str:
+    """Say what is read from a form and what is written in it."""
+    uses = (("read as", entry["reads"]), ("written from", entry["writes"]))
+    return "; ".join(f"{label} {', '.join(what)}" for label, what in uses if what)
+
+
+def _labelled(label: str, texts: Iterable[str | None]) -> str:
+    """Return lines with a label before the first, folded."""
+    lines = [line for text in texts if text for line in wrap(text, LIST_WIDTH - LIST_LABEL, break_on_hyphens=False)]
+    first = f"  {label}"
+    if len(first) >= LIST_LABEL:
+        return "".join(f"{line}\n" for line in (first, *(" " * LIST_LABEL + line for line in lines)))
+    begins = [first, *[""] * len(lines)]
+    return "".join(f"{begin:{LIST_LABEL}}{line}\n" for begin, line in zip(begins, lines, strict=False))
+
+
+def _signs(name: str) -> Iterator[str]:
+    """Name the signs of a form; of a pattern only the kind, if it is more than words."""
+    for kind, what in FORMATS[name].signs:
+        words = what if isinstance(what, str) and re.fullmatch(r"[\w./*|-]+", what) else ""
+        yield f"{kind} {words}".rstrip()

@@ -1,22 +1,127 @@
-"""A run of turtles as a picture: turtlesim's window at its own scale, beside it distance and commands over time."""
+"""A run of turtles as a picture: turtlesim's window at its own scale, beside it distance and commands over time.
+
+What a plot shows of a run: the turtles' trails by pen, and each follower's distance and commands over time.
+
+A sweep of two gains as two maps of colours: time to reach, and overshoot; empty where it never was within reach.
+"""
 
 from __future__ import annotations
 
 import math
+from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
 from xml.sax.saxutils import escape
 
 from frametool.errors import printable
+from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE
-from frametool.view.drawing import COLOURS
-from frametool.view.shapes import Picture, PictureBox, PictureDot, PictureLine, PictureWords
+from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.sim.turtle import TurtleState
-    from frametool.view.drawing import Drawing
-    from frametool.view.shapes import Shape
+    from frametool.sim.scene import Scene
+    from frametool.sim.simulate import SimulationStep
+    from frametool.sim.sweep import SweepResult
+    from frametool.sim.turtle import Pen, TurtleState
+    from frametool.view.pictures import Shape
+
+    Point = tuple[float, float]
+
+# where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names
+COLOURS = ("#f4d35e", "#ee964b", "#7bdff2", "#b2f7ef", "#f7a1c4", "#c3f584", "#d0bdf4", "#ffffff")
+
+SHORT = 0.05  # metres, two pixels
+FLAT = 1e-6  # metres; small, because the points left out before are not looked at again
+
+
+class Stroke(NamedTuple):
+    """A line drawn with one pen: points in metres, y up."""
+
+    turtle: str
+    pen: Pen
+    points: list[Point]
+
+
+class Curves(NamedTuple):
+    """A follower over time: seconds, metres, m/s, rad/s, one of each a control step."""
+
+    times: list[float]
+    distance: list[float]
+    linear: list[float]
+    angular: list[float]
+
+
+def colours_of(turtles: Iterable[str]) -> dict[str, str]:
+    """Return a colour for each turtle, in the order of their names."""
+    return dict(zip(sorted(turtles), cycle(COLOURS), strict=False))
+
+
+class Drawing:
+    """Remember of the steps what a plot shows; turtles that do not move add nothing."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Create the drawing of a run that has not begun."""
+        self.strokes: list[Stroke] = []
+        self.turtles: dict[str, TurtleState] = {}
+        self.curves: dict[str, Curves] = {name: Curves([], [], [], []) for name in scene.followers}
+        self._current: dict[str, Stroke] = {}
+        self._clears = 0
+
+    def watch(self, step: SimulationStep) -> None:
+        """Add a step to the drawing."""
+        if step.is_tick:
+            self._wipe_if_cleared(step)
+            self.turtles = step.states
+            for name in step.states:
+                self._draw(name, step)
+        for command in step.commands:
+            curves = self.curves[command.turtle]
+            curves.times.append(step.t_ns / BILLION)
+            curves.distance.append(command.distance or 0.0)
+            curves.linear.append(command.twist.linear_x)
+            curves.angular.append(command.twist.angular_z)
+
+    def colours(self) -> dict[str, str]:
+        """Return the colour of every turtle: `#rrggbb`."""
+        return colours_of({*self.turtles, *self.curves})
+
+    def _wipe_if_cleared(self, step: SimulationStep) -> None:
+        if step.clears != self._clears:
+            self._clears = step.clears
+            self.strokes.clear()
+            self._current.clear()
+
+    def _draw(self, name: str, step: SimulationStep) -> None:
+        """Go on with a turtle's stroke, or begin one with its new pen."""
+        x, y, _ = step.states[name]
+        pen = step.pens[name]
+        stroke = self._current.get(name)
+        if stroke is None or stroke.pen != pen:
+            begin = [stroke.points[-1]] if stroke is not None else []
+            stroke = self._current[name] = Stroke(name, pen, begin)
+            if not pen.off:
+                self.strokes.append(stroke)
+        _extend(stroke.points, (x, y))
+
+
+def _extend(points: list[Point], place: Point) -> None:
+    """Go on to a place; a point on the straight way there is not kept."""
+    if len(points) > 1 and _is_straight(points[-2], points[-1], place):
+        points[-1] = place
+    elif not points or points[-1] != place:
+        points.append(place)
+
+
+def _is_straight(begin: Point, middle: Point, end: Point) -> bool:
+    """Tell whether the middle lies between both ends, and so near to the line through them that nobody sees it."""
+    ahead_x, ahead_y = middle[0] - begin[0], middle[1] - begin[1]
+    on_x, on_y = end[0] - middle[0], end[1] - middle[1]
+    if ahead_x * on_x + ahead_y * on_y <= 0.0:
+        return False
+    length = math.hypot(ahead_x + on_x, ahead_y + on_y)
+    return length < SHORT or abs(ahead_x * on_y - ahead_y * on_x) < FLAT * length
+
 
 WINDOW = 500.0  # pixels, as turtlesim's
 METRE = 45.0  # pixels
@@ -136,3 +241,80 @@ def _bounds(values: Iterable[float]) -> tuple[float, float]:
     """Return the least and the greatest value, zero included, as far as an axis reaches."""
     known = [0.0, *values]
     return max(min(known), -FURTHEST), min(max(known), FURTHEST)
+
+
+SIDE = 400.0  # pixels of a map
+MAP_MARGIN = 70.0
+BAR = 15.0
+SHADES = 50  # of the bar
+# viridis at five places, dark for little
+STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
+
+
+class GainMap(NamedTuple):
+    """One map: what it shows, its values in a row for each linear gain, nan where there is none, and the gains."""
+
+    title: str
+    values: Sequence[Sequence[float]]
+    linear: Sequence[float]
+    angular: Sequence[float]
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Return the least and the greatest value."""
+        known = [value for row in self.values for value in row if value == value]  # noqa: PLR0124 - nan
+        return (min(known), max(known)) if known else (0.0, 0.0)
+
+
+def sweep_picture(gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult) -> Picture:
+    """Draw both maps side by side."""
+    columns = {"time to reach (s)": result.time_to_reach, "overshoot (m)": result.overshoot}
+    maps = [GainMap(title, values.tolist(), gain_linear, gain_angular) for title, values in columns.items()]
+    side = SIDE + 2.0 * MAP_MARGIN
+    shapes = [shape for index, each in enumerate(maps) for shape in _map(each, MAP_MARGIN + index * side)]
+    return Picture(2.0 * side, side, shapes)
+
+
+def _map(each: GainMap, left: float) -> Iterator[Shape]:
+    """Draw one map: a rectangle for each pair, linear gains upwards, angular gains to the right."""
+    high, wide = SIDE / len(each.linear), SIDE / len(each.angular)
+    yield PictureWords(left, MAP_MARGIN - 16.0, each.title, size=14.0)
+    for row, (linear, values) in enumerate(zip(each.linear, each.values, strict=True)):
+        for column, (angular, value) in enumerate(zip(each.angular, values, strict=True)):
+            label = f"linear {linear:g}, angular {angular:g}: {value:.4g}"
+            x, y = left + column * wide, MAP_MARGIN + SIDE - (row + 1) * high
+            yield PictureBox(x, y, wide, high, _colour(value, each.bounds), label)
+    yield from _gains(each, left)
+    yield from _bar(left + SIDE + 10.0, each.bounds)
+
+
+def _gains(each: GainMap, left: float) -> Iterator[Shape]:
+    """Name the gains at the ends of both sides."""
+    below, bottom = MAP_MARGIN + SIDE + 14.0, MAP_MARGIN + SIDE
+    yield PictureWords(left, below, f"{each.angular[0]:g}")
+    yield PictureWords(left + SIDE / 2.0, below, "angular gain (1/s)", anchor="middle")
+    yield PictureWords(left + SIDE, below, f"{each.angular[-1]:g}", anchor="end")
+    yield PictureWords(left - 6.0, bottom - 6.0, f"{each.linear[0]:g}", anchor="end")
+    yield PictureWords(left - 14.0, MAP_MARGIN + SIDE / 2.0, "linear gain (1/s)", anchor="middle", turn=-90.0)
+    yield PictureWords(left - 6.0, MAP_MARGIN + 6.0, f"{each.linear[-1]:g}", anchor="end")
+
+
+def _bar(left: float, bounds: tuple[float, float]) -> Iterator[Shape]:
+    """Draw what the colours mean."""
+    low, high = bounds
+    for shade in range(SHADES):
+        y = MAP_MARGIN + SIDE * (SHADES - 1 - shade) / SHADES
+        yield PictureBox(left, y, BAR, SIDE / SHADES + 0.5, _colour(shade / (SHADES - 1), (0.0, 1.0)))
+    yield PictureWords(left, MAP_MARGIN - 8.0, f"{high:.3g}")
+    yield PictureWords(left, MAP_MARGIN + SIDE + 14.0, f"{low:.3g}")
+
+
+def _colour(value: float, bounds: tuple[float, float]) -> str:
+    """Return the colour of a value between its bounds; that of the paper for nan."""
+    if value != value:  # noqa: PLR0124 - nan
+        return "paper"
+    low, high = bounds
+    place = (value - low) / (high - low) * (len(STOPS) - 1) if high > low else 0.0
+    at = min(int(place), len(STOPS) - 2)
+    mixed = (round(a + (b - a) * (place - at)) for a, b in zip(STOPS[at], STOPS[at + 1], strict=True))
+    return f"#{''.join(f'{part:02x}' for part in mixed)}"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable
 from frametool.geometry.transform import Transform
-from frametool.grammar.edge_label import edge_label
+from frametool.grammar.result import edge_label
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -52,7 +52,7 @@ def _label(track: Track, style: Style) -> tuple[str, ...]:
     label = edge_label(Transform.of(*track.components), style)
     if track.standing:
         return label
-    from frametool.frames.report import motion
+    from frametool.frames.edge_log import motion
 
     return *label, motion(track)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.frames.buffer import TransformBuffer
-from frametool.frames.tree import FrameTree
+from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:

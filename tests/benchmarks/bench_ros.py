@@ -105,7 +105,7 @@ def load(path: str) -> int:
 
 def samples(path: str) -> int:
     """Read one record after the other and keep none."""
-    from frametool.formats.recordings import Recording
+    from frametool.formats.load import Recording
 
     return sum(1 for _ in Recording(path).edges())
 

@@ -14,15 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.text.cells import Cells, split_blank, split_delimited
-from frametool.text.fixed import fixed_spans
 from frametool.text.parse import parse_floats
-from frametool.text.shortest import shortest_spans
 from frametool.text.spans import Spans, join
+from frametool.text.write import fixed_spans, shortest_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frametool.text.array_types import Floats
+    from frametool.text.spans import Floats
 
 ROWS, COLUMNS, REPEATS = 8000, 3, 40
 FULL = np.random.default_rng(1).uniform(-100.0, 100.0, (ROWS, COLUMNS))

@@ -15,7 +15,7 @@ import pytest
 
 from frametool.calc.scope import Scope
 from frametool.calc.values import TREE, Term, Type
-from frametool.cli.calc_completion import Completer
+from frametool.cli.calc_input import Completer
 from frametool.formats.load import load
 
 if TYPE_CHECKING:

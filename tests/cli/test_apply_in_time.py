@@ -10,7 +10,7 @@ import pytest
 
 from frametool.documents.source import Source
 from frametool.formats.load import load_sources
-from frametool.frames.tree import FrameTree
+from frametool.frames.lookups import FrameTree
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 import frametool
-from frametool.formats import FORMATS, Format
+from frametool.formats.table import FORMATS, Format
 from frametool.grammar.edges import Answers
-from frametool.view.form_list import option_of
+from frametool.view.report_text import option_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,7 +82,7 @@ def test_an_example_stands_where_the_reader_or_the_writer_shows_one(run: Run, na
 
 
 def test_a_row_with_all_there_can_be_is_told(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    row = Format("a toy", (".toy",), ("tree",), "frametool.formats.tree_reader", states="toy<-child, feet",
+    row = Format("a toy", (".toy",), ("tree",), "frametool.formats.trees.tree_reader", states="toy<-child, feet",
                  asks=("direction", "frames"), signs=(("xml", "toy"), ("line", r"toy \d")))  # fmt: skip
     monkeypatch.setitem(FORMATS, "a-toy-with-a-long-name", row)
     told = words(run("formats", "a-toy-with-a-long-name").out)

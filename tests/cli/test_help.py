@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from frametool.cli import COMMANDS
-from frametool.cli.command import EXIT_CODES
 from frametool.cli.commands.help import topic, topics
+from frametool.cli.options import EXIT_CODES
 from frametool.geometry.conventions import AXES
 from frametool.geometry.representations import REPRESENTATIONS
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from frametool.cli.group import group
-from frametool.formats import FORMATS, Format, readers
+from frametool.formats.table import FORMATS, Format, readers
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,7 +11,7 @@ import click
 import pytest
 
 from frametool.cli import COMMANDS
-from frametool.cli.reuse import Reused
+from frametool.cli.group import Reused
 from frametool.geometry.representations import Notation
 
 if TYPE_CHECKING:

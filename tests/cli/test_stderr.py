@@ -23,9 +23,9 @@ PACKAGE = Path(frametool.__file__).parent
 TALKING = {"echo", "secho", "warn", "catch_warnings", "print"}  # as names of functions
 ALLOWED = {
     ("errors.py", "warn"), ("cli/stderr.py", "print"), ("view/tree_text.py", "print"),
-    ("view/png.py", "catch_warnings"),  # what a drawing library says of fonts
+    ("view/pictures.py", "catch_warnings"),  # what a drawing library says of fonts
     ("view/frame_scene.py", "catch_warnings"),  # what Python says of an expression
-    ("formats/launch_python.py", "catch_warnings"),  # what Python says of a file of somebody else's
+    ("formats/trees/launch_python.py", "catch_warnings"),  # what Python says of a file of somebody else's
 }  # fmt: skip
 MOVE = ["apply", "--transform", "{xyz: [1, 0, 0]}"]
 LINES = '{"xyz": [1, 2, 3]}\n{"xyz": [1, "?", 3]}\n{"xyz": [4, 5, 6]}\n'

@@ -6,8 +6,8 @@ import io
 
 import pytest
 
-from frametool.documents.input_file import InputFile
-from frametool.documents.xml_events import XmlFile
+from frametool.documents.source import InputFile
+from frametool.documents.xml import XmlFile
 from frametool.errors import FormatError
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from frametool.errors import BadAnswer, FormatError, Unanswered
-from frametool.formats.dh_table import Column, column_of
 from frametool.formats.load import load
+from frametool.formats.robots.dh import Column, column_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from frametool.errors import FormatError
-from frametool.formats import FORMATS, Format, by_suffix, readers, writers
 from frametool.formats.detect import by_sign, detect, of_folder
 from frametool.formats.load import load
+from frametool.formats.table import FORMATS, Format, by_suffix, readers, writers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,7 +49,7 @@ def with_toy(folder: Path, *arguments: str, stdin: str = "") -> tuple[int, str, 
     """Run the command line in a new interpreter in which the toy has its row."""
     (folder / "toy.py").write_text(TOY)
     code = (
-        f"import sys; sys.path[:0] = [{str(folder)!r}, {str(ROOT)!r}]; import frametool.formats as formats; "
+        f"import sys; sys.path[:0] = [{str(folder)!r}, {str(ROOT)!r}]; import frametool.formats.table as formats; "
         f"formats.FORMATS['toy'] = formats.Format(**{ROW!r}); from frametool.cli import run; "
         f"sys.exit(run({list(arguments)!r}))"
     )

@@ -9,9 +9,8 @@ import pytest
 
 import frametool
 from frametool.errors import BadAnswer, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
-from frametool.formats.joint_columns import find_joint_columns, stamp_column
-from frametool.formats.joints import Joint, JointValue, Mimic, motion, read_value
-from frametool.formats.posture import Posture
+from frametool.formats.robots.joints import Joint, JointValue, Mimic, motion, read_value
+from frametool.formats.robots.posture import Posture, find_joint_columns, stamp_column
 from frametool.grammar.edges import Answers, Options, Tally, Topics
 
 if TYPE_CHECKING:

@@ -350,4 +350,4 @@ def test_reading_a_launch_file_in_xml_loads_neither_numpy_nor_the_reader_of_pyth
     (tmp_path / "a.launch").write_text(f"<launch>{NODE.format(FLAGS)}</launch>")
     code = "import sys; from frametool.cli import run; run(['lookup', 'a.launch', 'base', 'cam']); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
-    assert not {"numpy", "rich", "yaml", "frametool.formats.launch_python"} & set(done.stdout.split())
+    assert not {"numpy", "rich", "yaml", "frametool.formats.trees.launch_python"} & set(done.stdout.split())

@@ -10,7 +10,7 @@ import pytest
 from clouds import RNG, SHIFT, cloud, move, moved, pcd, pcd_rows, turned, xyz
 
 from frametool.errors import ValueInvalid
-from frametool.formats.lzf import unpack
+from frametool.formats.rows.pcd import unpack
 
 if TYPE_CHECKING:
     from collections.abc import Callable

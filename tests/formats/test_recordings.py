@@ -11,7 +11,7 @@ import pytest
 
 from frametool.documents import chunks
 from frametool.errors import FileProblem, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
-from frametool.formats.recordings import Recording
+from frametool.formats.load import Recording
 from frametool.grammar.result import Style
 from frametool.ros.echo_format import message_text, stamp
 

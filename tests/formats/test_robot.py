@@ -14,7 +14,7 @@ import frametool
 from frametool.errors import FormatError, NotConnected, UnknownFrame, ValueInvalid
 
 if TYPE_CHECKING:
-    from frametool.formats.robot import Robot
+    from frametool.formats.robots.robot import Robot
 
 ARM = Path(__file__).resolve().parent.parent.parent / "examples" / "arm.urdf"
 

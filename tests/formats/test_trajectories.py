@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from frametool.formats import FORMATS, is_trajectory, writers
 from frametool.formats.load import load
+from frametool.formats.table import FORMATS, is_trajectory, writers
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,8 +11,8 @@ import pytest
 from robots import origin
 
 import frametool
-from frametool.formats.urdf_writer import write_tree
-from frametool.frames.tree import FrameTree
+from frametool.formats.robots.urdf import write_tree
+from frametool.frames.lookups import FrameTree
 from frametool.grammar.result import Style
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from frametool import FrameTree, Transform, TransformBuffer
 from frametool.errors import BadTopology, LookupFailed, NoDataAt, TooLate, UnknownFrame, ValueInvalid
 from frametool.frames import track as track_module
 from frametool.frames.path import compose_path
-from frametool.frames.sample_page import Page
-from frametool.frames.track import PAGE, MovingTrack
+from frametool.frames.track import PAGE, MovingTrack, Page
 
 if TYPE_CHECKING:
     from frametool.frames.lookups import Frames

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from frametool.geometry import arrays, floats, rigid
-from frametool.geometry.joint_motion import slid, turned
-from frametool.geometry.kinematic_chain import go_on, slide, turn
+from frametool.geometry.rigid import go_on, slid, slide, turn, turned
 
 AXES = [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.6, 0.0, 0.8), (2 / 3, -1 / 3, 2 / 3)]
 ANGLES = [0.0, -0.0, 0.3, -2.9, math.pi, 1e-9, 40.0, -1e7]

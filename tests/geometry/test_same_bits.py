@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import samples
 
-from frametool.geometry import arrays, euler, far_angles, floats, matrix, quaternion, rigid, segment, six_d, trig
+from frametool.geometry import arrays, euler, floats, matrix, quaternion, rigid, six_d, trig
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -145,7 +145,7 @@ KERNELS: dict[str, tuple[Callable[..., Any], Sequence[Row]]] = {
     "extent": (rigid.extent, POSES),
     "rigid distance": (rigid.distance, WAYS),
     "interpolate": (rigid.interpolate, joined(WAYS, MANY_FRACTIONS)),
-    "prepare": (segment.prepare, WAYS),
+    "prepare": (rigid.prepare, WAYS),
 }
 
 
@@ -171,17 +171,17 @@ def test_every_kernel_of_arithmetic_alone(name: str) -> None:
 
 
 def test_a_way_walked_at_many_fractions() -> None:
-    prepare: Callable[..., Any] = segment.prepare
+    prepare: Callable[..., Any] = rigid.prepare
     ways = [[*way[:7], *prepare(*way, floats)] for way in WAYS]
     within = [fraction for fraction in MANY_FRACTIONS if 0.0 <= fraction[0] <= 1.0]
-    assert_same(segment.along, joined(ways, within * 2))
+    assert_same(rigid.along, joined(ways, within * 2))
 
 
 def test_a_way_prepared_once_is_the_slerp_of_its_ends() -> None:
-    prepare: Callable[..., Any] = segment.prepare
+    prepare: Callable[..., Any] = rigid.prepare
     unit: Callable[..., Any] = quaternion.unit
     slerp: Callable[..., Any] = quaternion.slerp
-    along: Callable[..., Any] = segment.along
+    along: Callable[..., Any] = rigid.along
     for way, (fraction,) in zip(WAYS, MANY_FRACTIONS * 2, strict=False):
         if 0.0 < fraction < 1.0:
             pose: Any = (*way[:7], *prepare(*way, floats))
@@ -228,7 +228,7 @@ def test_angles_of_millions_of_turns_are_reduced_to_the_last_bit() -> None:
 
     with mp.workdps(400):
         for angle in (1e8, 1e15, -1e22, 2.0**1000, 1e308, 6381956970095103.0 * 2.0**797):
-            rest, odd = far_angles.reduced_exactly(angle)
+            rest, odd = trig.reduced_exactly(angle)
             turns = mp.nint(mpf(angle) / (mp.pi / 2))
             assert rest == float(mpf(angle) - turns * mp.pi / 2)
             assert odd == int(turns) % 2

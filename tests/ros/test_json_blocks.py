@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.formats.recordings import Recording
+from frametool.formats.load import Recording
 from frametool.grammar.edges import Tally
-from frametool.ros.json_blocks import plain_line
+from frametool.ros.plain_messages import plain_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,11 +9,10 @@ from rich.console import Console
 
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
-from frametool.view.canvas import Canvas
-from frametool.view.drawing import Drawing
 from frametool.view.live import Screen
-from frametool.view.run_plot import run_picture, ticks
-from frametool.view.svg import write_svg
+from frametool.view.pictures import write_svg
+from frametool.view.run_plot import Drawing, run_picture, ticks
+from frametool.view.terminal import Canvas
 
 
 @pytest.mark.parametrize(

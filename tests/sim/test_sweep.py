@@ -10,9 +10,8 @@ import pytest
 from frametool.errors import ValueInvalid
 from frametool.sim import sweep
 from frametool.sim.controllers import FollowController
-from frametool.sim.run_summary import RunSummary
 from frametool.sim.scene import tutorial
-from frametool.sim.simulate import simulate
+from frametool.sim.simulate import RunSummary, simulate
 from frametool.sim.sweep import grid, rows, simulate_many
 from frametool.sim.turtle import CENTRE
 

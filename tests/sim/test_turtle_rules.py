@@ -9,11 +9,20 @@ import pytest
 from frametool.errors import ValueInvalid
 from frametool.sim.controllers import LAWS, FollowController
 from frametool.sim.leaders import LEADERS, Heading, Mailbox, Script, built_in, scripted
-from frametool.sim.run_summary import RunSummary
 from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall, tutorial
-from frametool.sim.simulate import Simulation, SimulationStep, simulate
-from frametool.sim.turtle import CENTRE, SIZE, TICK_NS, TIMEOUT_NS, Turtle, TurtleState, Twist, single
-from frametool.sim.world import ServiceRefused, World
+from frametool.sim.simulate import RunSummary, Simulation, SimulationStep, simulate
+from frametool.sim.turtle import (
+    CENTRE,
+    SIZE,
+    TICK_NS,
+    TIMEOUT_NS,
+    ServiceRefused,
+    Turtle,
+    TurtleState,
+    Twist,
+    World,
+    single,
+)
 
 SECOND = 1_000_000_000
 

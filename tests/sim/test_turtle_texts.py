@@ -14,10 +14,9 @@ from frametool.grammar.result import Style
 from frametool.sim.command_file import read_commands, read_script
 from frametool.sim.controllers import FollowController
 from frametool.sim.leaders import KEYS, scripted
-from frametool.sim.run_summary import RunSummary
 from frametool.sim.scene import Follow, tutorial
 from frametool.sim.scene_file import read_scene
-from frametool.sim.simulate import simulate
+from frametool.sim.simulate import RunSummary, simulate
 from frametool.sim.step_writer import EMITS, FORMS, SHORT, StepWriter, table
 from frametool.sim.turtle import CENTRE, Twist
 

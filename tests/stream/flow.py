@@ -6,12 +6,11 @@ import io
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError
-from frametool.formats import readers
+from frametool.formats.table import readers
 from frametool.geometry.representations import notation
 from frametool.stream.faults import MOST, BadRows
-from frametool.stream.operation import Operation
 from frametool.stream.record_stream import run_records
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 from frametool.stream.run import run
 from frametool.stream.table_stream import run_table
 

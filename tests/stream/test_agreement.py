@@ -14,9 +14,8 @@ from flow import INVERT, MOVE, convert, flow
 from frametool.documents.source import Source
 from frametool.errors import FrametoolError, FrametoolWarning
 from frametool.grammar.result import Result, Style
-from frametool.stream.operation import Operation
 from frametool.stream.record_values import read_poses, results
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -8,8 +8,7 @@ import re
 import pytest
 from flow import MOVE, convert, flow
 
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 
 CONSECUTIVE = Request(Operation(of="previous"))
 GOOD = '{"point":[1,2,3]}\n'

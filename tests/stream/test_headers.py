@@ -7,8 +7,7 @@ from flow import INVERT, MOVE, convert, flow
 
 from frametool.geometry.representations import REPRESENTATIONS
 from frametool.stream.header import Header, find_rotations
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 
 STEP = Request(Operation(left=(1.0, 0.0, 0.0, 0.0, 0.0, 0.7071067811865476, 0.7071067811865476)))
 UP = Request(Operation(left=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)))

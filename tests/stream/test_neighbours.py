@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 from flow import INVERT, MOVE, QUARTER, convert, flow
 
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable

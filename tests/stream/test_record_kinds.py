@@ -13,9 +13,8 @@ from frametool.documents.source import Source
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.readers import Reading
-from frametool.stream.operation import Operation
 from frametool.stream.record import find_records
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 from frametool.stream.scalar import moved
 
 if TYPE_CHECKING:

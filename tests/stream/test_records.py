@@ -6,8 +6,7 @@ import pytest
 from flow import INVERT, MOVE, Flow, convert, flow
 
 from frametool.errors import FrametoolWarning
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 
 MANY = 40  # records: beyond what is done singly
 

@@ -10,8 +10,7 @@ import pytest
 from flow import INVERT, QUARTER, convert, flow
 
 from frametool.errors import UnknownFrame, ValueInvalid
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 
 if TYPE_CHECKING:
     from conftest import Outcome

@@ -7,8 +7,7 @@ from itertools import pairwise
 import pytest
 from flow import INVERT, MOVE, convert, flow
 
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 
 HOSTILE = ["007", "1.50", "1e3", '"a,b"', '"q""q"', '""', "", "é 🐢", "\0", "x" * 1_000_000, '" "', "-0.0", "nan", "5'"]
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numbers_at_hand import HOSTILE, random_bits
 
-from frametool.text.fixed import fixed_spans
 from frametool.text.spans import join
+from frametool.text.write import fixed_spans
 
 
 def lines(values: list[float], precision: int) -> list[str]:

@@ -7,7 +7,7 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
-from frametool.text.seconds import nanoseconds_of
+from frametool.text.parse import nanoseconds_of
 
 
 def by_decimal(seconds: float) -> int:

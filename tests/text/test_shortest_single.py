@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from frametool.text.shortest_single import rounded_to_single
+from frametool.text.write import rounded_to_single
 
 RNG = np.random.default_rng(11)
 

@@ -20,7 +20,7 @@ from console import ROOT
 import frametool
 from frametool.errors import UnknownFrame, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
-from frametool.frames.tree import FrameTree
+from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
 from frametool.view.frame_scene import FrameScene
 from frametool.view.html_page import SCRIPTS, write_page

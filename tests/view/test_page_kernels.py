@@ -11,7 +11,7 @@ import numpy as np
 import samples
 from browsers import NEEDS_CHROMIUM, seen_in_chromium
 
-from frametool.geometry import floats, segment
+from frametool.geometry import floats, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,8 +42,8 @@ def test_the_way_between_samples_is_that_of_the_buffer(tmp_path: Path) -> None:
         for ends in (NEAR, FAR, TURNS)
         for start, end in zip(TURNS, ends, strict=True)
     ]
-    prepare: Any = segment.prepare
-    along: Any = segment.along
+    prepare: Any = rigid.prepare
+    along: Any = rigid.along
     expected = [along(*a, *prepare(*a, *b, floats), fraction, floats) for a, b, fraction in cases]
     found = in_the_page(tmp_path, "([a, b, fraction]) => along(a, b, fraction)", cases)
     assert [tuple(pose) for pose in found] == expected

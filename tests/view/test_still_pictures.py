@@ -15,17 +15,22 @@ from console import ROOT
 
 import frametool
 from frametool.errors import ValueInvalid
-from frametool.frames.tree import FrameTree
+from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
-from frametool.view.canvas import Canvas
 from frametool.view.frame_scene import FrameScene
-from frametool.view.frames_picture import HEIGHT, SIZE, WIDTH, still_picture
-from frametool.view.frames_terminal import TerminalPicture
-from frametool.view.label_places import TakenBoxes, place_labels
-from frametool.view.png import write_png
-from frametool.view.projection import EYES, Projection, nice
-from frametool.view.shapes import PictureDot, PictureLine, PictureWords
-from frametool.view.svg import write_svg
+from frametool.view.pictures import (
+    HEIGHT,
+    SIZE,
+    WIDTH,
+    PictureDot,
+    PictureLine,
+    PictureWords,
+    still_picture,
+    write_png,
+    write_svg,
+)
+from frametool.view.projection import EYES, Projection, TakenBoxes, nice, place_labels
+from frametool.view.terminal import Canvas, TerminalPicture
 
 if TYPE_CHECKING:
     from pathlib import Path

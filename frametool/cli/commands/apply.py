@@ -7,16 +7,26 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.cloud_files import clouds_of
-from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, rotation_options
-from frametool.cli.completions import ColumnNames
 from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options
 from frametool.cli.explaining import given as given_as_written
+from frametool.cli.options import (
+    FILE,
+    TEXT,
+    TIME,
+    ColumnNames,
+    Command,
+    array_option,
+    at_ns,
+    pose_options,
+    reading_options,
+    result_options,
+    rotation_options,
+    rules,
+    rules_options,
+)
 from frametool.cli.output import Output
-from frametool.cli.pasted_input import is_inline, is_pasted
-from frametool.cli.poses import one_pose, pose_source, usage_if_inline, values_of
-from frametool.cli.reading_options import array_option, reading_options
+from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown
@@ -25,8 +35,8 @@ from frametool.text.numbers import NotFinite, parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.calc.explain.derive_apply import ByPose, ByTree
-    from frametool.formats.assembly import Rules
+    from frametool.explain.derive import ByPose, ByTree
+    from frametool.formats.load import Rules
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.request import Request
@@ -116,7 +126,7 @@ def command(
         if rest in ((), ("-",)) or len(records) != 1 or frame_column is not None:
             raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
         try:
-            from frametool.calc.explain.derive_apply import derive_apply
+            from frametool.explain.derive import derive_apply
 
             source = pose_source(records[0], stream.given, normalize=normalize, points=True)
             made = derive_apply(way.explained(), source, plan, kind=kind or "", degrees=deg, normalize=normalize,
@@ -173,8 +183,7 @@ class Way(NamedTuple):
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Say how records move: from one frame or each from its own, all alike or each at its own time."""
-        from frametool.stream.operation import Operation
-        from frametool.stream.request import Request
+        from frametool.stream.request import Operation, Request
         from frametool.stream.stamp_source import Timed
 
         has_source = self.has_source and frame_column is None
@@ -235,7 +244,7 @@ def _way_by_tree(
     counters = not any(frame.isdecimal() for frame in tree.frames)
     in_time = at_times if chosen is None else None
     def explained() -> ByTree:
-        from frametool.calc.explain.derive_apply import ByTree
+        from frametool.explain.derive import ByTree
 
         return ByTree(tree, target, source, at_ns(chosen))
 
@@ -252,7 +261,7 @@ def _way_by_pose(argument: str, given: Notation | None, *, degrees: bool, normal
         return pose.components
 
     def explained() -> ByPose:
-        from frametool.calc.explain.derive_apply import ByPose
+        from frametool.explain.derive import ByPose
 
         return ByPose(given_as_written(source, given, degrees=degrees, normalize=normalize, told=False))
 

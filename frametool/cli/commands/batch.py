@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from frametool.cli.command import FILE, Command
+from frametool.cli.options import FILE, Command
 from frametool.cli.stderr import say
 from frametool.documents.source import opened
 from frametool.stream.faults import SKIP, STOP
@@ -44,7 +44,7 @@ def command(file: str, on_failure: str) -> int:  # fmt: skip
     where lines were skipped. Standard input is not for the lines: name files. A line cannot be a batch itself, nor run
     on the clock or without end, as sim --realtime does.
     """
-    from frametool.cli.batch_run import CommandBatch
+    from frametool.cli.batch import CommandBatch
 
     stream, skips = opened(file), on_failure == SKIP
     if file != "-":

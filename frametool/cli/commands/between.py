@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, result_options, rotation_options
+from frametool.cli.options import TEXT, Command, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import pose_source, usage_if_inline
 from frametool.cli.stderr import say
@@ -56,9 +56,8 @@ def _directions(texts: Sequence[str]) -> tuple[Vector, Vector]:
 
 def _vectors(text: str) -> list[Vector]:
     """Read the vectors of an argument."""
-    from frametool.stream.operation import Operation
     from frametool.stream.record_values import documents
-    from frametool.stream.request import Request
+    from frametool.stream.request import Operation, Request
     from frametool.stream.row_layout import VECTOR
 
     request = Request(Operation(moves=True), kind=VECTOR)

@@ -10,15 +10,19 @@ import click
 
 from frametool.calc.evaluate import evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.literals import Literals
 from frametool.calc.parser import mentions_row, walk
-from frametool.calc.scope import Scope
-from frametool.cli.calc_completion import Expression
-from frametool.cli.calc_names import file_named_in
-from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options
-from frametool.cli.completions import ColumnNames
+from frametool.calc.scope import Literals, Scope
+from frametool.cli.calc_input import Expression, file_named_in
+from frametool.cli.options import (
+    FILE,
+    ColumnNames,
+    Command,
+    pose_options,
+    reading_options,
+    result_options,
+    rotation_options,
+)
 from frametool.cli.output import Output
-from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import load_tree
 from frametool.documents.source import read_text
@@ -26,8 +30,8 @@ from frametool.documents.source import read_text
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.calc.formula import RowExpressions
     from frametool.calc.parser import Line
+    from frametool.calc.rows import RowExpressions
     from frametool.calc.values import Term
     from frametool.stream.request import Request
 
@@ -94,7 +98,7 @@ def command(
         formula.check((kind,) if kind else ("pose", "point", "vector"))
         request = _request(formula, kind or "", time_column, degrees=deg, normalize=normalize)
         return stream.run(request, output)
-    from frametool.cli.calc_output import value_texts
+    from frametool.cli.calc_input import value_texts
 
     output.pieces(value_texts(_results(lines, scope), output.style))
     return 0
@@ -130,17 +134,17 @@ def _without_expression(stream: Stream, output: Output, scope: Scope) -> int:
     if stream.path is not None:
         raise click.UsageError("-i FILE needs an expression over row")
     if sys.stdin is not None and sys.stdin.isatty():
-        from frametool.cli.calc_prompt import talk
+        from frametool.cli.calc_input import talk
 
         return talk(scope, output)
-    from frametool.cli.calc_pipe import calculate_lines
+    from frametool.cli.calc_input import calculate_lines
 
     return calculate_lines(stream, output, scope)
 
 
 def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, output: Output) -> RowExpressions:
     """Part lines into those whose results are written and those that only bind names."""
-    from frametool.calc.formula import RowExpressions
+    from frametool.calc.rows import RowExpressions
 
     results = [line for line, is_option in zip(lines, flags, strict=True) if is_option or not line.name]
     if not results:
@@ -160,8 +164,7 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
 
 def _request(formula: RowExpressions, kind: str, time_column: str | None, *, degrees: bool, normalize: bool) -> Request:
     """Say what is asked of the rows."""
-    from frametool.stream.operation import Operation
-    from frametool.stream.request import Request
+    from frametool.stream.request import Operation, Request
     from frametool.stream.stamp_source import Timed
 
     if time_column is not None and not formula.needs_time:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Command, pose_options, verbose_option
-from frametool.cli.reading_options import reading_options
+from frametool.cli.options import FILE, Command, pose_options, reading_options, verbose_option
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import opened, state

@@ -7,11 +7,10 @@ from typing import Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.explaining import Explaining, all_given, explain_options
+from frametool.cli.options import TEXT, Command, pose_options, pose_reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, factors_of, one_pose
-from frametool.cli.reading_options import pose_reading_options
 from frametool.cli.streaming import Stream, stream_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
@@ -44,7 +43,7 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     given = [each.argument for each in factors]
     if explaining:
         plan = explaining.plan(output, stream)
-        from frametool.calc.explain.derive import derive_compose
+        from frametool.explain.derive import derive_compose
 
         written = all_given(given, stream.given, degrees=deg, normalize=normalize)
         turned = [each.turned() if factor.is_inverse else each for each, factor in zip(written, factors, strict=True)]
@@ -64,8 +63,7 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
         for side in (factors[:at], factors[at + 1 :])
     )
     rows = factors[at]
-    from frametool.stream.operation import Operation
-    from frametool.stream.request import Request
+    from frametool.stream.request import Operation, Request
 
     before = reduce(product, left) if left else None
 

@@ -7,14 +7,28 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
-from frametool.cli.completions import AxesName
 from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options, one_argument
 from frametool.cli.explaining import given as given_as_written
+from frametool.cli.options import (
+    TEXT,
+    AxesName,
+    Command,
+    Number,
+    pose_options,
+    pose_reading_options,
+    result_options,
+    rotation_options,
+)
 from frametool.cli.output import Output
-from frametool.cli.pasted_input import is_inline, is_pasted, rejoined
-from frametool.cli.poses import pose_from_numbers, pose_source, source_from_numbers, values_of
-from frametool.cli.reading_options import pose_reading_options
+from frametool.cli.poses import (
+    is_inline,
+    is_pasted,
+    pose_from_numbers,
+    pose_source,
+    rejoined,
+    source_from_numbers,
+    values_of,
+)
 from frametool.cli.stderr import say
 from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.errors import ValueInvalid
@@ -27,10 +41,10 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.calc.explain.other_axes import OtherAxes
     from frametool.documents.source import Source
+    from frametool.explain.operations import OtherAxes
     from frametool.geometry.representations import Notation
-    from frametool.stream.operation import Operation
+    from frametool.stream.request import Operation
 
 
 AXES = 3
@@ -107,8 +121,7 @@ def command(
     if explaining:
         explaining.plan(output, stream)
         one_argument(values[0] if values else axes or world)
-    from frametool.stream.operation import Operation
-    from frametool.stream.request import Request
+    from frametool.stream.request import Operation, Request
 
     operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
     forms = output.notations or (notation("quaternion"),)
@@ -151,7 +164,7 @@ def command(
     if explaining:
         if len(poses) != 1:
             raise click.UsageError(f"--explain derives one pose, found {len(results)}")
-        from frametool.calc.explain.derive import derive_convert
+        from frametool.explain.derive import derive_convert
 
         written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
         change = _named_change(axes, world, operation) if values else None
@@ -209,7 +222,7 @@ def _changed(pose: Pose, operation: Operation) -> Pose:
 def _change_of_axes(axes: str | None, world: str | None) -> Operation:
     """Return the operation that --axes and --world-axes name."""
     from frametool.geometry.conventions import both_sides
-    from frametool.stream.operation import Operation
+    from frametool.stream.request import Operation
 
     try:
         left, mirrors, right = both_sides(world, axes)
@@ -222,7 +235,7 @@ def _change_of_axes(axes: str | None, world: str | None) -> Operation:
 
 def _named_change(axes: str | None, world: str | None, operation: Operation) -> OtherAxes | None:
     """Return the change of axes for a derivation, None without one."""
-    from frametool.calc.explain.other_axes import OtherAxes
+    from frametool.explain.operations import OtherAxes
 
     left = (world, operation.left[3:]) if world and operation.left else None
     right = (axes, operation.right[0][3:]) if axes and operation.right else None

@@ -7,11 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Command, Text, list_options, pose_options, verbose_option
+from frametool.cli.options import (
+    FILE,
+    TIME,
+    Command,
+    Text,
+    at_ns,
+    list_options,
+    pose_options,
+    reading_options,
+    verbose_option,
+)
 from frametool.cli.output import Output
-from frametool.cli.reading_options import reading_options
 from frametool.cli.stderr import say
-from frametool.cli.times import TIME, at_ns
 from frametool.cli.trees import FRAME, frame_name, is_quiet, load_sides
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.load import lines_of
@@ -22,7 +30,7 @@ from frametool.text.numbers import parse_length, read_number_or_angle
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.formats.assembly import Place
+    from frametool.formats.load import Place
     from frametool.lint.tree_diff import Comparison
 
 DIFFERENT, TROUBLE = 1, 2
@@ -124,7 +132,7 @@ def _write(output: Output, found: Comparison, places: Sequence[Mapping[str, Plac
     if output.style.form == "github":
         output.text(_annotations(found, places))
     elif output.style.form == "text":
-        from frametool.view.diff_text import write_diff
+        from frametool.view.report_text import write_diff
 
         output.text(write_diff(told))
     else:

@@ -8,27 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import (
+from frametool.cli.options import (
     FILE,
     Command,
     Number,
+    Skipped,
+    Time,
     pose_options,
+    reading_options,
     result_options,
     rotation_options,
+    rules,
+    rules_options,
     verbose_option,
 )
 from frametool.cli.output import Output
-from frametool.cli.reading_options import reading_options
-from frametool.cli.times import Skipped, Time, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import NoDataAt, ValueInvalid
-from frametool.frames.replay import checked_rate
-from frametool.grammar.looked_up import result_at
+from frametool.frames.lookups import checked_rate
+from frametool.grammar.pose_algebra import result_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.frames.replay import Replayed
+    from frametool.frames.lookups import Replayed
     from frametool.grammar.result import Result
 
 STAMP = Time(latest=False)
@@ -92,7 +95,7 @@ def command(
     results = skipped.counted(_results(replayed, target, source, skipped))
     shown = islice(results, None if limit is None else min(limit, sys.maxsize))
     if out.style.form == "text":
-        from frametool.view.echo_text import write_blocks
+        from frametool.view.pose_text import write_blocks
 
         out.pieces(write_blocks(shown, target, source, out.style))
     else:

@@ -6,18 +6,24 @@ from typing import Any
 
 import click
 
-from frametool.cli.command import FILE, STREAMED, Command, pose_options, result_options, rotation_options
+from frametool.cli.options import (
+    FILE,
+    STREAMED,
+    Command,
+    pose_options,
+    reading_options,
+    result_options,
+    rotation_options,
+)
 from frametool.cli.output import Output
-from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import RECORDS, Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, opened, state
-from frametool.formats import holds_arrays
 from frametool.formats.detect import detect
-from frametool.formats.robot import robot_of
+from frametool.formats.robots.robot import robot_of
+from frametool.formats.table import holds_arrays
 from frametool.stream.faults import ROWS_SKIPPED
 from frametool.stream.joint_rows import JointRows, echoed, names_in
-from frametool.stream.operation import Operation
-from frametool.stream.request import Request
+from frametool.stream.request import Operation, Request
 
 
 @click.command(cls=Command, name="fk")
@@ -63,7 +69,7 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
     if not echo_form:
         operation = Operation(moves=True, formula=rows)
         return stream.run(Request(operation, poses=0, degrees=deg, normalize=normalize), output)
-    from frametool.stream.joint_messages import joint_poses
+    from frametool.stream.joint_rows import joint_poses
 
     bad = stream.policy(name)
     with stream.opened() as source:

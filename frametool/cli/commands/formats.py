@@ -6,10 +6,10 @@ from typing import Any
 
 import click
 
-from frametool.cli.command import Command, Form, list_options
+from frametool.cli.options import Command, Form, list_options
 from frametool.cli.output import Output
-from frametool.formats import FORMATS
-from frametool.view.form_list import form_entry, write_form, write_forms
+from frametool.formats.table import FORMATS
+from frametool.view.report_text import form_entry, write_form, write_forms
 
 
 @click.command(cls=Command, name="formats")

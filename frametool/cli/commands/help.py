@@ -10,8 +10,8 @@ from typing import Any
 import click
 
 from frametool.cli import COMMANDS
-from frametool.cli.command import TEXT, Command
-from frametool.cli.help_page import show_help
+from frametool.cli.group import show_help
+from frametool.cli.options import TEXT, Command
 from frametool.cli.sink import writing
 from frametool.errors import alternatives, shown
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, Number, pose_options, result_options, rotation_options
 from frametool.cli.explaining import Explaining, all_given, explain_options
+from frametool.cli.options import TEXT, Command, Number, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations
 from frametool.grammar.pose_algebra import interpolated
@@ -38,7 +38,7 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
         plan = explaining.plan(output)
         if len(fractions) != 1:
             raise click.UsageError(f"--explain derives one fraction, found {len(fractions)}")
-        from frametool.calc.explain.derive import derive_interpolate
+        from frametool.explain.derive import derive_interpolate
 
         first, last = all_given((a, b), degrees=deg, normalize=normalize)
         explaining.write(derive_interpolate(first, last, fractions[0], plan), output)

@@ -6,11 +6,10 @@ from typing import Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
 from frametool.cli.explaining import Explaining, explain_options, given
+from frametool.cli.options import TEXT, Command, pose_options, pose_reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import write_results
-from frametool.cli.reading_options import pose_reading_options
 from frametool.cli.streaming import Stream, stream_options
 
 
@@ -35,12 +34,11 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
     output = Output("poses", deg=deg, **options)
     if explaining:
         plan = explaining.plan(output, stream)
-        from frametool.calc.explain.derive import derive_invert
+        from frametool.explain.derive import derive_invert
 
         written = given(pose, stream.given, degrees=deg, normalize=normalize)
         return explaining.write(derive_invert(written, plan), output)
-    from frametool.stream.operation import Operation
-    from frametool.stream.request import Request
+    from frametool.stream.request import Operation, Request
 
     request = Request(
         Operation(inverse=True),

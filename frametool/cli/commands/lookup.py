@@ -6,16 +6,28 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options
 from frametool.cli.explaining import Explaining, explain_options
 from frametool.cli.lookup_rows import RowFrames, column_options
+from frametool.cli.options import (
+    FILE,
+    TIME,
+    Command,
+    Skipped,
+    at_ns,
+    pose_options,
+    read_times,
+    reading_options,
+    result_options,
+    rotation_options,
+    rules,
+    rules_options,
+    times_option,
+)
 from frametool.cli.output import Output
-from frametool.cli.reading_options import reading_options
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.times import TIME, Skipped, at_ns, read_times, rules, rules_options, times_option
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.grammar.edges import stop
-from frametool.grammar.looked_up import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
+from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,7 +87,7 @@ def command(
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
     if plan is not None:
-        from frametool.calc.explain.derive import derive_lookup
+        from frametool.explain.derive import derive_lookup
 
         found = derive_lookup(frames, target, source, plan, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
         return explaining.write(found, output)

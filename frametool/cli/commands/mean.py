@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
-from frametool.cli.completions import ColumnNames
+from frametool.cli.options import TEXT, ColumnNames, Command, pose_options, result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.pasted_input import is_pasted
-from frametool.cli.poses import poses_from
+from frametool.cli.poses import is_pasted, poses_from
 from frametool.cli.streaming import Stream, stream_options
 from frametool.errors import ValueInvalid
 from frametool.text.numbers import parse_number
@@ -51,8 +49,7 @@ def command(poses: tuple[str, ...], weights: str | None, deg: bool, normalize: b
     stream = Stream(options)
     output = Output("poses", deg=deg, **options)
     from frametool.stream.gathering import Gathered
-    from frametool.stream.operation import Operation
-    from frametool.stream.request import Request
+    from frametool.stream.request import Operation, Request
 
     gathered = Gathered()
     request = Request(

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, Command, pose_options, result_options, verbose_option
+from frametool.cli.options import FILE, TEXT, Command, pose_options, reading_options, result_options, verbose_option
 from frametool.cli.output import Output
-from frametool.cli.reading_options import reading_options
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import opened, state
 from frametool.lint.monitor_report import monitor

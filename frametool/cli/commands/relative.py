@@ -6,12 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
-from frametool.cli.completions import ColumnNames
 from frametool.cli.explaining import Explaining, all_given, explain_options, one_argument
+from frametool.cli.options import (
+    TEXT,
+    ColumnNames,
+    Command,
+    pose_options,
+    pose_reading_options,
+    result_options,
+    rotation_options,
+)
 from frametool.cli.output import Output
 from frametool.cli.poses import combinations, one_pose, write_results
-from frametool.cli.reading_options import pose_reading_options
 from frametool.cli.streaming import Stream, stream_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
@@ -77,7 +83,7 @@ def command(
         plan = explaining.plan(output, stream)
         if consecutive or first:
             raise click.UsageError("--consecutive and --first are about the rows of a stream; leave --explain out")
-        from frametool.calc.explain.derive import derive_relative
+        from frametool.explain.derive import derive_relative
 
         arguments = [str(one_argument(each)) for each in (a, b)]
         given_a, given_b = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
@@ -108,8 +114,7 @@ def command(
 
 def _along(*, consecutive: bool, velocity: bool, beside: str) -> Request:
     """Compare a stream's rows with the row before, or with the first."""
-    from frametool.stream.operation import PREVIOUS, START, Operation
-    from frametool.stream.request import Request
+    from frametool.stream.request import PREVIOUS, START, Operation, Request
 
     # a row is seen from another one of the same stream, which is the same thing at another moment
     operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
@@ -118,7 +123,7 @@ def _along(*, consecutive: bool, velocity: bool, beside: str) -> Request:
 
 def _asked(a: str | None, b: str | None, plain: Request) -> Request:
     """Compare a stream's rows with a fixed A or B, or with the row's own second pose."""
-    from frametool.stream.operation import Operation
+    from frametool.stream.request import Operation
 
     if b is None:
         if a not in (None, "-"):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from frametool.cli.command import EXIT_CODES
 from frametool.cli.group import Group
+from frametool.cli.options import EXIT_CODES
 
 SUBCOMMANDS = {
     "follow": ("frametool.cli.commands.sim_follow", "a leader, and one or more turtles that follow"),

@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Command
 from frametool.cli.explaining import EXPLAIN, significant
-from frametool.cli.leader import leader_of
-from frametool.cli.sim_options import LEADER, follow_options
-from frametool.cli.sim_output import SimOutput, output_options
+from frametool.cli.options import Command
+from frametool.cli.sim_output import LEADER, SimOutput, follow_options, leader_of, output_options
 from frametool.cli.sink import writing
 from frametool.errors import ValueInvalid
-from frametool.formats import by_suffix
+from frametool.formats.table import by_suffix
 from frametool.sim.controllers import FollowController
 from frametool.sim.scene import tutorial
 
@@ -69,8 +67,8 @@ def _explain(output: SimOutput, scene: Scene, step: int, form: str, precision: i
     """Write the derivation of one control step of the followers."""
     if told:
         raise click.UsageError(f"--explain-step derives one step in words; leave {' and '.join(told)} out")
-    from frametool.calc.explain.agreement import DerivationStyle
-    from frametool.calc.explain.follow import derive_follow
+    from frametool.explain.derive import DerivationStyle
+    from frametool.explain.follow import derive_follow
     from frametool.sim.followed import follow_steps
 
     plan = DerivationStyle(output.style, significant(precision))

@@ -6,10 +6,9 @@ from typing import Any
 
 import click
 
-from frametool.cli.command import TEXT, Command
+from frametool.cli.options import TEXT, Command
 from frametool.cli.poses import source_of, usage_if_inline
-from frametool.cli.sim_options import Duration
-from frametool.cli.sim_output import SimOutput, output_options
+from frametool.cli.sim_output import Duration, SimOutput, output_options
 from frametool.cli.stderr import say
 from frametool.errors import FormatError
 from frametool.frames.stamps import BILLION

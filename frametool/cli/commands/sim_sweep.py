@@ -6,11 +6,24 @@ from typing import Any
 
 import click
 
-from frametool.cli.command import Command, Text
-from frametool.cli.leader import leader_of
-from frametool.cli.pictures import drawn
-from frametool.cli.sim_options import LAW, LEADER, MAX_ANGULAR, MAX_LINEAR, RATE, REACH, SEED, SPAWN, Duration
-from frametool.cli.sim_output import check_files, format_options, style_of, suffix_of
+from frametool.cli.options import Command, Text
+from frametool.cli.output import drawn
+from frametool.cli.sim_output import (
+    LAW,
+    LEADER,
+    MAX_ANGULAR,
+    MAX_LINEAR,
+    RATE,
+    REACH,
+    SEED,
+    SPAWN,
+    Duration,
+    check_files,
+    format_options,
+    leader_of,
+    style_of,
+    suffix_of,
+)
 from frametool.cli.sink import writing
 from frametool.errors import ValueInvalid, shown
 from frametool.sim.step_writer import table
@@ -87,7 +100,7 @@ def command(
     with writing(output, force=force) as write:
         write(text)
     if plot:
-        from frametool.view.heat_map import sweep_picture
+        from frametool.view.run_plot import sweep_picture
 
         with writing(plot, force=force) as write:
             write(drawn(sweep_picture(gain_linear, gain_angular, result), suffix_of(plot)))

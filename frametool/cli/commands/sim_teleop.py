@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Command
 from frametool.cli.commands.sim_follow import output_and_scene
-from frametool.cli.sim_options import follow_options
-from frametool.cli.sim_output import output_options
+from frametool.cli.options import Command
+from frametool.cli.sim_output import follow_options, output_options
 from frametool.sim.leaders import HEADINGS, KEYS, Heading, Mailbox
 
 if TYPE_CHECKING:

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import TEXT, Command, pose_options, result_options, rotation_options
+from frametool.cli.options import TEXT, Command, pose_options, reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import misuse_unless_rotations
-from frametool.cli.reading_options import reading_options
 from frametool.cli.trees import load_tree
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, shown
-from frametool.frames.tree import FrameTree
+from frametool.frames.lookups import FrameTree
 from frametool.grammar.readers import Reading
 from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_positional
 

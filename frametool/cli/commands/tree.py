@@ -6,10 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Command, pose_options, result_options, rotation_options, verbose_option
+from frametool.cli.options import (
+    FILE,
+    TIME,
+    Command,
+    at_ns,
+    pose_options,
+    reading_options,
+    result_options,
+    rotation_options,
+    rules,
+    rules_options,
+    verbose_option,
+)
 from frametool.cli.output import Output
-from frametool.cli.reading_options import reading_options
-from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import load_tree
 
 if TYPE_CHECKING:

@@ -10,12 +10,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, TEXT, Command, Text, decorated, verbose_option
-from frametool.cli.pictures import drawn
-from frametool.cli.reading_options import reading_options
+from frametool.cli.options import (
+    FILE,
+    TEXT,
+    TIME,
+    Command,
+    Text,
+    at_ns,
+    decorated,
+    reading_options,
+    rules,
+    rules_options,
+    verbose_option,
+)
+from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.cli.times import TIME, at_ns, rules, rules_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened
 from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import parse_angle
@@ -24,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.view.frame_scene import FrameScene
-    from frametool.view.frames_picture import StillPicture
+    from frametool.view.pictures import StillPicture
 
 FORMS = ("text", "html", "svg", "glb", "png")
 SUFFIXES = {".html": "html", ".htm": "html", ".svg": "svg", ".glb": "glb", ".png": "png", ".txt": "text"}
@@ -117,7 +127,7 @@ def command(
     chosen = _form(form, output, opens=opens)
     refuse_existing(output, force=force)
     if chosen == "png":
-        from frametool.view.png import require_matplotlib
+        from frametool.view.pictures import require_matplotlib
 
         require_matplotlib()
     if overlay and (source or not target):
@@ -137,12 +147,12 @@ def command(
     if live:
         if chosen != "text" or output is not None or not sys.stdout.isatty() or scene.at_ns is None:
             raise click.UsageError("--live plays what moves in a terminal: give it a tree that moves and no -o")
-        from frametool.view.frames_terminal import play
+        from frametool.view.terminal import play
 
         play(scene, eye, color)
         return
     if chosen == "text" and output is None and sys.stdout.isatty():
-        from frametool.view.frames_terminal import TerminalPicture, print_terminal
+        from frametool.view.terminal import TerminalPicture, print_terminal
 
         columns, lines = os.get_terminal_size(sys.stdout.fileno())
         print_terminal(TerminalPicture(scene, columns, lines - 1, eye), color)
@@ -185,10 +195,10 @@ def _content(
 
         return write_glb(scene)
     if form == "text":
-        from frametool.view.frames_terminal import TerminalPicture
+        from frametool.view.terminal import TerminalPicture
 
         return TerminalPicture(scene, *get_terminal_size(PIPE_SIZE), eye).text()
-    from frametool.view.frames_picture import still_picture
+    from frametool.view.pictures import still_picture
 
     still = still_picture(scene, eye, title, before)
     _tell_of_crowd(still, scene)
@@ -198,8 +208,8 @@ def _content(
 def _joints(tree: str, scene: FrameScene) -> list[dict[str, Any]]:
     """Return the joints of a robot's file that get a slider; its warnings were told when its frames were read."""
     from frametool.errors import overheard
-    from frametool.formats.robot import robot_of
-    from frametool.view.joint_sliders import joint_sliders
+    from frametool.formats.robots.robot import robot_of
+    from frametool.view.html_page import joint_sliders
 
     (robot, posture), _ = overheard(robot_of, opened([tree])[0])
     return joint_sliders(robot, posture.still, scene.names)

@@ -1,0 +1,269 @@
+"""`frametool.calc(..)`: expressions in Python, with values that carry their frames.
+
+Values as results: the mappings that machine formats write and read back, and the line a person reads.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, Self
+
+from frametool.calc.evaluate import evaluate_line, read_line
+from frametool.calc.rules import in_radians
+from frametool.calc.scope import Scope
+from frametool.calc.tokens import CalcError, frame_text
+from frametool.calc.values import (
+    ANGLES,
+    LIST,
+    NUMBER,
+    PLAIN_NUMBER,
+    POINT,
+    POSE,
+    RADIAN,
+    TREE,
+    TWIST,
+    Term,
+    Type,
+    unit_text,
+)
+from frametool.errors import ValueInvalid, printable, shown
+from frametool.frames.lookups import Frames
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+from frametool.geometry.trig import RADIAN as DEGREES
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+from frametool.text.numbers import parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.geometry.types import Array, Components
+    from frametool.grammar.result import Style
+
+
+class Measure(float):
+    """A number that knows its unit: `m`, `rad`, `s`, `m^2`, ..; "" for a plain one.  Angles are in radians."""
+
+    __slots__ = ("unit",)
+    unit: str
+
+    def __new__(cls, value: float, unit: str) -> Self:
+        """Keep the two together."""
+        made = super().__new__(cls, value)
+        made.unit = unit
+        return made
+
+    def __reduce__(self) -> tuple[type[Self], tuple[float, str]]:
+        """Let it be copied and pickled with its unit."""
+        return type(self), (float(self), self.unit)
+
+
+class Framed:
+    """A value with its frames: a pose `target<-source`, or a point, vector, twist or angles seen in `target`.
+
+    kind: pose, point, vector, twist, angles, list.  A frame that nobody said is None.
+    """
+
+    __slots__ = ("_term",)
+
+    def __init__(self, term: Term) -> None:
+        """Wrap what an expression came to."""
+        self._term = term
+
+    @property
+    def kind(self) -> str:
+        """What it is."""
+        return self._term.type.kind
+
+    @property
+    def target(self) -> str | None:
+        """The frame it is seen from."""
+        return self._term.type.target
+
+    @property
+    def source(self) -> str | None:
+        """The frame that a pose is the pose of."""
+        return self._term.type.source
+
+    @property
+    def components(self) -> Components:
+        """Its numbers, floats or arrays: those of a pose are tx, ty, tz, x, y, z, w."""
+        return self._term.at(None)
+
+    @property
+    def transform(self) -> Transform:
+        """The transform target_from_source of a pose."""
+        if self.kind != POSE:
+            raise ValueInvalid(f"{self._term.type.named} is no pose")
+        return Transform.of(*self.components)
+
+    @property
+    def xyz(self) -> Array:
+        """The position of a pose or point, or the vector, shape (..., 3)."""
+        return self._stacked(self.components[:3])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:  # noqa: FBT001 - numpy's signature
+        """Return its numbers, shape (..., n); of a pose the 4x4 matrix."""
+        found = self.transform.as_matrix() if self.kind == POSE else self._stacked(self.components)
+        return found if dtype is None else found.astype(dtype, copy=bool(copy))
+
+    @staticmethod
+    def _stacked(parts: Components) -> Array:
+        import numpy as np
+
+        return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+    def __iter__(self) -> Iterator[Any]:
+        """Go through a list."""
+        if self.kind != LIST:
+            raise TypeError(f"{self._term.type.named} is no list")
+        return map(_result, self._term.items)
+
+    def __len__(self) -> int:
+        """Count a list."""
+        if self.kind != LIST:
+            raise TypeError(f"{self._term.type.named} has no length")
+        return len(self._term.items)
+
+    def __repr__(self) -> str:
+        """Return kind, frames and numbers."""
+        if self.kind == LIST:
+            return f"<list of {len(self)}>"
+        frames = str(self._term.type) if self.kind == POSE else f"in {frame_text(self.target)}"
+        return f"<{self.kind} {frames} {self.components}>"
+
+
+def calc(
+    text: str, /, *, tree: Frames | None = None, degrees: bool = False, normalize: bool = False, **names: Any
+) -> Any:
+    """Return the value of an expression such as `inv(map<-base_link) * (map<-tool)`; `help calc` is the language.
+
+    tree: where bare look-ups are made.  names: values the expression may name: trees, transforms, rotations, numbers,
+        three numbers (a point), six (a twist), lists of transforms, results of other expressions.
+    degrees, normalize: how the literals of poses are read.
+    Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`.
+    Raises CalcError for frames or units that do not fit, LookupFailed.
+    """
+    from frametool.calc.scope import Literals
+
+    scope = Scope(
+        tree=tree,
+        names={name: _term(name, value) for name, value in names.items()},
+        literals=Literals(degrees=degrees, normalize=normalize),
+    )
+    for name in names:
+        read_line(f"{name}=0")  # refuses what has a meaning of its own
+    return _result(evaluate_line(read_line(text), scope))
+
+
+def _result(term: Term) -> Any:
+    """Return what Python gets."""
+    if term.type.kind == TREE:
+        return term.tree
+    if term.type.kind != NUMBER:
+        return Framed(term)
+    (value,) = in_radians(term).at(None)
+    return Measure(value, unit_text(term.type.unit)) if type(value) is float else value
+
+
+def _term(name: str, value: Any) -> Term:
+    """Take a Python value."""
+    if isinstance(value, Framed):
+        found = value._term  # noqa: SLF001 - its own module
+    elif isinstance(value, Frames):
+        found = Term(Type(TREE), (), tree=value)
+    elif isinstance(value, Transform):
+        found = Term(Type(POSE), value.components)
+    elif isinstance(value, Rotation):
+        found = Term(Type(POSE), (0.0, 0.0, 0.0, *value.components))
+    elif isinstance(value, Measure):
+        found = Term(_type_of(value), (float(value),))
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        found = Term(PLAIN_NUMBER, (parse_number(repr(float(value))),))  # refuses what is not finite
+    elif isinstance(value, (list, tuple)) and value and isinstance(value[0], (Transform, Framed)):
+        found = Term(Type(LIST), (), items=tuple(_term(name, each) for each in value))
+    else:
+        found = _of_numbers(name, value)
+    return found.written(name, atomic=True)
+
+
+def _type_of(value: Measure) -> Type:
+    """Return the type of a number with a unit."""
+    from frametool.calc.evaluate import evaluate
+
+    if not value.unit:
+        return PLAIN_NUMBER
+    return evaluate(re.sub(r"[a-z]+", r"1\g<0>", value.unit), Scope()).type
+
+
+def _of_numbers(name: str, value: Any) -> Term:
+    """Take an array: (..., 3) is points, (..., 6) twists, others numbers."""
+    import numpy as np
+
+    try:
+        array = np.asarray(None if isinstance(value, bool) else value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueInvalid(f"{name}: an expression knows nothing of {shown(type(value).__name__)}") from None
+    if not np.isfinite(array).all():
+        raise ValueInvalid(f"{name}: the numbers are not finite")
+    if array.ndim and array.shape[-1] in (3, 6):
+        kind = POINT if array.shape[-1] == 3 else TWIST
+        parts = tuple(float(part) if part.ndim == 0 else part for part in np.moveaxis(array, -1, 0))
+        return Term(Type(kind), parts)
+    return Term(PLAIN_NUMBER, (float(array) if array.ndim == 0 else array,))
+
+
+def plain_results(term: Term, style: Style) -> Iterator[Any]:
+    """Yield a value as results: a pose as a Result, a number bare, all else a mapping; of a list each item."""
+    type_ = term.type
+    if type_.kind == TREE:
+        raise CalcError(f"{term.text} is a tree; ask it: {term.text}[TARGET<-SOURCE]")
+    if type_.kind == LIST:
+        for item in term.items:
+            yield from plain_results(item, style)
+        return
+    numbers = term.at(None)
+    if type_.kind == POSE:
+        yield Result(Pose.of(numbers, type_.source, type_.target))
+    elif type_.kind == NUMBER:
+        yield angle_in(term, degrees=style.degrees) if type_.unit == RADIAN else numbers[0]
+    elif type_.kind == ANGLES:
+        degrees = style.degrees
+        angles = [each * DEGREES for each in numbers] if degrees else list(numbers)
+        yield _in_frame(term) | {"rpy_deg" if degrees else "rpy": angles}
+    else:
+        yield _in_frame(term) | {type_.kind: list(numbers)}
+
+
+def _in_frame(term: Term) -> dict[str, Any]:
+    return {} if term.type.target is None else {"frame": term.type.target}
+
+
+def angle_in(term: Term, *, degrees: bool) -> float:
+    """Return an angle in degrees or radians; what was given in degrees comes out as it was."""
+    if degrees and term.type.degrees:
+        return float(term.at(None)[0])
+    radians = float(in_radians(term).at(None)[0])
+    return radians * DEGREES if degrees else radians
+
+
+def line_of_value(term: Term, style: Style) -> str:
+    """Return a value other than a pose or a point on a line, for a person."""
+    type_, numbers = term.type, term.at(None)
+    frame = "" if type_.target is None else f" in {printable(type_.target)}"
+    if type_.kind == NUMBER and type_.unit == RADIAN:
+        radians, degrees = (_text(angle_in(term, degrees=each), style) for each in (False, True))
+        return f"{degrees} deg  ({radians} rad)\n" if style.degrees else f"{radians} rad  ({degrees} deg)\n"
+    if type_.kind == NUMBER:
+        return f"{_text(numbers[0], style)} {unit_text(type_.unit)}".rstrip() + "\n"
+    if type_.kind == ANGLES:
+        radians, degrees = ("  ".join(_text(each * unit, style) for each in numbers) for unit in (1.0, DEGREES))
+        return f"rpy  {radians}  rad{frame}\n     {degrees}  deg\n"
+    assert type_.kind == TWIST  # noqa: S101 - all other kinds are written elsewhere
+    linear, angular = ("  ".join(_text(each, style) for each in part) for part in (numbers[:3], numbers[3:]))
+    return f"linear  {linear}  m\nangular  {angular}  rad{frame}\n"
+
+
+def _text(value: float, style: Style) -> str:
+    return style.number(value + 0.0)

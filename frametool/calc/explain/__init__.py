@@ -1,1 +1,0 @@
-"""Derivations: each step as formula, formula with numbers and value, from the same text."""

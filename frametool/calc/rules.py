@@ -1,0 +1,492 @@
+"""What the operators need and give: frames that touch, units that agree, and the kernels that then run.
+
+What operators and functions demand of their values: one frame, the same frames, plain numbers, angles.
+
+What to write instead: expressions whose frames touch, found by trying, as texts that can be pasted.
+
+A term appears as it was typed: bound names by their names, literals as they are, look-ups in a named tree as d[..].
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.calc.tokens import CalcError, frame_text
+from frametool.calc.values import (
+    ANGLES,
+    LIST,
+    METRE,
+    NUMBER,
+    PLAIN,
+    POINT,
+    POSE,
+    RADIAN,
+    TO_RADIANS,
+    TREE,
+    TWIST,
+    VECTOR,
+    Term,
+    Type,
+    made,
+    meet,
+)
+from frametool.errors import shown
+from frametool.geometry import floats, quaternion, rigid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from frametool.calc.values import Dimension
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Components, Namespace, Number, Rigid
+    Trees = Sequence[tuple[str, Frames]]
+
+MOST = 2
+"""Suggestions in one message."""
+
+
+def _forms(term: Term) -> tuple[tuple[str, str | None, str | None], ...]:
+    """Return a pose and its inverse: text, target, source."""
+    target, source = term.type.target, term.type.source
+    return (term.bracketed, target, source), (f"inv({term.text})", source, target)
+
+
+def rewritten_products(left: Term, right: Term) -> Iterator[str]:
+    """Yield the products of two poses, either inverted or not, in either order, whose frames touch."""
+    pairs = [(a, b) for a in _forms(left) for b in _forms(right)]
+    swapped = [(b, a) for a, b in pairs]
+    tried = [pairs[2], pairs[1], pairs[3], swapped[0], swapped[1], swapped[2], swapped[3]]
+    for (first, target, between), (second, touching, source) in tried:
+        if between is not None and between == touching:
+            yield f"{first} * {second}  (= {frame_text(target)}<-{frame_text(source)})"
+
+
+def for_product(left: Term, right: Term, trees: Iterable[tuple[str, Frames]]) -> str:
+    """Say how two poses that do not touch can be multiplied."""
+    found = list(rewritten_products(left, right))[:MOST]
+    if found:
+        return f"frames that touch: {', or '.join(found)}"
+    between = _looked_up(left.type.source, right.type.target, trees)
+    return f"a lookup between them is missing: {between or _arrow(left.type.source, right.type.target)}"
+
+
+def for_point(pose: Term, point: Term, trees: Iterable[tuple[str, Frames]]) -> str:
+    """Say how a point in another frame can be moved."""
+    if point.type.target == pose.type.target:
+        return f"inv({pose.text}) takes points in {frame_text(pose.type.target)}"
+    between = _looked_up(pose.type.source, point.type.target, trees)
+    return f"{between or _arrow(pose.type.source, point.type.target)} stands between"
+
+
+def for_same_frames(left: Term, right: Term) -> str:
+    """Say how two poses of different frames go together; "" where nothing is found."""
+    a, b = left.type, right.type
+    if a.target is not None and a.target == b.source and a.source == b.target:
+        return f"; inv({right.text}) is {frame_text(b.source)}<-{frame_text(b.target)}"
+    if a.target is not None and a.target == b.target and a.source != b.source:
+        seen = f"{frame_text(b.source)} seen from {frame_text(a.source)}"
+        return f"; for {seen}: inv({left.text}) * {right.bracketed}"
+    return ""
+
+
+def for_one_target(left: Term, right: Term, trees: Iterable[tuple[str, Frames]]) -> str:
+    """Say how two poses come to be seen from one frame; "" where nothing is found."""
+    a, b = left.type, right.type
+    if b.source == a.target:
+        return f"; write inv({right.text}) for the second"
+    if a.source == b.target:
+        return f"; write inv({left.text}) for the first"
+    if a.source is not None and a.source == b.source:
+        return f"; write inv(..) for both: inv({left.text}), inv({right.text})"
+    if (over := _looked_up(a.target, b.target, trees)) is not None:
+        return f"; bring the second over: ({over}) * {right.bracketed}"
+    return f"; a lookup between them is missing: {_arrow(a.target, b.target)}"
+
+
+def for_other_frame(left: Term, right: Term, trees: Iterable[tuple[str, Frames]]) -> str:
+    """Say how the second of two points or vectors comes into the frame of the first."""
+    over = _looked_up(left.type.target, right.type.target, trees)
+    if over is None:
+        return f"; a lookup between them is missing: {_arrow(left.type.target, right.type.target)}"
+    return f"; bring the second over: ({over}) * {right.bracketed}"
+
+
+def _arrow(target: str | None, source: str | None) -> str:
+    return f"{frame_text(target)}<-{frame_text(source)}"
+
+
+def _looked_up(target: str | None, source: str | None, trees: Iterable[tuple[str, Frames]]) -> str | None:
+    """Return a look-up of one of some trees, by name, that knows both frames; None where none does."""
+    for name, tree in trees:
+        if target in tree.frames and source in tree.frames and _connected(tree, target, source):
+            return f"{name}[{_arrow(target, source)}]" if name else _arrow(target, source)
+    return None
+
+
+def _connected(tree: Frames, target: str | None, source: str | None) -> bool:
+    """Tell whether a tree knows where one frame is seen from another."""
+    from frametool.errors import LookupFailed
+
+    try:
+        tree.lookup_components(str(target), str(source))
+    except LookupFailed:
+        return False
+    return True
+
+
+def refuse_frames(left: Term, right: Term) -> str:
+    """Name the two frames that do not touch."""
+    return f"{shown(left.type.source)} and {shown(right.type.target)} do not touch"
+
+
+def in_radians(term: Term) -> Term:
+    """Return an angle with its number in radians."""
+    if not term.type.degrees:
+        return term
+    return made(term.type._replace(degrees=False), lambda angle: (angle * TO_RADIANS,), term, functions=False)
+
+
+def wanted(term: Term) -> Term:
+    """Refuse a tree or a list where one value is wanted."""
+    if term.type.kind == TREE:
+        raise CalcError(f"{term.text} is a tree; ask it: {term.text}[TARGET<-SOURCE]")
+    if term.type.kind == LIST:
+        raise CalcError(f"{term.text} is a list of {len(term.items)}; only mean(..) takes one")
+    return term
+
+
+def common(left: Term, right: Term, trees: Trees) -> str | None:
+    """Return the one frame that two points or vectors are seen in."""
+    a, b = left.type, right.type
+    if not meet(a.target, b.target):
+        hint = for_other_frame(left, right, trees)
+        raise CalcError(f"{a.named} and {b.named}: both must be seen from one frame{hint}")
+    return a.target if a.target is not None else b.target
+
+
+def same_frames(terms: Sequence[Term], what: str) -> Type:
+    """Return the frames that all of some poses have; refuse poses of different ones."""
+    first = terms[0]
+    type_ = first.type
+    for term in terms[1:]:
+        other = term.type
+        if not (meet(type_.target, other.target) and meet(type_.source, other.source)):
+            hint = for_same_frames(first, term)
+            raise CalcError(f"{what} needs two poses of the same frames, found {type_} and {other}{hint}")
+        type_ = Type(
+            POSE,
+            other.target if type_.target is None else type_.target,
+            other.source if type_.source is None else type_.source,
+        )
+    return type_
+
+
+def one_target(left: Term, right: Term, what: str, trees: Trees) -> None:
+    """Refuse two poses that are not seen from one frame; whose poses they are may differ."""
+    if not meet(left.type.target, right.type.target):
+        hint = for_one_target(left, right, trees)
+        raise CalcError(f"{what} compares two poses seen from one frame, found {left.type} and {right.type}{hint}")
+
+
+def plain_angle(term: Term, what: str) -> Term:
+    """Take an angle, or a plain number as radians."""
+    if term.type.kind != NUMBER or term.type.unit not in (PLAIN, RADIAN):
+        raise CalcError(f"{what} takes an angle, found {term.type.named}")
+    return term
+
+
+def plain_number(term: Term, what: str) -> Term:
+    """Take a number without a unit."""
+    if term.type.kind != NUMBER or term.type.unit != PLAIN:
+        raise CalcError(f"{what} takes a plain number, found {term.type.named}")
+    return term
+
+
+def need(term: Term, kinds: Sequence[str], what: str) -> Term:
+    """Refuse a value of another kind."""
+    if term.type.kind not in kinds:
+        articles = " or ".join(f"a {kind}" if kind != ANGLES else kind for kind in kinds)
+        raise CalcError(f"{what}() takes {articles}, found {term.type.named}")
+    return term
+
+
+PLACED = (POINT, VECTOR)
+
+
+def plus(a: Number, b: Number) -> Components:
+    """Return the sum of two numbers."""
+    return (a + b,)
+
+
+def minus(a: Number, b: Number) -> Components:
+    """Return the difference of two numbers."""
+    return (a - b,)
+
+
+def _plus_all(*parts: Number) -> Components:
+    half = len(parts) // 2
+    return tuple(a + b for a, b in zip(parts[:half], parts[half:], strict=True))
+
+
+def _minus_all(*parts: Number) -> Components:
+    half = len(parts) // 2
+    return tuple(a - b for a, b in zip(parts[:half], parts[half:], strict=True))
+
+
+def _scaled(factor: Number, *vector: Number) -> Components:
+    return tuple(factor * part for part in vector)
+
+
+def _product(a: Number, b: Number) -> Components:
+    return (a * b,)
+
+
+def _quotient(a: Number, b: Number) -> Components:
+    return (a / b,)
+
+
+def _turned(*parts: Number) -> Components:
+    return quaternion.rotate(*parts[3:])
+
+
+def _no_division(*parts: float) -> str:
+    return "division by zero" if parts[-1] == 0.0 else ""
+
+
+# --- products ---
+
+
+def times(left: Term, right: Term, trees: Trees) -> Term:
+    """Multiply: poses whose frames touch, a pose and what it moves, numbers, a number and a vector."""
+    a, b = left.type.kind, right.type.kind
+    if a == b == POSE:
+        return _composed(left, right, trees)
+    if a == POSE and b in PLACED:
+        return _moved(left, right, trees)
+    if a == b == NUMBER:
+        unit = _added(left.type.unit, right.type.unit)
+        if PLAIN in (left.type.unit, right.type.unit):  # degrees stay degrees
+            return made(Type(NUMBER, unit=unit, degrees=left.type.degrees or right.type.degrees), _product, left, right,
+                        functions=False)  # fmt: skip
+        return made(Type(NUMBER, unit=unit), _product, in_radians(left), in_radians(right), functions=False)
+    if {a, b} == {NUMBER, VECTOR}:
+        number, vector = (left, right) if a == NUMBER else (right, left)
+        _require_scale(number)
+        return made(vector.type, _scaled, number, vector, functions=False)
+    if POSE in (a, b) and NUMBER in (a, b):
+        raise CalcError("a pose cannot be multiplied by a number; its part is pose ^ 0.5")
+    if b == POSE and a in PLACED:
+        raise CalcError(f"the pose stands on the left: {right.type} * {a}")
+    if {a, b} == {NUMBER, POINT}:
+        raise CalcError("a point cannot be multiplied by a number; a direction is vector([x, y, z])")
+    raise CalcError(f"cannot multiply {left.type.named} by {right.type.named}")
+
+
+def _composed(left: Term, right: Term, trees: Trees) -> Term:
+    a, b = left.type, right.type
+    if not meet(a.source, b.target):
+        raise CalcError(f"{a} * {b}: {refuse_frames(left, right)}; {for_product(left, right, trees)}")
+    return made(Type(POSE, a.target, b.source), rigid.compose, left, right, functions=False)
+
+
+def _moved(pose: Term, point: Term, trees: Trees) -> Term:
+    a, b = pose.type, point.type
+    if not meet(a.source, b.target):
+        what = f"{b.kind}s"
+        hint = for_point(pose, point, trees).replace("points", what)
+        raise CalcError(f"{a} takes {what} in {shown(a.source)}, found one in {shown(b.target)}; {hint}")
+    kernel = rigid.apply if b.kind == POINT else _turned
+    return made(Type(b.kind, a.target), kernel, pose, point, functions=False)
+
+
+def _require_scale(number: Term) -> None:
+    if number.type.unit not in (PLAIN, METRE):
+        raise CalcError(f"a vector is scaled by a plain number or a length, found {number.type.named}")
+
+
+def _added(a: Dimension, b: Dimension) -> Dimension:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def over(left: Term, right: Term) -> Term:
+    """Divide by a number."""
+    a, b = left.type, right.type
+    if b.kind != NUMBER:
+        hint = f"; for poses: inv({right.text}) * {left.bracketed}" if a.kind == b.kind == POSE else ""
+        raise CalcError(f"cannot divide by {b.named}{hint}")
+    if a.kind == NUMBER:
+        unit = _added(a.unit, (-b.unit[0], -b.unit[1], -b.unit[2]))
+        if b.unit == PLAIN or (a.degrees and b.degrees):
+            type_ = Type(NUMBER, unit=unit, degrees=a.degrees and not b.degrees)
+            return made(type_, _quotient, left, right, functions=False, check=_no_division)
+        return made(Type(NUMBER, unit=unit), _quotient, in_radians(left), in_radians(right), functions=False,
+                    check=_no_division)  # fmt: skip
+    if a.kind == VECTOR:
+        _require_scale(right)
+        return made(a, lambda *parts: tuple(each / parts[3] for each in parts[:3]), left, right, functions=False,
+                    check=_no_division)  # fmt: skip
+    hint = "; its part is pose ^ 0.5" if a.kind == POSE else "; a direction is vector([x, y, z])" * (a.kind == POINT)
+    raise CalcError(f"cannot divide {a.named} by a number{hint}")
+
+
+# --- sums ---
+
+
+def add(left: Term, right: Term, trees: Trees) -> Term:
+    """Add what can be added."""
+    return _sum(left, right, trees, adding=True)
+
+
+def subtract(left: Term, right: Term, trees: Trees) -> Term:
+    """Subtract what can be subtracted."""
+    return _sum(left, right, trees, adding=False)
+
+
+def _sum(left: Term, right: Term, trees: Trees, *, adding: bool) -> Term:
+    a, b = left.type, right.type
+    verb, sign = ("add", "+") if adding else ("subtract", "-")
+    if a.kind == b.kind == NUMBER:
+        if a.unit != b.unit:
+            raise CalcError(f"cannot {verb} {a.named} and {b.named}")
+        kernel = plus if adding else minus
+        if a.degrees and b.degrees:
+            return made(a, kernel, left, right, functions=False)
+        return made(a._replace(degrees=False), kernel, in_radians(left), in_radians(right), functions=False)
+    if a.kind in PLACED and b.kind in PLACED:
+        frame = common(left, right, trees)
+        kind = _kind_of_sum(a, b, adding=adding)
+        return made(Type(kind, frame), _plus_all if adding else _minus_all, left, right, functions=False)
+    if a.kind == b.kind == TWIST:
+        frame = common(left, right, trees)
+        return made(Type(TWIST, frame), _plus_all if adding else _minus_all, left, right, functions=False)
+    if POSE in (a.kind, b.kind):
+        raise CalcError(f"poses are composed with *, not {sign}; the difference of two is inv(a) * b")
+    raise CalcError(f"cannot {verb} {a.named} and {b.named}")
+
+
+def _kind_of_sum(a: Type, b: Type, *, adding: bool) -> str:
+    """Return what a sum or difference of points and vectors is."""
+    if a.kind == b.kind == POINT:
+        if adding and (a.target is not None or b.target is not None):
+            raise CalcError("the sum of two points depends on the origin; subtract them, or use mean(..)")
+        return POINT if adding else VECTOR
+    if a.kind == VECTOR and b.kind == POINT and not adding:
+        raise CalcError("a point cannot be subtracted from a vector; point - vector is a point")
+    return VECTOR if a.kind == b.kind else POINT
+
+
+def negated(term: Term) -> Term:
+    """Return the negative of a number, a vector or a twist."""
+    kind = term.type.kind
+    if kind == POSE:
+        raise CalcError("a pose has no negative; inv(..) is its inverse")
+    if kind == POINT and term.type.target is not None:
+        raise CalcError("a point in a frame has no negative; a direction is vector(..)")
+    if kind not in (NUMBER, VECTOR, TWIST, POINT):
+        raise CalcError(f"{term.type.named} has no negative")
+    return made(term.type, lambda *parts: tuple(0.0 - part for part in parts), term, functions=False)
+
+
+def unsigned(term: Term) -> Term:
+    """Take what a plus stands before."""
+    if term.type.kind == POSE:
+        raise CalcError("a pose has no sign; leave the + out")
+    return term
+
+
+# --- powers and frames ---
+
+
+def inverse(term: Term) -> Term:
+    """Return b<-a of a<-b."""
+    return made(Type(POSE, term.type.source, term.type.target), rigid.inverse, term, functions=False)
+
+
+def power(base: Term, exponent: Term) -> Term:
+    """Raise a number to a power, or take a part of a pose's screw motion: exp(f log); -1 is the inverse."""
+    a, b = base.type, exponent.type
+    if b.kind != NUMBER or b.unit != PLAIN:
+        raise CalcError(f"an exponent is a plain number, found {b.named}")
+    known = exponent.parts[0] if exponent.parts is not None else None
+    if type(known) is not float:
+        known = None
+    if a.kind == POSE:
+        if known == -1.0:
+            return inverse(base)
+        if known == 1.0:
+            return base.typed(a)
+        return made(Type(POSE, a.target), _part_of_motion, base, exponent)
+    if a.kind != NUMBER:
+        raise CalcError(f"{a.named} has no powers; poses and numbers have")
+    if a.unit == PLAIN:
+        return made(a, _powered, base, exponent, check=_no_power)
+    if known is None:
+        raise CalcError(f"the exponent of {a.named} must be a number that is known")
+    unit = (a.unit[0] * known, a.unit[1] * known, a.unit[2] * known)
+    return made(Type(NUMBER, unit=unit), _powered, in_radians(base), exponent, check=_no_power)
+
+
+def _part_of_motion(
+    tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, fraction: Number, xp: Namespace
+) -> Components:
+    vx, vy, vz, wx, wy, wz = rigid.log(tx, ty, tz, *quaternion.unit(x, y, z, w, xp), xp)
+    f = fraction
+    return rigid.exp(f * vx, f * vy, f * vz, f * wx, f * wy, f * wz, xp)
+
+
+def with_unit(pose: Sequence[Number], xp: Namespace) -> Rigid:
+    """Return a pose with its quaternion made unit, which products keep only to some eps."""
+    tx, ty, tz, x, y, z, w = pose
+    return tx, ty, tz, *quaternion.unit(x, y, z, w, xp)
+
+
+def _powered(base: Number, exponent: Number, xp: Namespace) -> Components:
+    if xp is floats:
+        result = base**exponent
+        return (float(result),) if not isinstance(result, complex) else (float("nan"),)
+    return (base**exponent,)
+
+
+def _no_power(base: float, exponent: float) -> str:
+    if base == 0.0 and exponent < 0.0:
+        return "division by zero"
+    if base < 0.0 and exponent != int(exponent):
+        return f"{base:g} has no power {exponent:g}"
+    return ""
+
+
+def as_frames(term: Term, target: str | None, source: str | None) -> Term:
+    """Return a pose with both its frames."""
+    type_ = term.type
+    if type_.kind != POSE:
+        raise CalcError(f"only a pose has two frames; found {type_.named}")
+    if not (meet(type_.target, target) and meet(type_.source, source)):
+        raise CalcError(f"this is {type_} already")
+    return term.typed(type_._replace(target=target, source=source))
+
+
+def in_frame(term: Term, frame: str) -> Term:
+    """Say what frame a point, a vector, a twist or angles are seen in."""
+    type_ = term.type
+    if type_.kind not in (POINT, VECTOR, TWIST, ANGLES):
+        hint = "; a pose has two: .. as TARGET<-SOURCE" if type_.kind == POSE else ""
+        raise CalcError(f"in names the frame of a point or vector; found {type_.named}{hint}")
+    if not meet(type_.target, frame):
+        moved = f"({frame_text(frame)}<-{frame_text(type_.target)}) * .."
+        raise CalcError(f"this is in {shown(type_.target)} already; to move it: {moved}")
+    return term.typed(type_._replace(target=frame))
+
+
+def list_of_numbers(items: Sequence[Term]) -> Term:
+    """Return the point of three numbers, or the twist of six."""
+    if len(items) not in (3, 6):
+        numbers = "1 number" if len(items) == 1 else f"{len(items)} numbers"
+        hint = "a point has 3, a twist 6; rotations say what they are: {rpy_deg: [..]}"
+        raise CalcError(f"a list of {numbers}; {hint}")
+    units = [METRE] * 3 + [RADIAN] * 3
+    for term, unit in zip(items, units, strict=False):
+        if term.type.unit not in (PLAIN, unit):
+            what = "a point is in metres" if len(items) == 3 else "a twist is three lengths, then three angles"
+            raise CalcError(f"{what}, found {term.type.named}")
+    kind = POINT if len(items) == 3 else TWIST
+    return made(Type(kind), lambda *parts: parts, *map(in_radians, items), functions=False)

@@ -1,0 +1,335 @@
+"""A batch: commands one after the other in one process, each as it would run alone in a pipe.
+
+The lines of a batch as they come: each with its number, its words, and the name under which its result is kept.
+
+Results that a batch keeps under names instead of printing them, as the text that then stands for them.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import sys
+from contextlib import contextmanager, redirect_stdout
+from io import BytesIO, TextIOWrapper
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from frametool.cli import TROUBLE, TROUBLES, words_of
+from frametool.cli.group import answered, called, called_in, group
+from frametool.cli.shell_words import NAME, Words, split
+from frametool.cli.stderr import BatchLine, say_error, telling_of, wants_json
+from frametool.cli.trees import TreeCache
+from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
+from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, alternatives
+from frametool.grammar.rotation_spelling import ROTATION_KEYS
+from frametool.stream.faults import ROWS_SKIPPED, Misused, RowsSkipped
+from frametool.stream.record import PARTS, POINT_KEYS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import BinaryIO
+
+MOST_JOINED = 1000  # lines of one command
+_ASSIGNMENT = re.compile(rf"[ \t]*({NAME})[ \t]*=[ \t]*")
+
+
+class CommandLine(NamedTuple):
+    """A command of a batch.
+
+    number: of its first line
+    name: what its result is kept as; "" if it is printed
+    words: those of the command; without any, the line is blank or a comment
+    """
+
+    number: int
+    name: str
+    words: Words
+
+
+def command_lines(stream: BinaryIO, source: str) -> Iterator[CommandLine]:
+    """Yield the commands of a batch, each as soon as its last line is there.
+
+    Raises FormatError for what is no text of lines at all.
+    """
+    lines = _lines(stream, source)
+    for number, text, problem in lines:
+        yield _command_line(number, text, problem, lines, source)
+
+
+def _command_line(
+    number: int, text: str, problem: str, lines: Iterator[tuple[int, str, str]], source: str
+) -> CommandLine:
+    """Return the command that begins in a line, with the lines that a backslash joins to it."""
+    name, words = _taken_apart(text)
+    joined = 1
+    while words.goes_on and not problem:
+        _, more, problem = next(lines, (0, "", ""))
+        text = text[:-1] + more
+        joined += 1
+        if joined > MOST_JOINED:
+            raise FormatError(f"a command of more than {MOST_JOINED} lines", source=source, line=number)
+        name, words = _taken_apart(text)
+    return CommandLine(number, name, Words([], problem) if problem else words)
+
+
+def _taken_apart(text: str) -> tuple[str, Words]:
+    """Return the name before `=`, if there is one, and the words behind it."""
+    found = _ASSIGNMENT.match(text)
+    if found is None:
+        return "", split(text)
+    words = split(text[found.end() :])
+    if not (words.words or words.problem or words.goes_on):
+        words = Words([], f"no command behind {found[1]} =")
+    return found[1], words
+
+
+def _lines(stream: BinaryIO, source: str) -> Iterator[tuple[int, str, str]]:
+    """Yield the number of each line, its text without its end, and what is wrong with its bytes."""
+    number = 0
+    while data := stream.readline(MOST_CHARACTERS + 1):
+        number += 1
+        if number == 1 and data.startswith(UTF16):
+            raise FormatError("UTF-16; lines are read as UTF-8: iconv -f UTF-16 -t UTF-8", source=source)
+        if len(data) > MOST_CHARACTERS:
+            raise FormatError(f"a line of more than {MOST_CHARACTERS} bytes", source=source, line=number)
+        try:
+            yield number, decode(data, source).rstrip("\r\n"), ""
+        except FormatError as error:
+            yield number, "", error.message
+
+
+OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
+OF_RECORDS = {*POINT_KEYS, *ROTATION_KEYS, *PARTS, "x", "y", "z"}
+READABLE = ("json", "yaml")  # the same numbers; other forms are for printing
+KEPT_ARE = "a name keeps one pose, point, number or tree"
+
+
+class KeptResults:
+    """The results of lines `NAME = COMMAND`."""
+
+    def __init__(self) -> None:
+        """Create it without any."""
+        self._texts: dict[str, str] = {}
+        self._lost: dict[str, int] = {}
+
+    def value_of(self, name: str) -> str:
+        """Return what stands for a name; raise Misused for one that has no value."""
+        if name in self._texts:
+            return self._texts[name]
+        if name in self._lost:
+            raise Misused(f"${name} has no value: line {self._lost[name]}, which sets it, has failed")
+        known = alternatives(name, self._texts, "names") if self._texts else "; no line before has kept a result"
+        shells = "variables of the shell are not known here" if name in os.environ else "a dollar sign is $$"
+        raise Misused(f"unknown name ${name}{known}; {shells}")
+
+    def keep(self, name: str, text: str) -> None:
+        """Keep a result that was printed as JSON."""
+        _refuse_other_results(name, text)
+        self._texts[name] = text.strip()
+        self._lost.pop(name, None)
+
+    def lose(self, name: str, line: int) -> None:
+        """Forget what a name stood for: the line that sets it has failed."""
+        self._texts.pop(name, None)
+        self._lost[name] = line
+
+
+def _refuse_other_results(name: str, text: str) -> None:
+    """Raise ValueInvalid for what is not one pose, point, number or tree."""
+    lines = text.count("\n")
+    if lines != 1:
+        raise ValueInvalid(f"{name}: the command has {lines or 'no'} result{'s' * (lines != 1)}; {KEPT_ARE}")
+    try:
+        value = json.loads(text)
+    except ValueError:
+        raise ValueInvalid(f"{name}: the result is text; {KEPT_ARE}") from None
+    keys = set(value) if isinstance(value, dict) else set()
+    if not (isinstance(value, float | int) or keys & OF_TREES or keys & OF_RECORDS):
+        raise ValueInvalid(f"{name}: the result is a report; {KEPT_ARE}")
+
+
+def print_as_json(name: str, context: click.Context) -> None:
+    """Let a command that is about to run print what can be kept; raise Misused where it cannot."""
+    formats: Any = next((each.type for each in context.command.params if each.name == "format_name"), None)
+    if "json" not in getattr(formats, "choices", ()):
+        raise Misused(f"{name}: {context.info_name} has no result that can be kept; {KEPT_ARE}")
+    params = context.params
+    for param, option in (("output", "-o FILE"), ("explain", "--explain"), ("explain_full", "--explain-full")):
+        if params.get(param):
+            raise Misused(f"{name}: a result is kept or written, not both; leave {option} or {name} = out")
+    if params["format_name"] not in (None, *READABLE):
+        raise Misused(f"{name}: -f {params['format_name']} is for printing, and {name} is kept; leave it out")
+    params["format_name"] = "json"
+
+
+@contextmanager
+def captured() -> Iterator[BytesIO]:
+    """Yield what takes everything that is printed in the block."""
+    held = _Limited()
+    stream = TextIOWrapper(held, "utf-8")
+    try:
+        with redirect_stdout(stream):
+            yield held
+            sys.stdout.flush()
+    finally:
+        stream.detach()
+
+
+class _Limited(BytesIO):
+    """Bytes, no more of them than a document may have."""
+
+    def write(self, data: Any) -> int:
+        """Take some more."""
+        if self.tell() + len(data) > MOST_CHARACTERS:
+            raise ValueInvalid(f"a result of more than {MOST_CHARACTERS} bytes; {KEPT_ARE}")
+        return super().write(data)
+
+
+FINISHED = (0, ROWS_SKIPPED)  # a command that skipped rows, as it was told to, has come to its end
+ENDLESS = ("--realtime", "--live", "teleop", "--duration=inf")
+NO_INPUT = "standard input is not for the lines of a batch; name a file, or keep a result by NAME = and give $NAME"
+
+
+class LineFailed(FrametoolError):
+    """Report a command that said itself what is wrong, by its status."""
+
+
+class CommandBatch:
+    """The commands of a batch, and what they leave for those behind them: kept results, trees, the exit status.
+
+    source: the batch as messages name it
+    skips: go on behind a line that fails
+    """
+
+    def __init__(self, source: str, *, skips: bool) -> None:
+        """Create a batch of which nothing has run."""
+        self.source = source
+        self.skips = skips
+        self.results = KeptResults()
+        self.context = click.Context(group, info_name="frametool", obj=TreeCache())
+        self.count = self.failed = self.status = 0
+        self.in_json = True  # as all lines that failed wanted their errors
+
+    def run(self, stream: BinaryIO) -> int:
+        """Run the commands of a stream as they come and return the exit status of all."""
+        with _without_input(), _as_in_a_pipe():
+            for line in command_lines(stream, self.source):
+                if not (line.words.words or line.words.problem):
+                    continue
+                self.count += 1
+                status = self._run_line(line)
+                if status in FINISHED:
+                    self.status = self.status or status
+                elif self.skips:
+                    self.failed += 1
+                else:
+                    return status
+        if not self.failed:
+            return self.status
+        message = f"{self.source}: {self.failed} of {self.count} lines skipped"
+        say_error(RowsSkipped(message, source=self.source, bad=self.failed, rows=self.count), in_json=self.in_json)
+        return ROWS_SKIPPED
+
+    def _run_line(self, line: CommandLine) -> int:
+        """Run one command and tell what goes wrong; return its status."""
+        words: list[str] = []
+        status = 0
+        problem: FrametoolError
+        with telling_of(BatchLine(self.source, line.number)):
+            try:
+                if line.words.problem:
+                    raise Misused(line.words.problem)
+                words = line.words.with_values(self.results.value_of)
+                status = self._printed(words) if not line.name else self._kept(line.name, words)
+                if status in FINISHED:
+                    return status
+                problem = LineFailed(f"{words[0]} ended with status {status}", status=status)
+            except BrokenPipeError:
+                raise
+            except FrametoolError as error:
+                problem = error
+            except TROUBLES as error:
+                problem = FileProblem(words_of(error))
+            if line.name:
+                self.results.lose(line.name, line.number)
+            self.in_json &= (in_json := wants_json(words))
+            say_error(problem, in_json=in_json, fate="line skipped" if self.skips else "")
+        return status or TROUBLE.get(words[0] if words else "", problem.exit_code)
+
+    def _printed(self, words: Sequence[str], name: str = "") -> int:
+        """Call a command; with a name for its result in a form that can be kept."""
+        _refuse(words)
+
+        def prepare(context: click.Context) -> None:
+            if name:
+                print_as_json(name, context)
+
+        self.context.meta.clear()
+        if words[0].startswith("-") and not name:  # options of frametool itself
+            return answered(lambda: called(list(words)), words)
+        return answered(lambda: called_in(self.context, words, prepare), words)
+
+    def _kept(self, name: str, words: Sequence[str]) -> int:
+        """Call a command and keep what it prints."""
+        with captured() as held:
+            status = self._printed(words, name)
+        if status in FINISHED:
+            self.results.keep(name, held.getvalue().decode())
+        return status
+
+
+def _refuse(words: Sequence[str]) -> None:
+    """Raise Misused for a command that has no place in a batch."""
+    if words[0] == "batch":
+        raise Misused("a batch runs no batch; put the lines of that one here")
+    if words[0] == "frametool":
+        raise Misused("a line is what stands behind frametool; leave that word out")
+    endless = next((each for each in words if each in ENDLESS), "")
+    if words[0] == "sim" and (endless or "--duration inf" in " ".join(words)):
+        raise Misused(f"sim {endless or '--duration inf'} keeps the lines behind it waiting; run it alone")
+
+
+@contextmanager
+def _without_input() -> Iterator[None]:
+    """Keep commands from standard input, which holds their own lines or belongs to none of them."""
+    before = sys.stdin
+    sys.stdin = _NoInput()
+    try:
+        yield
+    finally:
+        sys.stdin = before
+
+
+class _NoInput(io.TextIOBase):
+    """A standard input that refuses whoever reads from it."""
+
+    @property
+    def buffer(self) -> BinaryIO:
+        """Raise Misused."""
+        raise Misused(NO_INPUT)
+
+
+@contextmanager
+def _as_in_a_pipe() -> Iterator[None]:
+    """Let commands print into a terminal as they print into a pipe."""
+    if not sys.stdout.isatty():
+        yield
+        return
+    stream = _Pipe(sys.stdout.buffer, "utf-8")
+    try:
+        with redirect_stdout(stream):
+            yield
+    finally:
+        stream.detach()
+
+
+class _Pipe(io.TextIOWrapper):
+    """A standard output that is taken for no terminal."""
+
+    def isatty(self) -> bool:
+        """Return that it is none."""
+        return False

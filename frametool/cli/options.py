@@ -1,0 +1,576 @@
+"""What all commands share: negative numbers as arguments, the options of every result, where it is written.
+
+What the shell offers in the place of names that are in no list of choices: axes, and columns of the input.
+
+The options about files of frames, which `frametool.cli.trees` heeds; adding them to a command reads nothing yet.
+
+Times on the command line: decimal seconds or nanoseconds, `latest`, ranges and files; never through a float.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from frametool.cli.group import Reused, WithHelp
+from frametool.cli.stderr import as_json, say, say_error, tell
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
+from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, readers, writers
+from frametool.frames.stamps import NotATime, parse_stamp, whole_stamp
+from frametool.geometry.euler import AXES
+from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
+from frametool.text.numbers import parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+
+    from click.shell_completion import CompletionItem
+
+    from frametool.formats.load import Rules
+    from frametool.geometry.representations import Notation
+    from frametool.grammar.result import Result
+
+    Function = TypeVar("Function", bound=Callable[..., Any])
+
+# an argument that begins like this is a number, whatever short options there are
+NEGATIVE = re.compile(
+    r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)", re.IGNORECASE
+)
+STREAMED = ("records", "rows", "arrays")
+READ = readers("tree", "records", "rows", "arrays", "joints")
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
+
+
+class Command(WithHelp, Reused):
+    """A command whose arguments may be negative numbers.
+
+    click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
+    own check of misspelled options; `Text` takes the blank off again.
+    """
+
+    exit_codes = EXIT_CODES
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Shield negative numbers (-j is an option where joints are), give a bare --explain its form, then parse."""
+        if any(map(NEGATIVE.match, args)):
+            options = {name for each in self.get_params(ctx) for name in each.opts}
+            args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
+        return super().parse_args(ctx, _with_form(args) if "--explain" in args else args)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """End every help with the exit codes."""
+        super().format_epilog(ctx, formatter)
+        formatter.write_paragraph()
+        formatter.write_text(self.exit_codes)
+
+
+def _with_form(args: list[str]) -> list[str]:
+    """Join --explain with the form behind it, or with `text`: click would take any argument there for its value."""
+    joined: list[str] = []
+    for each in args:
+        if joined and joined[-1] == "--explain":
+            is_form = each in ("text", "markdown", "latex")
+            joined[-1] = f"--explain={each if is_form else 'text'}"
+            if is_form:
+                continue
+        joined.append(each)
+    return [f"{each}=text" if each == "--explain" else each for each in joined]
+
+
+class Text(click.ParamType[str]):
+    """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+        """Remove the blank."""
+        return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
+
+
+class Utf8(Text):
+    """Text that will be part of a result."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse bytes that are no text."""
+        if any("\ud800" <= each <= "\udfff" for each in str(value)):
+            self.fail(f"{shown(value)} is not UTF-8 text", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class File(Text):
+    """A file's name, which the shell completes."""
+
+    name = "file"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Leave it to the shell."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+
+class Number(Text):
+    """A finite number."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read it as documents read theirs."""
+        try:
+            return parse_number(super().convert(value, param, ctx)) if isinstance(value, str) else value
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+
+
+FULL = -1  # digits: as many as the number has
+
+
+class Digits(Text):
+    """How many digits stand after the point: a number, or `full`."""
+
+    name = "digits"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Take the word for all, or count."""
+        return FULL if value in ("full", FULL) else click.IntRange(0, 30).convert(value, param, ctx)
+
+
+class Notations(click.ParamType["tuple[Notation, ...]"]):
+    """Names of representations, separated by commas."""
+
+    name = "rep[,rep..]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Notation, ...]:
+        """Look each name up."""
+        if not isinstance(value, str):
+            return tuple(value)
+        try:
+            chosen = tuple(form for spec in value.split(",") for form in notations(spec.strip()))
+            for form in chosen:
+                form.bound_axes()  # euler without its axes is refused before any work
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+        return chosen
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Complete the last name of the list."""
+        from click.shell_completion import CompletionItem
+
+        done, comma, begun = incomplete.rpartition(",")
+        names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
+        spec = begun.partition(":")[0]
+        if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
+            names += [f"{spec}:{axes}" for axes in ("all", *AXES)]
+        return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
+
+
+TEXT = Text()
+UTF8 = Utf8()
+FILE = File()
+VERBOSE = "frametool.verbose"  # where a command's context keeps that -v was given
+
+
+def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:
+    context.meta[VERBOSE] = chosen
+
+
+verbose_option = click.option(
+    "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
+    help="say what each input was taken for",
+)  # fmt: skip
+
+
+READING = "frametool.reading"  # where a command's context keeps the options about files of frames
+TREES_OPENED = "frametool.trees_opened"  # set in a command's context once it reads files of frames
+FORMS = "frametool.forms"  # where a command's context keeps those of --in
+
+
+class Form(Text):
+    """The name of a form of text, of any or of those from which something is read."""
+
+    name = "form"
+
+    def __init__(self, names: Collection[str], are: str) -> None:
+        """Keep the forms that may be named, and what they are in an error: `read`, `known`."""
+        self.names = names
+        self.are = are
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse what is none, with the nearest name; of a form that is known and not read, say what to do."""
+        if value not in self.names:
+            self.fail(self._problem(value), param, ctx)
+        return value
+
+    def _problem(self, value: str) -> str:
+        if value in FORMATS and (instead := FORMATS[value].instead):
+            return f"{value} ({FORMATS[value].summary}) is not read: {instead}"
+        near = did_you_mean(value, self.names)
+        return f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Offer the forms."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(name, help=FORMATS[name].summary) for name in self.names if name.startswith(incomplete)]
+
+
+def _keep_forms(context: click.Context, _: click.Parameter, chosen: Sequence[str]) -> None:
+    context.meta[FORMS] = chosen
+
+
+def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
+    """Return the forms that --in names for files of frames, in their order, and the form of the stream.
+
+    streams: there is a stream; its form is the last one that can be streamed, "" if there is none
+    """
+    context = click.get_current_context(silent=True)
+    told = [] if context is None else list(context.meta.get(FORMS, ()))
+    streamed = [form for form in told if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
+    if not streamed:
+        return told, ""
+    last = len(told) - 1 - told[::-1].index(streamed[-1])
+    return told[:last] + told[last + 1 :], streamed[-1]
+
+
+in_option = click.option(
+    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM", expose_value=False,
+    callback=_keep_forms,
+    help="form of the input (`frametool formats`), once a file",
+)  # fmt: skip
+
+
+def say_if_verbose(text: str) -> None:
+    """Write a line on stderr if the command was called with -v."""
+    context = click.get_current_context(silent=True)
+    if context is not None and context.meta.get(VERBOSE):
+        say(text)
+
+
+_PRECISION = click.option(
+    "--precision", type=Digits(), metavar="N|full",
+    help="digits after the point  [default: full; overviews 6]",
+)  # fmt: skip
+_PLACE = (
+    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
+    click.option("--force", is_flag=True, help="let --output replace a file"),
+)
+
+
+def result_options(*what: str) -> Callable[[Function], Function]:
+    """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
+    form = click.option(
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers(*what))),
+        help="form of the result",
+    )  # fmt: skip
+    return lambda function: decorated(function, (form, _PRECISION, *_PLACE))
+
+
+def list_options(*more: str) -> Callable[[Function], Function]:
+    """Add to a command the options that shape and place a list for people, which is text wherever it goes.
+
+    more: forms beside text and those of reports
+    """
+    form = click.option(
+        "-f", "--format", "format_name", type=click.Choice(("text", *writers("report"), *more)),
+        help="form of the result  [default: text]",
+    )  # fmt: skip
+    return lambda function: decorated(function, (form, *_PLACE))
+
+
+def rotation_options(function: Function) -> Function:
+    """Add to a command the options that choose how rotations are written."""
+    return decorated(
+        function,
+        [
+            click.option(
+                "--to",
+                "notations",
+                type=Notations(),
+                metavar="REP[,REP..]",
+                help="representations of the result  [default: quaternion]",
+            ),
+            click.option("--deg", is_flag=True, help="angles in degrees"),
+            click.option(
+                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"
+            ),
+        ],
+    )
+
+
+def pose_options(function: Function) -> Function:
+    """Add to a command the options that say how poses are read; they come beside `rotation_options`."""
+    return click.option(
+        "--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation"
+    )(function)
+
+
+def decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
+    """Add several options to a command, in this order in its help."""
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+class AxesName(Text):
+    """A convention of axes, or the change from one to another: A_from_B."""
+
+    name = "axes"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Offer the conventions; behind `_from_` those it may come from."""
+        from frametool.geometry.conventions import AXES, MIRRORED
+
+        begun, joint, _ = incomplete.partition("_from_")
+        known = {name: about for name, (_, about) in AXES.items()} | dict.fromkeys(MIRRORED, "mirrored")
+        offered = {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
+        return _items(offered.items(), incomplete)
+
+
+class ColumnNames(Text):
+    """Columns of the input, or keys of its records, with commas between them."""
+
+    name = "name"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Offer those of the file that -i names."""
+        done, comma, begun = incomplete.rpartition(",")
+        path = ctx.params.get("input_path")
+        found = _names_in(str(path)) if path and path != "-" else []
+        return _items(((done + comma + name, "") for name in found), done + comma + begun)
+
+
+def _items(offered: Iterable[tuple[str, str]], begun: str) -> list[CompletionItem]:
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(name, help=about or None) for name, about in offered if name.startswith(begun)]
+
+
+def _names_in(path: str) -> list[str]:
+    """Return the names of a table's columns, or the outermost keys of records; none for what cannot be read."""
+    from frametool.documents.source import HEAD
+    from frametool.errors import FrametoolError
+    from frametool.formats.detect import Beginning, detect
+    from frametool.stream.table import open_table
+    from frametool.stream.table_stream import DELIMITERS
+
+    try:
+        with open(path, "rb") as file:
+            head = file.read(HEAD)
+        form, _ = detect(head, "rows", "records", name=path)
+        if form not in DELIMITERS:
+            return sorted(".".join(each) for each in Beginning(head).json_paths)
+        return list(open_table(head, DELIMITERS[form], header=True, source=path)[0].names or ())
+    except (OSError, FrametoolError):
+        return []  # nothing to offer, and a completion must not print
+
+
+def _keep(context: click.Context, option: click.Parameter, chosen: Any) -> None:
+    context.meta.setdefault(READING, {})[option.name] = chosen
+
+
+def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
+    """Add to a command the options that say how files of frames are read; `opened` heeds them.
+
+    streams: the command has those of streams too, `--in` and `--quiet` among them
+    """
+    own = () if streams else (in_option, _quiet_option)
+    return lambda function: decorated(function, (*own, *_READING_OPTIONS))
+
+
+def _option(*names: str, **rest: Any) -> Callable[[Any], Any]:
+    return click.option(*names, expose_value=False, callback=_keep, **rest)
+
+
+_quiet_option = _option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+_CAMERA_AXES = _option(
+    "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
+    help="turn cameras to these axes  [default: those that the form of the file has]",
+)  # fmt: skip
+_STAMPS = _option(
+    "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
+)
+array_option = _option("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
+_EDGES = _option("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
+_READING_OPTIONS = (
+    _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
+            help="read only this topic; may be repeated"),
+    _option("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
+            help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
+    _option("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
+            help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
+    _option("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
+            help="names of frames that a form does not name; may be repeated, in the order of the files"),
+    _option("--direction", "direction", type=click.Choice(DIRECTIONS),
+            help="of matrices whose key does not say which frame they are seen from"),
+    _CAMERA_AXES,
+    _option("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
+    _STAMPS,
+)  # fmt: skip
+
+
+def pose_reading_options(function: Function) -> Function:
+    """Add to a command of streams the options about trajectories: the times of their poses, the axes of cameras."""
+    return decorated(function, [_CAMERA_AXES, _STAMPS, _EDGES, array_option])
+
+
+LATEST = "latest"
+POLICIES = ("ros1", "ros2")
+MOST_TIMES = 100_000_000
+MOST_TOLD = 10  # times without a result
+
+
+class TimesSkipped(FrametoolError):
+    """Report how many of the times asked for have no result."""
+
+    exit_code = 3
+
+
+class Skipped:
+    """Times that are left out: the first are reported, all are counted."""
+
+    def __init__(self, *, in_json: bool) -> None:
+        """Create an empty count; `in_json` says how errors are written."""
+        self.in_json = in_json
+        self.errors: list[FrametoolError] = []
+        self.count = 0
+        self.found = 0
+
+    @property
+    def is_full(self) -> bool:
+        """Return whether further errors are only counted."""
+        return len(self.errors) >= MOST_TOLD
+
+    def add(self, error: FrametoolError | None, count: int = 1) -> None:
+        """Count one time, or several in a row; keep why they are left out, if that is told and will be reported."""
+        self.count += count
+        if error is not None and not self.is_full:
+            self.errors.append(error)
+
+    def counted(self, results: Iterator[Result]) -> Iterator[Result]:
+        """Yield results and count them."""
+        for result in results:
+            self.found += 1
+            yield result
+
+    def finish(self) -> int:
+        """Report what was left out; return the exit status."""
+        if not self.count:
+            return 0
+        for error in self.errors:
+            tell(as_json(error) if self.in_json else f"frametool: {error} (skipped)")
+        asked = self.found + self.count
+        total = TimesSkipped(f"{self.count} of {asked} times skipped", skipped=self.count, asked=asked)
+        say_error(total, in_json=self.in_json)
+        return total.exit_code
+
+
+class Time(Text):
+    """A time in seconds, or in nanoseconds with `ns`; `latest` where that is a choice."""
+
+    name = "time"
+
+    def __init__(self, *, latest: bool = True) -> None:
+        """Keep whether `latest` is a choice."""
+        self.latest = latest
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return nanoseconds, or `latest`."""
+        text = super().convert(value, param, ctx)
+        if not isinstance(text, str) or (self.latest and text == LATEST):
+            return text
+        try:
+            return whole_stamp(parse_stamp(text))
+        except NotATime as error:
+            self.fail(f"{error}{', or latest' if self.latest else ''}", param, ctx)
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+
+
+TIME = Time()
+
+
+def at_ns(chosen: int | str | None) -> int | None:
+    """Return the nanoseconds of an option; None for the latest."""
+    return chosen if isinstance(chosen, int) else None
+
+
+def rules_options(function: Function) -> Function:
+    """Add to a command the options that say how moving frames are taken."""
+    options = [
+        click.option("--moving", is_flag=True,
+                     help="an edge with one stamp answers only that instant"),
+        click.option("--cache", type=Time(latest=False), metavar="SECONDS",
+                     help="forget what is older  [default: nothing]"),
+        click.option("--tf2", type=click.Choice(POLICIES),
+                     help="take, refuse and complain as tf2 does"),
+    ]  # fmt: skip
+    return decorated(function, options)
+
+
+def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:
+    """Collect what the options say about how frames are taken."""
+    if tf2 is not None and normalize:
+        raise click.UsageError("--tf2 takes rotations as tf2 does; leave --normalize out")
+    if cache is not None and cache < 0:
+        raise click.UsageError("--cache takes seconds, not less than 0")
+    from frametool.formats.load import Rules
+
+    return Rules(moving=moving, policy=tf2 or "frametool", keep_ns=cache, normalize=normalize)
+
+
+def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:
+    """Read START:STOP:STEP (seconds; STOP counts if a step meets it), T,T,.., or the lines of a file or `-`, in order.
+
+    Empty lines and those that begin with `#` are passed over.
+    report: takes the errors of lines that are no time.
+    """
+    from frametool.cli.poses import source_of
+
+    if text.count(":") == 2:
+        return _range(text)
+    if re.match(r"[-+]?\.?\d", text) and not os.path.exists(text):
+        return _listed(text)
+    source = source_of(text)
+    times: list[int] = []
+    bad = 0
+    for number, line in enumerate(source.text.splitlines(), 1):
+        if (stripped := line.strip()) and not stripped.startswith("#"):
+            try:
+                times.append(whole_stamp(parse_stamp(stripped)))
+            except ValueInvalid as error:
+                bad += 1
+                report(FormatError(str(error), source=source.name, line=number))
+    if not times and not bad:
+        raise FormatError("no times in it; write one a line", source=source.name)
+    return times
+
+
+def _listed(text: str) -> list[int]:
+    """Read times between commas."""
+    try:
+        return [whole_stamp(parse_stamp(part.strip())) for part in text.split(",")]
+    except ValueInvalid as error:
+        hint = "times are T,T,.. in seconds, START:STOP:STEP, or a file"
+        raise click.UsageError(f"--times {shown(text)}: {error}; {hint}") from None
+
+
+def _range(text: str) -> range:
+    """Read START:STOP:STEP."""
+    try:
+        start, stop, step = (whole_stamp(parse_stamp(part)) for part in text.split(":"))
+    except ValueInvalid as error:
+        raise click.UsageError(f"--times {text}: {error}; a range is START:STOP:STEP in seconds") from None
+    if step <= 0 or stop < start:
+        raise click.UsageError(f"--times {text}: STEP must be positive and STOP not before START")
+    if (stop - start) // step >= MOST_TIMES:
+        raise click.UsageError(f"--times {text} has more than {MOST_TIMES} times")
+    return range(start, stop + 1, step)
+
+
+times_option = click.option(
+    "--times", type=TEXT, metavar="TIMES",
+    help="many: T,T,.., START:STOP:STEP, or FILE, one a line",
+)  # fmt: skip

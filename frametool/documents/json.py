@@ -1,0 +1,206 @@
+"""JSON text to plain values, and to places: knows JSON, no meaning.
+
+The json module is ten times faster than any YAML parser and starts sooner; it keeps no places, so they are found by
+a scan of their own when an error needs them.
+
+Plain values to JSON text on one line; how floats are written is the caller's.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+
+from frametool.documents.marks import END, LEAF, LIST, MAP, repeated_key
+from frametool.documents.source import DEEPEST, MOST_CONTAINERS, Source, error_at, too_much
+from frametool.errors import FormatError
+
+TYPE_CHECKING = False
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import Any
+
+    from frametool.documents.marks import Event
+
+JSON_NUMBER = r"-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+"
+_BLANKS = re.compile(r"[ \t\n\r]*")
+_WORD = r'"[^"\\]*+(?:\\.[^"\\]*+)*+"|[{}\[\]]|[^\s{}\[\],:"]+'
+# up to \ud83d and the like without the other half of the pair
+_WHOLE = r"(?s)(?:[^\\]++|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(?!\\u[dD][89a-fA-F])\\.)*+"
+_BRACKETS = {"{": MAP, "[": LIST, "]": END, "}": END}
+
+
+class _RepeatedKey(Exception):
+    """Report that a key stands twice in one object, or is empty."""
+
+
+class _NoJson(FormatError):
+    """Report a text that is no JSON at all."""
+
+
+def looks_like_json(text: str) -> bool:
+    """Say whether the first character that is not blank opens an array, or an object with a quoted key or none."""
+    first = _BLANKS.match(text).end()  # type: ignore[union-attr]
+    if not text.startswith("{", first):
+        return text.startswith("[", first)
+    second = _BLANKS.match(text, first + 1).end()  # type: ignore[union-attr]
+    return second == len(text) or text[second] in '"}'
+
+
+def parse_json(source: Source) -> list[Any] | None:
+    """Return the values of a text of one or several JSON objects or arrays; None if it is no JSON.
+
+    Numbers and truth values stay text, null is None.  Raises FormatError for what is JSON but must not be:
+    a key twice, half a character, too deep, too much.
+    """
+    try:
+        return strict_json(source)
+    except _NoJson:
+        return None
+
+
+def strict_json(source: Source) -> list[Any]:
+    """Return the values of a text that must be JSON; raises FormatError with the place where it is none."""
+    if source.text.count("[") + source.text.count("{") > MOST_CONTAINERS:
+        raise error_at(source, 0, too_much(0))
+    try:
+        values = _deeply_decoded(source)
+    except _RepeatedKey:
+        raise repeated_key(source, json_events(source.text)) from None
+    except FormatError:
+        raise
+    except ValueError as error:
+        problem = getattr(error, "msg", str(error))
+        message = f"not JSON: {problem[:1].lower()}{problem[1:]}"
+        raise error_at(source, getattr(error, "pos", 0), message, _NoJson) from None
+    at = re.match(_WHOLE, source.text).end() if "\\u" in source.text else len(source.text)  # type: ignore[union-attr]
+    if at < len(source.text):
+        raise error_at(source, at, f"{source.text[at:at + 6]} is half a character; its other half is missing")
+    if not _settle(values, source.text):
+        raise _too_deep(source)
+    return values
+
+
+def _deeply_decoded(source: Source) -> list[Any]:
+    """Decode a text; one that is as deep as allowed gets the stack that json needs for it."""
+    try:
+        return _decoded(source.text)
+    except RecursionError:
+        if any(depth > DEEPEST for depth, _ in _depths(source.text)):
+            raise _too_deep(source) from None
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(limit + 4 * DEEPEST)
+    try:
+        return _decoded(source.text)
+    finally:
+        sys.setrecursionlimit(limit)
+
+
+def _decoded(text: str) -> list[Any]:
+    """Decode one value after the other, up to the end."""
+    from json import JSONDecoder
+
+    decode = JSONDecoder(object_pairs_hook=_distinct, parse_int=str, parse_float=str, parse_constant=str).raw_decode
+    values = []
+    end = _end_of_blanks(text, 0)
+    while end < len(text):
+        value, end = decode(text, end)
+        values.append(value)
+        end = _end_of_blanks(text, end)
+    return values
+
+
+def _end_of_blanks(text: str, begin: int) -> int:
+    """Return the offset of the next character that is not blank."""
+    match = _BLANKS.match(text, begin)
+    return match.end() if match else begin
+
+
+def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Make a dict of pairs whose keys all differ and are not empty."""
+    made = dict(pairs)
+    if len(made) != len(pairs) or "" in made:
+        raise _RepeatedKey
+    return made
+
+
+def _settle(values: list[Any], text: str) -> bool:
+    """Turn truth values into text, level by level; say whether there are at most DEEPEST levels."""
+    has_words = "true" in text or "false" in text
+    level: list[Any] = [values]
+    for _ in range(DEEPEST + 1):
+        if has_words:
+            for outer in level:
+                _spell_words(outer)
+        level = [
+            inner
+            for outer in level
+            for inner in (outer.values() if type(outer) is dict else outer)
+            if type(inner) is dict or type(inner) is list
+        ]
+        if not level:
+            return True
+    return False
+
+
+def _spell_words(outer: Any) -> None:
+    """Turn the truth values in a container into text."""
+    pairs = outer.items() if type(outer) is dict else enumerate(outer)
+    for key in [key for key, value in pairs if value is True or value is False]:
+        outer[key] = "true" if outer[key] else "false"
+
+
+def json_events(text: str) -> Iterator[Event]:
+    """Yield the values of a text that parse_json reads, in order, with their places."""
+    from json import loads
+
+    for token in re.finditer(_WORD, text):
+        word = token[0]
+        if word in _BRACKETS:
+            yield _BRACKETS[word], "", token.start(), token.end(), word, 0
+        elif word[0] == '"':
+            text = loads(word, strict=False) if "\\" in word else word[1:-1]
+            yield LEAF, text, token.start(), token.end(), '"', 0
+        else:
+            yield LEAF, word, token.start(), token.end(), "", 0
+
+
+def _depths(text: str) -> Iterator[tuple[int, int]]:
+    """Yield the depth and the offset of each list and map."""
+    depth = 0
+    for kind, _, start, *_ in json_events(text):
+        if kind != LEAF:
+            depth += -1 if kind == END else 1
+            yield depth, start
+
+
+def _too_deep(source: Source) -> FormatError:
+    """Find the bracket that is one too many."""
+    at = next((start for depth, start in _depths(source.text) if depth > DEEPEST), 0)
+    return error_at(source, at, too_much(DEEPEST))
+
+
+class Verbatim(str):
+    """A number or truth value as it was written; it is written so again, without quotes."""
+
+    __slots__ = ()
+
+
+def dump(value: Any, number: Callable[[float], str] = repr) -> str:
+    """Write plain values as JSON on one line; `number` writes the floats.
+
+    Not json.dumps, because that has no say in how floats are written.
+    """
+    if isinstance(value, (float, Verbatim)):
+        return number(value) if isinstance(value, float) else str(value)
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{dump(key)}: {dump(each, number)}" for key, each in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(dump(each, number) for each in value) + "]"
+    if isinstance(value, str) and value.isascii() and value.isprintable() and '"' not in value and "\\" not in value:
+        return f'"{value}"'  # most texts, without importing json
+    import json
+
+    is_plain = not isinstance(value, str) or value.isprintable()
+    return json.dumps(value, ensure_ascii=not is_plain)  # control characters and lone surrogates reach no terminal raw

@@ -1,0 +1,255 @@
+"""XML as a stream of elements with their places: expat of the standard library, without a tree and without entities.
+
+Knows syntax only.  Names keep their prefix as written (`sensor:camera`), so that files whose prefixes are bound nowhere
+are read too.
+
+Part of an XML file as a tree of elements: those that a form has a use for; the rest is left out while reading.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from math import inf, isfinite
+from typing import NamedTuple
+from xml.parsers import expat
+
+from frametool.documents.source import MOST_CHARACTERS, Source, line_of, not_text, pointer
+from frametool.errors import FileProblem, FormatError, shown
+from frametool.text.numbers import parse_number
+
+TYPE_CHECKING = False
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+    from typing import NoReturn
+
+    from frametool.documents.source import InputFile
+
+DEEPEST_ELEMENT = 100_000
+_BLOCK = 1 << 16
+_OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s;]+;")
+_DECIMALS = "0123456789.-+eE \t\r\n"
+
+
+class Element(NamedTuple):
+    """The beginning or the end of an element.
+
+    ends: whether it is the end; then `text` is what stands directly in the element, the rest is as at its beginning
+    depth: 1 for the root
+    offset: of its first character, in bytes
+    """
+
+    ends: bool
+    tag: str
+    attributes: dict[str, str]
+    depth: int
+    line: int
+    column: int
+    offset: int
+    text: str = ""
+
+
+class XmlFile:
+    """The elements of one XML file, and errors that point into it."""
+
+    def __init__(self, file: InputFile) -> None:
+        """Read the bytes of a file; raises FileProblem, and FormatError where they are too many or no text."""
+        self.name = file.name
+        try:
+            self.data = file.stream.read(MOST_CHARACTERS + 1)
+        except OSError as error:
+            raise FileProblem(f"{self.name}: {(error.strerror or str(error)).lower()}") from None
+        if len(self.data) > MOST_CHARACTERS:
+            raise FormatError(f"longer than {MOST_CHARACTERS} bytes, the most in one file", source=self.name)
+
+    def elements(self, deepest: int = DEEPEST_ELEMENT, *, ends: bool = True) -> Iterator[Element]:
+        """Yield the beginnings and ends of all elements, in order.
+
+        deepest: those further down are left out; ends: without them the text in elements is left out too.
+        Raises FormatError for what is no XML, and for declarations of entities.
+        """
+        opened: list[Element] = []
+        texts: list[list[str]] = []
+        found: list[Element] = []
+        parser = expat.ParserCreate()
+        depth = 0
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            nonlocal depth
+            depth += 1
+            if depth <= deepest:
+                place = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, parser.CurrentByteIndex
+                found.append(Element(False, tag, attributes, depth, *place))  # noqa: FBT003 - a field of a record
+                if ends:
+                    opened.append(found[-1])
+                    texts.append([])
+            if depth > DEEPEST_ELEMENT:
+                message = f"more than {DEEPEST_ELEMENT} elements inside one another"
+                raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
+
+        def end(_: str) -> None:
+            nonlocal depth
+            if ends and depth <= deepest:
+                found.append(Element(True, *opened.pop()[1:7], "".join(texts.pop())))  # noqa: FBT003 - a field
+            depth -= 1
+
+        def read_text(text: str) -> None:
+            if depth <= deepest:
+                texts[-1].append(text)
+
+        def refuse(*_: object) -> NoReturn:
+            message = "XML with entities of its own is not read; expand them: xmllint --noent FILE"
+            raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
+
+        parser.StartElementHandler, parser.EndElementHandler = start, end
+        if ends:
+            parser.CharacterDataHandler = read_text
+        parser.StartDoctypeDeclHandler = partial(self._check_doctype, parser)
+        parser.EntityDeclHandler = refuse
+        parser.ExternalEntityRefHandler = refuse
+        for begin in range(0, len(self.data) or 1, _BLOCK):
+            block = self.data[begin : begin + _BLOCK]
+            try:
+                parser.Parse(block, begin + _BLOCK >= len(self.data))
+            except expat.ExpatError as error:
+                yield from found
+                raise self._broken(error) from None
+            except (LookupError, ValueError) as error:  # of Python's codecs
+                if isinstance(error, FormatError):
+                    raise
+                raise self._at(1, 1, f"not XML: {error}") from None
+            yield from found
+            found.clear()
+
+    def _check_doctype(self, parser: expat.XMLParserType, _: str, file: str | None, *_more: object) -> None:
+        """Refuse entities of another file, which expat would leave out in silence."""
+        if file and _OTHER_ENTITY.search(self.data.replace(b"\0", b"")):
+            message = f"XML with entities of {shown(file)} is not read; expand them: xmllint --noent --loaddtd FILE"
+            raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
+
+    def _broken(self, error: expat.ExpatError) -> FormatError:
+        """Say in one line what is no XML."""
+        if what := not_text(self.data):
+            return FormatError(what, source=self.name, line=1, column=1)
+        problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
+        return self._at(error.lineno, error.offset + 1, f"not XML: {problem}")
+
+    def error(self, element: Element, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
+        """Make the error for an element, or for the value of one of its attributes."""
+        line, column = self.place(element, attribute)
+        return self._at(line, column, message, rule=rule)
+
+    def place(self, element: Element, attribute: str = "") -> tuple[int, int]:
+        """Return line and column of an element, or of the value of one of its attributes."""
+        line, column = element.line, element.column
+        name = re.compile(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()))
+        value = name.search(self.data, element.offset, element.offset + _BLOCK) if attribute else None
+        if value:
+            before = self.data[element.offset : value.end()].decode("utf-8", "replace")
+            line += before.count("\n")
+            column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
+        return line, column
+
+    def _at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
+        # lines as expat counts them, which are those of every editor
+        text = self.data.decode("utf-8", "replace").split("\n")[line - 1 : line] or [""]
+        snippet = pointer(line_of(text[0], 1), column)
+        return FormatError(message, source=self.name, line=line, column=column, snippet=snippet, rule=rule)
+
+    def numbers(self, element: Element, attribute: str, count: int, default: str | None = None) -> tuple[float, ...]:
+        """Read an attribute as so many finite numbers between blanks; without it the default."""
+        text = element.attributes.get(attribute, default)
+        if text is None:
+            raise self.error(element, f"<{element.tag}> has no {attribute}")
+        return self.numbers_in(text, element, attribute, count)
+
+    def numbers_in(self, text: str, element: Element, attribute: str, count: int) -> tuple[float, ...]:
+        """Read a text of an element as so many finite numbers; the attribute, if any, is where it stands."""
+        words = text.split()
+        if len(words) == count and not text.strip(_DECIMALS):  # plain decimals, nearly always
+            try:
+                numbers = tuple(map(float, words))
+            except ValueError:
+                numbers = (inf,)
+            if all(map(isfinite, numbers)):
+                return numbers
+        if len(words) != count:
+            found = f"found {len(words)} in {shown(text)}"
+            expected = f"{count} number{'s' * (count != 1)}"
+            raise self.error(element, f"{attribute or element.tag}: expected {expected}, {found}", attribute)
+        try:
+            return tuple(map(parse_number, words))
+        except ValueError as error:
+            raise self.error(element, f"{attribute or element.tag}: {error}", attribute) from None
+
+    @property
+    def source(self) -> Source:
+        """Return the text under its name."""
+        return Source(self.name, self.data.decode("utf-8", "replace"))
+
+
+_ENDS_EARLY = 3  # expat's code for "no element found", which it also says behind a text that breaks off
+
+
+class XmlNode:
+    """One element: its attributes and place, its text, and those of the elements in it that are kept."""
+
+    __slots__ = ("children", "element", "tag", "text")
+
+    def __init__(self, element: Element) -> None:
+        """Create it as it begins."""
+        self.element = element
+        self.tag = element.tag
+        self.children: list[XmlNode] = []
+        self.text = ""
+
+    def all(self, *tags: str) -> Iterator[XmlNode]:
+        """Yield the elements of some kinds that stand directly in it."""
+        return (child for child in self.children if child.tag in tags)
+
+    def first(self, tag: str) -> XmlNode | None:
+        """Return the first element of a kind, if there is one."""
+        for child in self.children:
+            if child.tag == tag:
+                return child
+        return None
+
+    def text_of(self, tag: str, default: str = "") -> str:
+        """Return the text of the first element of a kind."""
+        found = self.first(tag)
+        return default if found is None else found.text
+
+    def attribute(self, name: str) -> str:
+        """Return an attribute; "" where it is missing."""
+        return self.element.attributes.get(name, "").strip()
+
+
+def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]]) -> XmlNode:
+    """Return the root element with what is kept below it.
+
+    held: the elements that are kept in each element, the root first; of all others nothing is.
+    Raises FormatError.
+    """
+    top = next(iter(held))
+    opened: list[XmlNode] = []
+    skipped = 0  # the depth below which nothing is kept
+    for element in xml.elements():
+        if skipped and element.depth > skipped:
+            continue
+        skipped = 0
+        if element.ends:
+            if opened and opened[-1].element.depth == element.depth:
+                ended = opened.pop()
+                ended.text = element.text.strip()
+                root = ended
+        elif not opened and element.tag != top:
+            raise xml.error(element, f"expected <{top}>, found <{element.tag}>")
+        elif opened and element.tag not in held.get(opened[-1].tag, ()):
+            skipped = element.depth
+        else:
+            made = XmlNode(element)
+            if opened:
+                opened[-1].children.append(made)
+            opened.append(made)
+    return root

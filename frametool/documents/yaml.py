@@ -1,0 +1,425 @@
+"""YAML text to plain values, and to places, through the parser's events: knows YAML, no meaning.
+
+The library's constructors are not used: they build numbers, dates and truth values out of names, and they let a small
+text grow without bound.  The loop here keeps every scalar as text and counts depth and aliases as it goes.
+
+Long lists of plain maps, flow ones on a line each or block ones, and plain values in brackets: what big trees are.
+
+      - {name: lidar, parent: base_link, xyz: [0.9, 0, 2.0], rpy_deg: [0, 0, 90]}
+      - name: lidar
+        parent: base_link
+
+Such lines differ from JSON only in the quotes.  Once a strict pattern has found nothing else in them, a few
+replacements make them JSON, which reads 100 000 of them in a quarter of the time that the YAML parser takes to tell its
+events (0.5 s against 2.1); anything unusual, also a mistake, goes to the parser.  In other forms lists and maps that
+stand in brackets behind their key, `f1: {xyz: [0.9, 0, 2.0]}`, are taken out in the same way: the parser then has one
+event of each.
+
+What the YAML parser complains of, in one line that a person can act on.
+"""
+
+from __future__ import annotations
+
+import re
+
+import yaml
+from yaml.error import MarkedYAMLError
+from yaml.events import (
+    AliasEvent,
+    MappingEndEvent,
+    MappingStartEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+    StreamEndEvent,
+)
+
+from frametool.documents.marks import END, LEAF, LIST, MAP, repeated_key
+from frametool.documents.source import DEEPEST, MOST_CONTAINERS, Source, error_at, line_of, paused_collector, too_much
+from frametool.errors import FormatError, shown
+from frametool.text.numbers import odd_characters
+
+TYPE_CHECKING = False
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator
+    from typing import Any, TypeAlias
+
+    from frametool.documents.marks import Event
+
+    Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
+    NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
+
+LEAST = 1 << 16  # characters: shorter texts are not worth a second way
+# plain words and numbers that mean themselves in YAML and hold nothing that JSON would need to escape
+_WORD = r"(?:(?!(?:null|Null|NULL)[^\w./-])[A-Za-z_/][\w./-]*+|[-+]?(?:[0-9]+\.?[0-9]*+|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
+_LIST = rf"\[{_WORD}(?:, {_WORD})*+\]"
+_PAIR = rf"{_WORD}: (?:{_WORD}|{_LIST})"
+_BLOCKS = rf"(?a)(?P<indent> *)- {_PAIR}\n(?:(?P=indent)(?:- |  ){_PAIR}\n)*+\Z"
+_FLOWS = rf"(?a)(?P<indent> *)- \{{{_PAIR}(?:, {_PAIR})*+\}}\n(?:(?P=indent)- \{{{_PAIR}(?:, {_PAIR})*+\}}\n)*+\Z"
+_QUOTES = (
+    ("{", '{"'), ("}", '"}'), (": ", '": "'), (", ", '", "'), ('"[', '["'), (']"', '"]'),
+)  # fmt: skip
+STANDIN = "0"
+_BRACKETED = rf"(?am)^( *+(?:- )?{_WORD}: )(\{{{_PAIR}(?:, {_PAIR})*+\}}|{_LIST})$"
+_NOT_PLAIN = r"""["'|>#&*!%@`?\t\r]"""  # quotes, comments, texts of several lines, anchors: brackets may be none there
+BRACKETS = "\ue000"
+"""Stands for a value in brackets."""
+
+
+def split_run(text: str) -> tuple[str, list[Any]] | None:
+    """Take the list of plain maps off the end of a text.
+
+    Returns the text with STANDIN as the list's one item, and the items; None where the text has no such end.
+    """
+    begin = re.search(r"(?m)^ *- (\{?)", text) if len(text) >= LEAST else None
+    run = begin and re.compile(_FLOWS if begin[1] else _BLOCKS).match(text, begin.start())
+    if not begin or not run:
+        return None
+    items = _items(run[0] if begin[1] else _as_flows(run[0], run["indent"]), run["indent"])
+    return None if items is None else (f"{text[: run.start()]}{run['indent']}- {STANDIN}\n", items)
+
+
+def _as_flows(run: str, indent: str) -> str:
+    """Write block maps as flow ones, one a line."""
+    lines = run[:-1].replace(f"\n{indent}  ", ", ").replace(f"\n{indent}- ", f"}}\n{indent}- {{")
+    return f"{indent}- {{{lines[len(indent) + 2 :]}}}\n"
+
+
+def put_back(values: list[Any], items: list[Any]) -> bool:
+    """Put the items where the stand-in is: in the last list of the last document."""
+    holder = values[-1]
+    while isinstance(holder, dict) and holder:
+        holder = next(reversed(holder.values()))
+    if holder != [STANDIN]:
+        return False
+    holder[:] = items
+    return True
+
+
+def split_brackets(text: str) -> tuple[str, list[Any]] | None:
+    """Take the plain values in brackets that end a line out of a text.
+
+    Returns the text with BRACKETS in their places, and the values in order; None where a text is short or not plain.
+    """
+    if len(text) < LEAST or BRACKETS in text or re.search(_NOT_PLAIN, text):
+        return None
+    found: list[str] = []
+
+    def stand_in(match: re.Match[str]) -> str:
+        found.append(f"- {match[2]}\n")
+        return f"{match[1]}{BRACKETS}"
+
+    rest = re.sub(_BRACKETED, stand_in, text)
+    items = _items("".join(found), "") if found else None
+    return None if items is None else (rest, items)
+
+
+def _items(run: str, indent: str) -> list[Any] | None:
+    """Read a value in brackets a line as JSON; None where a key stands twice or there are too many."""
+    from json import JSONDecoder
+
+    if run.count("{") + run.count("[") > MOST_CONTAINERS:
+        return None
+    for plain, quoted in _QUOTES:
+        run = run.replace(plain, quoted)
+    run = run.replace("- [", '- ["').replace("]\n", '"]\n')
+    run = run.replace(f"\n{indent}- ", ",\n")
+    made: list[Any] = JSONDecoder(object_pairs_hook=_distinct).decode(f"[{run[len(indent) + 2 :]}]")
+    return None if None in made else made
+
+
+def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any] | None:
+    made = dict(pairs)
+    return made if len(made) == len(pairs) else None
+
+
+# compiled when an error asks for them, not at start-up
+_UNREADABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
+_ABOUT_TABS = "cannot start any token|tab character"
+_ABOUT_BEGINNINGS = "cannot start any token|scanning a directive"
+_NEVER_FIRST = ("@", "`", "%")
+_LONGEST_SHOWN = 40
+_HINTS = {
+    "mapping values are not allowed in this context": "; check the indentation, or quote a text that holds ': '",
+    "found unexpected ':'": "; write a blank after the colon",
+    "could not find expected ':'": "; a key needs ': ' after it",
+    "did not find expected key": "; check the indentation and the brackets above",
+    "did not find expected '-' indicator": "; check the indentation",
+}
+
+
+def translated(source: Source, error: Exception) -> FormatError:
+    """Make our error of the parser's: lower case, placed, with a hint where one is known."""
+    if isinstance(error, MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
+        line = mark.line + 1
+        message = _message(error, line_of(source.text, line), mark.column + 1)
+        return error_at(source, mark.index, message + _suspicion(source, line))
+    if odd := re.search(_UNREADABLE, source.text):
+        code = f"U+{ord(odd[0]):04X}"
+        return error_at(source, odd.start(), f"the character {code} may not stand in YAML or JSON; is this text?")
+    return error_at(source, 0, _one_line(str(error)) or type(error).__name__)
+
+
+def _suspicion(source: Source, line: int) -> str:
+    """Name what people do not see in the line of an error or the one before: odd characters, a missing blank, xacro."""
+    for text in (line_of(source.text, line), line_of(source.text, line - 1) if line > 1 else ""):
+        if odd := odd_characters(text):
+            return f"; the line has {odd}"
+        if "${" in text:
+            return "; is this xacro? expand it first"
+        if match := re.match(r"\s*(?:- +)*([\w./-]+):(?=[^\s:/])", text):
+            return f"; write a blank after '{match[1]}:'"
+    return ""
+
+
+def _one_line(text: str) -> str:
+    """Join the lines of the parser's text, in lower case."""
+    return " ".join(text.split()).lower()
+
+
+def _message(error: MarkedYAMLError, line: str, column: int) -> str:
+    """Say what is wrong at a column of a line, after the parser's problem and context."""
+    problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
+    word = line[column - 1 :].split(maxsplit=1)[0] if line[column - 1 :].strip() else ""
+    if "\t" in (line[column - 1 : column], *line[: column - 1].split(" ")) and re.search(_ABOUT_TABS, problem):
+        return "a tab cannot indent YAML; use blanks"
+    if "scanning a directive" in context:
+        word = line.split(maxsplit=1)[0] if line.strip() else ""
+    if word.startswith(_NEVER_FIRST) and re.search(_ABOUT_BEGINNINGS, problem + context):
+        name = word.rstrip(":,]}")[:_LONGEST_SHOWN]
+        return f'nothing can begin with {shown(word[0])} here; quote the name: "{name}"'
+    if word == ":" and problem == "did not find expected key":
+        return "an empty key; write a name before the colon"
+    begun = f" begun at line {error.context_mark.line + 1}" if error.context_mark else ""
+    return problem + (_HINTS.get(problem) or (f", {context}{begun}" if context else ""))
+
+
+TAG = "!"  # key under which a mapping has its tag: no plain key of YAML looks so
+MOST_ALIASES = 1000
+SPARE_COPIES = 10_000  # what aliases may repeat, beside one value for each character of the text
+
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_ITEM = object()  # stands for the key while a list is filled
+_NULLS = frozenset(("", "~", "null", "Null", "NULL"))
+_ODD_KEYS = frozenset(("", "<<"))
+_KINDS: dict[type, int] = {
+    ScalarEvent: LEAF,
+    AliasEvent: LEAF,
+    SequenceStartEvent: LIST,
+    MappingStartEvent: MAP,
+    SequenceEndEvent: END,
+    MappingEndEvent: END,
+}
+_MOST_DIRECTIVES = 100  # libyaml compares each new %TAG with all before it
+
+
+def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
+    """Return the value of each document of a YAML text, None for an empty one.
+
+    Mappings become dicts with text keys, sequences lists, scalars text, null values None.
+    tags: of mappings that are read (`!Rpy`, `!!opencv-matrix`); the dict then has its tag under the key TAG.
+    Raises FormatError.
+    """
+    if source.text.count("\n%TAG") > _MOST_DIRECTIVES:
+        raise error_at(source, source.text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
+    with paused_collector():
+        return _read_by_lines(source, tags) or _read_without_brackets(source) or _Builder(source, tags).build()
+
+
+def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
+    """Read a text that ends in a long list of plain maps; None for others and for mistakes."""
+    split = split_run(source.text)
+    if split is None:
+        return None
+    try:
+        values = _Builder(Source(source.name, split[0]), tags).build()
+    except FormatError:
+        return None
+    return values if put_back(values, split[1]) else None
+
+
+def _read_without_brackets(source: Source) -> list[Value] | None:
+    """Read a plain text whose values in brackets are read aside; None for others and for mistakes."""
+    split = split_brackets(source.text)
+    if split is None:
+        return None
+    builder = _Builder(Source(source.name, split[0]), ())
+    builder.aside = iter(split[1])
+    try:
+        values = builder.build()
+    except FormatError:
+        return None
+    return values if next(builder.aside, None) is None else None
+
+
+def yaml_events(text: str) -> Iterator[Event]:
+    """Yield the values of a text in order, with their places; what cannot be parsed ends them."""
+    get: Callable[[], Any] = _Loader(text).get_event
+    kinds = _KINDS
+    try:
+        while (kind := type(event := get())) is not StreamEndEvent:
+            if kind in kinds:
+                start = event.start_mark
+                word, style = "", ""
+                if kind is ScalarEvent:
+                    word, style = event.value, event.style or ""
+                elif kind is AliasEvent:
+                    word = style = "*"
+                elif kinds[kind] != END and event.flow_style:
+                    style = "["
+                yield kinds[kind], word, start.index, event.end_mark.index, style, start.column
+    except yaml.YAMLError:
+        return
+
+
+class _Builder:
+    """Build the values of one text; holds what the rare events need beside the loop."""
+
+    __slots__ = ("aliases", "anchors", "aside", "copies", "documents", "open", "source", "tags")
+
+    def __init__(self, source: Source, tags: Collection[str]) -> None:
+        """Start with an empty list of documents, the tags that are read, and the budget for aliases."""
+        self.source = source
+        self.tags = tags
+        self.anchors: dict[str, Value] = {}
+        self.aliases = MOST_ALIASES
+        self.copies = SPARE_COPIES + len(source.text)
+        self.aside: Iterator[Value] | None = None  # what BRACKETS stand for, if they stand for anything
+        self.documents: list[Value] = []
+        self.open: list[tuple[dict[str, Value] | list[Value], object]] = []
+
+    def build(self) -> list[Value]:
+        """Run the loop; what the parser itself refuses becomes our one-line error."""
+        try:
+            self._run(_Loader(self.source.text).get_event)
+        except FormatError:
+            raise
+        except (yaml.YAMLError, ValueError, RecursionError) as error:
+            raise translated(self.source, error) from None
+        return self.documents
+
+    def _run(self, get: Callable[[], Any]) -> None:
+        """Take events until the stream ends.
+
+        `current` is the dict or list being filled and `key` the key waiting for its value: None where a key comes
+        next, _ITEM in a list.  One function, because two million events pass through it for 100 000 frames.
+        """
+        stack, nulls, odd_keys, item, brackets = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside and BRACKETS
+        current: Any = self.documents
+        key: Any = item
+        room = MOST_CONTAINERS
+        value: Value
+        while True:
+            event = get()
+            kind = type(event)
+            if kind is ScalarEvent:
+                value = event.value
+                if key is None:
+                    if value in current or value in odd_keys:
+                        self._refuse_key(event, current)
+                    key = value
+                    if event.tag is not None or event.anchor is not None:
+                        self._note(event, value)
+                    continue
+                if value in nulls and not event.style:
+                    value = None
+                elif value == brackets:
+                    value = self._from_aside(event)
+            elif kind is MappingStartEvent or kind is SequenceStartEvent:
+                value = {} if kind is MappingStartEvent else []
+                if key is None:
+                    raise self._error(event, "a key must be one text, not a list or map")
+                room -= 1
+                if len(stack) >= DEEPEST or not room:
+                    raise self._error(event, too_much(len(stack)))
+            elif kind is MappingEndEvent or kind is SequenceEndEvent:
+                current, key = stack.pop()
+                continue
+            elif kind is AliasEvent:
+                value = self._repeat(event, current, key)
+            elif kind is StreamEndEvent:
+                return
+            else:
+                continue
+            if key is item:
+                current.append(value)
+            else:
+                current[key] = value
+                key = None
+            if kind is AliasEvent:
+                continue
+            if event.tag is not None or event.anchor is not None:
+                self._note(event, value)
+            if kind is not ScalarEvent:
+                stack.append((current, key))
+                current = value
+                key = None if kind is MappingStartEvent else item
+
+    def _from_aside(self, event: ScalarEvent) -> Value:
+        """Return the next value that was read aside: a list or a map of lists."""
+        if len(self.open) + 2 > DEEPEST:
+            raise self._error(event, too_much(DEEPEST))
+        return next(self.aside or iter(()), None)
+
+    def _note(self, event: NodeEvent, value: Value) -> None:
+        """Keep the tag of a mapping if it is one that is read, refuse others; remember what an anchor names."""
+        if event.tag is not None:
+            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
+            if tag not in self.tags or type(value) is not dict:
+                raise self._error(event, f"tag {tag} is not read here")
+            value[TAG] = tag
+        if event.anchor is not None:
+            self.anchors[event.anchor] = value
+
+    def _refuse_key(self, event: ScalarEvent, current: Any) -> None:
+        """Raise for a key that is there already, is empty or asks for a merge; a quoted << is a name."""
+        if event.value == "" and not (event.style and self.tags):  # Drake's name of the only body
+            raise self._error(event, "an empty key; write a name, or quotes around a blank one")
+        if event.value in current:
+            raise repeated_key(self.source, yaml_events(self.source.text))
+        if not event.style:
+            raise self._error(event, "merge keys (<<) are not supported; write the entries out")
+
+    def _repeat(self, event: AliasEvent, current: object, key: object) -> Value:
+        """Return a copy of what the alias stands for, within the budget."""
+        name = str(event.anchor)
+        if key is None:
+            raise self._error(event, f"alias *{name} cannot be a key")
+        if name not in self.anchors:
+            raise self._error(event, f"alias *{name} has no anchor &{name} before it")
+        value = self.anchors[name]
+        if value is current or any(value is container for container, _ in self.open):
+            raise self._error(event, f"alias *{name} stands inside what it repeats")
+        self.aliases -= 1
+        if self.aliases < 0:
+            raise self._error(event, f"more than {MOST_ALIASES} aliases")
+        return self._copy(event, value)
+
+    def _copy(self, event: AliasEvent, value: Value) -> Value:
+        """Copy level by level, so that no depth can exhaust the stack."""
+        root: list[Value] = [value]
+        level: list[Any] = [root]
+        for _ in range(DEEPEST + 1 - len(self.open)):
+            below = []
+            for container in level:
+                self.copies -= len(container)
+                if self.copies < 0:
+                    raise self._error(event, f"aliases repeat more than {SPARE_COPIES + len(self.source.text)} values")
+                for key, inner in _children(container):
+                    if type(inner) is dict or type(inner) is list:
+                        container[key] = inner.copy()
+                        below.append(container[key])
+            if not below:
+                return root[0]
+            level = below
+        raise self._error(event, too_much(DEEPEST))
+
+    def _error(self, event: Any, message: str) -> FormatError:
+        """Make the error for the place where an event begins."""
+        return error_at(self.source, event.start_mark.index, message)
+
+
+def _children(container: dict[str, Value] | list[Value]) -> list[tuple[Any, Value]]:
+    """Return keys or indices with their values."""
+    return list(container.items() if isinstance(container, dict) else enumerate(container))

@@ -1,0 +1,199 @@
+"""The derivation of a lookup: the way through the tree, the samples around the time, the products along the way."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.errors import printable
+from frametool.explain.operations import between, compose, inverse
+from frametool.explain.sheet import upright
+from frametool.frames.path import IDENTITY
+from frametool.frames.stamps import BILLION, format_stamp
+from frametool.geometry import floats, rigid
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.explain.sheet import Matrix, Sheet
+    from frametool.frames.lookups import Frames
+    from frametool.frames.track import MovingTrack, Track
+    from frametool.geometry.types import Rigid
+
+    Sample = tuple[int, str, Rigid]
+    Edge = tuple[str, str, Rigid]  # parent, child, parent_from_child
+
+MOST_SHOWN = 3  # edges of a chain whose products are written out
+STORED = "A stored edge is the pose of the child in its parent; it maps points in the child to points in the parent."
+
+
+def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | None) -> Rigid:
+    """Derive target_from_source at a time, None for the latest; the lookup itself has succeeded."""
+    to, of = printable(target), printable(source)
+    if target == source:
+        sheet.heading(f"{to}_from_{of}")
+        sheet.say("A frame seen from itself: the identity, x 0, y 0, z 0, w 1 and no shift.")
+        return IDENTITY
+    latest_ns = frames.latest(target, source)
+    if at_ns is None and latest_ns is not None:
+        at_ns = latest_ns
+    down, up = frames.between(target, source, at_ns)
+    tracks = {child: frames.track(child) for child in (*down, *up)}
+    sheet.heading("The way through the tree")
+    sheet.say(" <- ".join(map(printable, frames.path(target, source, at_ns))))
+    first, second = _names(frames, down, at_ns), _names(frames, [*reversed(up)], at_ns)
+    sheet.say(_sentence(first, second))
+    if len(tracks) > 1 or first:
+        sheet.say(f"{to}_from_{of} = {_formula(first, second)}")
+    sheet.caveat(STORED)
+    moving = [track for track in tracks.values() if track is not None and not track.standing]
+    if moving and at_ns is not None:
+        _say_time(sheet, moving, at_ns)
+    brief = len(tracks) > MOST_SHOWN and not sheet.every
+    standing = [_standing(tracks[child]) for child in (*down, *reversed(up))]
+    for parent, child, pose in filter(None, standing):
+        sheet.reached(pose[:3])
+        sheet.say(f"{parent}_from_{child}: {_line(sheet, pose)}")
+    edges = {child: _edge(sheet, track, at_ns or 0, brief=brief) for child, track in tracks.items() if track}
+    return _joined(sheet, [edges[each] for each in down], [edges[each] for each in reversed(up)], brief=brief)
+
+
+def joined_across(
+    sheet: Sheet, target_from_fixed: Rigid, fixed_from_source: Rigid, frames: tuple[str, str, str]
+) -> Rigid:
+    """Join the two halves of a lookup across time."""
+    sheet.say("The fixed frame counts as standing between the two times.")
+    return compose(sheet, target_from_fixed, fixed_from_source, frames)
+
+
+def _line(sheet: Sheet, pose: Rigid) -> str:
+    return f"xyz {sheet.numbers(pose[:3])} m, xyzw {sheet.numbers(pose[3:])}"
+
+
+def _names(frames: Frames, children: Sequence[str], at_ns: int | None) -> list[tuple[str, str]]:
+    """Return the edges of a branch as (parent, child), topmost first."""
+    return [(printable(str(frames.parent(child, at_ns))), printable(child)) for child in children]
+
+
+def _sentence(first: list[tuple[str, str]], second: list[tuple[str, str]]) -> str:
+    """Say how the branches come together."""
+    if not first:
+        edge = "The edge is stored as it is asked for." if len(second) == 1 else "The stored edges multiply, top first."
+        return f"{second[0][0]} is above {second[-1][1]}. {edge}"
+    if not second:
+        edge = "The stored edge is" if len(first) == 1 else "The product of the stored edges, top first, is"
+        return f"{first[0][0]} is above {first[-1][1]}. {edge} inverted."
+    return (
+        f"{first[0][0]} is the frame above both. The stored edges multiply from it down to the source, and from it "
+        "down to the target; the latter product is inverted."
+    )
+
+
+def _formula(first: list[tuple[str, str]], second: list[tuple[str, str]]) -> str:
+    """Write the product of stored edges."""
+    left, right = (" @ ".join(f"{parent}_from_{child}" for parent, child in each) for each in (first, second))
+    inverted = [f"({left})^-1"] if left else []
+    return " @ ".join([*inverted, *([right] if right else [])])
+
+
+def _say_time(sheet: Sheet, moving: Sequence[MovingTrack], at_ns: int) -> None:
+    """Say at which time the edges are taken, and why if it is the latest."""
+    newest = min(track.last_ns for track in moving)
+    text = f"Time {format_stamp(at_ns)} s."
+    if at_ns == newest:
+        text += " It is the latest that every moving edge on the way has reached"
+        if len(moving) > 1:
+            text += ": " + ", ".join(f"{printable(track.child)} {format_stamp(track.last_ns)}" for track in moving)
+        text += "."
+    sheet.say(text)
+
+
+def _standing(track: Track | None) -> Edge | None:
+    if track is None or not track.standing:
+        return None
+    return printable(track.parent), printable(track.child), track.components
+
+
+def _edge(sheet: Sheet, track: Track, at_ns: int, *, brief: bool) -> Edge:
+    """Return an edge as it is at a time, with the steps to it if it moves."""
+    if track.standing:
+        return printable(track.parent), printable(track.child), track.components
+    before, after = around(track, at_ns)
+    parent, child = printable(before[1]), printable(track.child)
+    sheet.reached(before[2][:3])
+    if after is None or before[0] == at_ns:
+        sheet.say(f"{parent}_from_{child}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}")
+        return parent, child, before[2]
+    if after[1] != before[1]:
+        sheet.say(
+            f"{parent}_from_{child}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}. The next, at "
+            f"{format_stamp(after[0])}, has another parent, {printable(after[1])}: until then this one holds."
+        )
+        return parent, child, before[2]
+    sheet.reached(after[2][:3])
+    with sheet.about(f"{parent}_from_{child}"):
+        return parent, child, _interpolated(sheet, before, after, at_ns, brief=brief)
+
+
+def around(track: MovingTrack, at_ns: int) -> tuple[Sample, Sample | None]:
+    """Return the last sample that is not after a time, and the next one, if there is one."""
+    before: Sample | None = None
+    for sample in track.walk():
+        if sample[0] > at_ns and before is not None:
+            return before, sample
+        before = sample
+    if before is None:
+        raise AssertionError(track)  # a track has at least one sample
+    return before, None
+
+
+def fraction(sheet: Sheet, begin_ns: int, end_ns: int, at_ns: int) -> float:
+    """Add how far between two samples a time is."""
+    sheet.say(
+        f"{format_stamp(at_ns)} s lies between the samples at {format_stamp(begin_ns)} and {format_stamp(end_ns)}; "
+        "past is the time since the first, gap that between the two, in seconds."
+    )
+    values = {"past": (at_ns - begin_ns) / BILLION, "gap": (end_ns - begin_ns) / BILLION}
+    return sheet.step(values, "f", "past/gap")
+
+
+def _interpolated(sheet: Sheet, before: Sample, after: Sample, at_ns: int, *, brief: bool) -> Rigid:
+    """Go from one sample towards the next."""
+    (begin, _, a), (end, _, b) = before, after
+    sheet.heading("the two samples around the time")
+    f = fraction(sheet, begin, end, at_ns)
+    sheet.say(f"a: {_line(sheet, a)}")
+    sheet.say(f"b: {_line(sheet, b)}")
+    if not brief:
+        return between(sheet, a, b, f)
+    found = rigid.interpolate(*a, *b, f, floats)
+    x, y, z = (sheet.inner((1.0 - f, f), pair) for pair in zip(a[:3], b[:3], strict=True))
+    weights = f"{sheet.number(1.0 - f)}·", f"{sheet.number(f)}·"
+    parts: list[str | Matrix] = [weights[0], upright(a[:3]), "+", weights[1], upright(b[:3]), "=", upright((x, y, z))]
+    sheet.grid("t", "(1 - f) ta + f tb", r"(1 - f)\,t_a + f\,t_b", parts, "m")
+    sheet.slerped(a[3:], b[3:], f, found[3:])
+    return x, y, z, *found[3:]
+
+
+def _joined(sheet: Sheet, to_target: list[Edge], to_source: list[Edge], *, brief: bool) -> Rigid:
+    """Multiply both branches and join them; where the branch to the target is empty nothing is inverted."""
+    if brief:
+        sheet.say("A long chain: one product a line; --explain-full writes every product out.")
+    down, up = _product(sheet, to_target, brief=brief), _product(sheet, to_source, brief=brief)
+    if down is None and up is not None:
+        return up[2]
+    if down is None:
+        raise AssertionError(to_target)  # the frames differ: there is an edge
+    top, target, pose = down
+    back = inverse(sheet, pose, top, target)
+    return back if up is None else compose(sheet, back, up[2], (target, top, up[1]), brief=brief)
+
+
+def _product(sheet: Sheet, edges: list[Edge], *, brief: bool) -> Edge | None:
+    """Multiply the edges of a branch, topmost first."""
+    if not edges:
+        return None
+    top, here, pose = edges[0]
+    for _, child, edge in edges[1:]:
+        pose = compose(sheet, pose, edge, (top, here, child), brief=brief)
+        here = child
+    return top, here, pose

@@ -1,0 +1,256 @@
+"""From the quaternion to each representation: one block a representation, and the table of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.explain.sheet import RADIANS, Sheet
+from frametool.explain.steps import direction, rows, to_degrees
+from frametool.explain.to_quaternion import ENTRIES, XYZ, XYZW
+from frametool.geometry import euler as kernel
+from frametool.geometry import floats
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.explain.sheet import Values
+    from frametool.grammar.readers import Quaternion
+
+    Block = Callable[..., Sequence[float]]  # (sheet, quaternion, axes, degrees, keep_sign) to numbers in column order
+
+NEAR_LOCK = 1e-3  # of h: below, the entries of the matrix lose more digits than the derivation may be off
+ENTRY = dict(
+    zip(
+        ENTRIES,
+        (
+            "1 - 2*(y**2 + z**2)", "2*(x*y - z*w)", "2*(x*z + y*w)",
+            "2*(x*y + z*w)", "1 - 2*(x**2 + z**2)", "2*(y*z - x*w)",
+            "2*(x*z - y*w)", "2*(y*z + x*w)", "1 - 2*(x**2 + y**2)",
+        ),
+        strict=True,
+    )
+)  # fmt: skip
+DET = "r11*(r22*r33 - r23*r32) + r12*(r23*r31 - r21*r33) + r13*(r21*r32 - r22*r31)"
+COVER = "Double cover: q and -q are one rotation. The sign with w >= 0 is taken (w = 0: first of x, y, z positive)."
+LOCK = "Gimbal lock: the first and the third axis coincide; only one sum of their angles is known, not each."
+NOT_ASIN = "pitch = atan2(-r31, h), not asin(-r31): asin loses half the digits near +-90 deg."
+NOT_ACOS = "2 atan2(s, w), not 2 acos(w): acos loses half the digits near no rotation."
+COLUMNS = "Column k is axis k of the source frame, written in the target frame."
+
+
+def quaternion(
+    sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, keep_sign: bool  # noqa: FBT001
+) -> Sequence[float]:
+    """Choose the sign; the order is x, y, z, w."""
+    if keep_sign or _first(q) >= 0.0:
+        return q
+    sheet.heading("The quaternion with w >= 0")
+    return canonical(sheet, q)
+
+
+def wxyz(sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+    """Choose the sign and put the scalar first."""
+    sheet.heading("The quaternion as w, x, y, z")
+    sheet.say("The scalar stands first; other libraries put it last, and four numbers do not say which.")
+    x, y, z, w = q if keep_sign else canonical(sheet, q)
+    sheet.say(f"w {sheet.number(w)}, x {sheet.number(x)}, y {sheet.number(y)}, z {sheet.number(z)}")
+    return w, x, y, z
+
+
+def canonical(sheet: Sheet, q: Quaternion, first: float | None = None) -> Quaternion:
+    """Return q or -q, with steps if the sign is turned; `first` decides it, else w or the first that is not 0."""
+    if (_first(q) if first is None else first) >= 0.0:
+        return q
+    values = dict(zip(XYZW, q, strict=True))
+    x, y, z, w = (sheet.step(values, f"q{name}", f"-{name}") for name in XYZW)
+    sheet.caveat(COVER)
+    return x, y, z, w
+
+
+def _first(q: Quaternion) -> float:
+    x, y, z, w = q
+    return w or x or y or z
+
+
+def matrix(
+    sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, _keep_sign: bool  # noqa: FBT001
+) -> Sequence[float]:
+    """Work out the nine entries."""
+    values = dict(zip(XYZW, q, strict=True))
+    sheet.heading("Quaternion to matrix")
+    return entries(sheet, values)
+
+
+def entries(sheet: Sheet, values: Values) -> Sequence[float]:
+    """Add the nine entries of x, y, z, w, and the check of the determinant."""
+    found = [sheet.step(values, name, formula) for name, formula in ENTRY.items()]
+    sheet.grid("R", "", "", [rows(found)])
+    sheet.caveat(COLUMNS)
+    sheet.step(values, "det", DET)
+    return found
+
+
+def rpy(sheet: Sheet, q: Quaternion, _axes: str, degrees: bool, _keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+    """Read the angles off five entries of the matrix; near lock off half their sum and difference."""
+    values = dict(zip(XYZW, q, strict=True))
+    flat = _level(sheet, values)
+    names = ("roll", "pitch", "yaw")
+    sheet.heading("Quaternion to roll, pitch, yaw")
+    if flat < NEAR_LOCK:
+        sheet.say("pitch is so near +-90 deg that the entries of the matrix lose digits. Instead:")
+        return _by_halves(sheet, values, "sxyz", names, degrees=degrees)
+    for name in ("r11", "r21", "r31", "r32", "r33"):
+        sheet.step(values, name, ENTRY[name])
+    sheet.step(values, "h", "sqrt(r11**2 + r21**2)")
+    sheet.step(values, "roll", "atan2(r32, r33)", RADIANS)
+    sheet.step(values, "pitch", "atan2(-r31, h)", RADIANS)
+    sheet.step(values, "yaw", "atan2(r21, r11)", RADIANS)
+    sheet.caveat(NOT_ASIN)
+    return to_degrees(sheet, values, *names) if degrees else [values[name] for name in names]
+
+
+def _level(sheet: Sheet, values: Values) -> float:
+    """Return the cosine of the pitch, without showing the steps to it."""
+    aside, inner = Sheet(sheet.digits, clean=sheet.clean), dict(values)
+    for name in ("r11", "r21"):
+        aside.step(inner, name, ENTRY[name])
+    return aside.step(inner, "h", "sqrt(r11**2 + r21**2)")
+
+
+def euler(sheet: Sheet, q: Quaternion, axes: str, degrees: bool, _keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+    """Take half the sum and half the difference of the outer angles as directions (Bernardes & Viollet 2022)."""
+    values = dict(zip(XYZW, q, strict=True))
+    sheet.heading(f"Quaternion to Euler angles {axes}")
+    fixed = "the fixed axes" if axes[0] == "s" else "the axes as they turn along,"
+    sheet.say(f"{axes}: a1, a2, a3 about {fixed} {', then '.join(axes[1:])}.")
+    return _by_halves(sheet, values, axes, ("a1", "a2", "a3"), degrees=degrees)
+
+
+def _by_halves(
+    sheet: Sheet, values: Values, axes: str, names: tuple[str, str, str], *, degrees: bool
+) -> Sequence[float]:
+    """Add the three angles of a convention."""
+    i, j, k, parity, symmetric, static = kernel.AXES[axes]
+    vi, vj, vk = "xyz"[i], "xyz"[j], "xyz"[k]
+    plus, minus = ("+", "-") if parity > 0.0 else ("-", "+")
+    first, middle, third = names
+    sheet.say(f"(a, b) points along half the sum of {first} and {third}, (c, d) along half their difference.")
+    if symmetric:
+        formulas = {"a": "w", "b": vi, "c": vj, "d": vk if parity > 0.0 else f"-{vk}"}
+    else:
+        formulas = {"a": f"w {plus} {vj}", "b": f"{vi} + {vk}", "c": f"w {minus} {vj}", "d": f"{vi} - {vk}"}
+    for name, formula in formulas.items():
+        sheet.step(values, name, formula)
+    x, y, z, w = (values[name] for name in XYZW)
+    locked = bool(kernel.locked(x, y, z, w, axes))
+    if symmetric:
+        sheet.step(values, "k", "sqrt(c**2 + d**2)")
+        sheet.step(values, "h", "sqrt(a**2 + b**2)")
+        sheet.step(values, middle, "2*atan2(k, h)", RADIANS)
+    else:
+        sheet.step(values, "h", "sqrt((a**2 + b**2)*(c**2 + d**2))")
+        sheet.step(values, "k", f"2*(w*{vj} {plus} {vi}*{vk})")
+        sheet.step(values, middle, "atan2(k, h)", RADIANS)
+    if locked:
+        by_sum = values["a"] ** 2 + values["b"] ** 2 > values["c"] ** 2 + values["d"] ** 2
+        sheet.step(values, first, _at_lock(by_sum=by_sum, static=static), RADIANS)
+        sheet.chosen(values, third, 0.0, RADIANS)
+        sheet.caveat(LOCK)
+    else:
+        sums, differences = ("b*c + a*d", "a*c - b*d"), ("b*c - a*d", "a*c + b*d")
+        for number, (name, (rise, run)) in enumerate(
+            zip((first, third), (differences, sums) if static else (sums, differences), strict=True), 1
+        ):
+            sheet.step(values, f"y{number}", rise)
+            sheet.step(values, f"x{number}", run)
+            sheet.step(values, name, f"atan2(y{number}, x{number})", RADIANS)
+        _warn_beside_lock(sheet, values, names)
+    return to_degrees(sheet, values, *names) if degrees else [values[name] for name in names]
+
+
+def _warn_beside_lock(sheet: Sheet, values: Values, names: tuple[str, str, str]) -> None:
+    """Say how much of the outer angles is rounding where the axes nearly coincide."""
+    a, b, c, d = (values[name] for name in "abcd")
+    level = floats.sqrt((a * a + b * b) * (c * c + d * d))
+    if 0.0 < level < NEAR_LOCK:
+        sheet.caveat(
+            f"Beside lock: {names[0]} and {names[2]} each are known only to about {4e-16 / level:.0e} rad, and by so "
+            "much the result may differ; one sum of them is known to all digits."
+        )
+
+
+def _at_lock(*, by_sum: bool, static: bool) -> str:
+    """Return the formula of the first angle where the third is 0: twice that of the pair that is left."""
+    if by_sum:
+        return "atan2(2*a*b, a**2 - b**2)"
+    return "atan2(-2*c*d, c**2 - d**2)" if static else "atan2(2*c*d, c**2 - d**2)"
+
+
+def axis_angle(
+    sheet: Sheet, q: Quaternion, _axes: str, degrees: bool, _keep_sign: bool  # noqa: FBT001
+) -> Sequence[float]:
+    """Divide the vector by its length; the angle from both."""
+    sheet.heading("Quaternion to axis and angle")
+    values = dict(zip(XYZW, canonical(sheet, q), strict=True))
+    if not _axis(sheet, values):
+        sheet.say("No rotation: the angle is 0, any axis will do, and x is taken.")
+        return 1.0, 0.0, 0.0, 0.0
+    angle = to_degrees(sheet, values, "angle")[0] if degrees else values["angle"]
+    return values["vx"], values["vy"], values["vz"], angle
+
+
+def _axis(sheet: Sheet, values: Values) -> bool:
+    """Add s, the angle and the unit axis; return whether there is one."""
+    if not any(values[name] for name in XYZ):
+        return False
+    direction(sheet, values, XYZ, ("vx", "vy", "vz"), "s")
+    sheet.step(values, "angle", "2*atan2(s, w)", RADIANS)
+    sheet.caveat(NOT_ACOS)
+    return True
+
+
+def rotvec(sheet: Sheet, q: Quaternion, _axes: str, degrees: bool, _keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+    """Multiply the axis with the angle."""
+    sheet.heading("Quaternion to rotation vector")
+    values = dict(zip(XYZW, canonical(sheet, q, q[3]), strict=True))
+    if not _axis(sheet, values):
+        sheet.say("No rotation: the vector is 0.")
+        return 0.0, 0.0, 0.0
+    unit = "deg" if degrees else RADIANS
+    angle = "angle_deg" if degrees else "angle"
+    if degrees:
+        to_degrees(sheet, values, "angle")
+    return [sheet.step(values, f"r{name}{'_deg' * degrees}", f"v{name}*{angle}", unit) for name in XYZ]
+
+
+def mrp(sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, _keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+    """Project the sphere: v/(1 + w)."""
+    sheet.heading("Quaternion to modified Rodrigues parameters")
+    sheet.say("p = v tan(angle/4): with w >= 0 the shorter turn, and |p| at most 1.")
+    values = dict(zip(XYZW, canonical(sheet, q), strict=True))
+    return [sheet.step(values, f"p{name}", f"{name}/(1 + w)") for name in XYZ]
+
+
+def six_d(
+    sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, _keep_sign: bool  # noqa: FBT001
+) -> Sequence[float]:
+    """Work out the first two columns of the matrix."""
+    values = dict(zip(XYZW, q, strict=True))
+    sheet.heading("Quaternion to two columns")
+    found = [sheet.step(values, name, ENTRY[name]) for name in ("r11", "r21", "r31", "r12", "r22", "r32")]
+    sheet.say("The first column, then the second; the third is their vector product.")
+    return found
+
+
+FROM_QUATERNION: dict[str, Block] = {
+    "quaternion": quaternion,
+    "xyzw": quaternion,
+    "wxyz": wxyz,
+    "rpy": rpy,
+    "euler": euler,
+    "axis_angle": axis_angle,
+    "rotvec": rotvec,
+    "matrix": matrix,
+    "mrp": mrp,
+    "six_d": six_d,
+}

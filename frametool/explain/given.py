@@ -1,0 +1,162 @@
+"""Poses as they were written: the notation and its numbers beside the pose they are, so that the way to it shows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.documents.source import Source
+from frametool.errors import ValueInvalid, printable
+from frametool.explain.operations import inverse
+from frametool.explain.to_quaternion import TO_QUATERNION, block_of
+from frametool.grammar import pose_algebra
+from frametool.grammar.pose import Pose
+from frametool.stream.record_values import documents, pose_of
+from frametool.stream.request import Request
+from frametool.stream.row_layout import POSE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.explain.sheet import Sheet
+    from frametool.geometry.representations import Notation
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.readers import Quaternion
+    from frametool.stream.record import Record
+
+INLINE = "argument"
+PLAIN = ("quaternion", "xyzw")
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+class Given(NamedTuple):
+    """A pose as it was written.
+
+    pose: what it is, read as every command reads it
+    notation: that of its rotation; None where none is written
+    numbers: of the rotation, in column order; degrees: whether its angles are degrees
+    position: x, y, z in metres as written, before `inverse: true`
+    inverse: whether what is written is the inverse
+    """
+
+    pose: Pose
+    notation: Notation | None = None
+    numbers: Sequence[float] = ()
+    degrees: bool = False
+    position: Sequence[float] = (0.0, 0.0, 0.0)
+    inverse: bool = False
+
+    def quaternion(self, sheet: Sheet) -> Quaternion:
+        """Add the way from the numbers as written to the quaternion."""
+        if self.notation is None:
+            sheet.heading("The rotation")
+            sheet.say("None is given: the identity, x 0, y 0, z 0, w 1.")
+            return IDENTITY
+        block = block_of(TO_QUATERNION, self.notation)
+        q: Quaternion = block(sheet, self.numbers, self.notation.bound_axes(), self.degrees)
+        return q
+
+    def components(self, sheet: Sheet, target: str, source: str) -> Rigid:
+        """Add the way from the numbers as written to target_from_source."""
+        if self.notation is None:
+            q: Quaternion = IDENTITY
+        elif self.is_plain:
+            x, y, z, w = self.numbers
+            q = x, y, z, w
+        else:
+            with sheet.about(f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"):
+                q = self.quaternion(sheet)
+        x, y, z = self.position
+        found: Rigid = (x, y, z, *q)
+        return inverse(sheet, found, source, target) if self.inverse else found
+
+    def turned(self) -> Given:
+        """Return the inverse: what is written stays, the pose and its frames are turned around."""
+        return self._replace(pose=pose_algebra.inverse(self.pose), inverse=not self.inverse)
+
+    @property
+    def is_plain(self) -> bool:
+        """Return whether the rotation is written as a unit quaternion, or not at all."""
+        if self.notation is None:
+            return True
+        return self.notation.representation.name in PLAIN and abs(sum(x * x for x in self.numbers) - 1.0) <= 1e-12
+
+    def say(self, sheet: Sheet, target: str, source: str) -> None:
+        """List the pose of target_from_source as it is written."""
+        sheet.reached(self.position)
+        written = f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"
+        sheet.say(f"{written}: {self._line(sheet)}{f'; its inverse is {target}_from_{source}' if self.inverse else ''}")
+
+    def _line(self, sheet: Sheet) -> str:
+        position = f"xyz {sheet.numbers(self.position)} m"
+        if self.notation is None:
+            return position
+        name = self.notation.representation.name
+        if self.notation.representation.angles:
+            name += ("_deg" if self.degrees else "_rad") + (f":{self.notation.axes}" if self.notation.axes else "")
+        return f"{position}, {'xyzw' if name == 'quaternion' else name} {sheet.numbers(self.numbers)}"
+
+
+def given_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Given]:
+    """Read the poses of a text as they are written; raises as `read_poses` does."""
+    return list(_given(source, Request(kind=POSE, degrees=degrees, normalize=normalize)))
+
+
+def _given(source: Source, request: Request) -> Iterator[Given]:
+    for _, records in documents(source, request):
+        yield from (given_of(record, request) for record in records)
+
+
+def given_of(record: Record, request: Request) -> Given:
+    """Return a record as it is written."""
+    shape = record.shape
+    numbers = shape.rotation(record.values) if shape.notation is not None else ()
+    degrees = shape.degrees if shape.notation is not None and shape.notation.representation.angles else False
+    position = shape.position(record.values)
+    return Given(pose_of(record, request), shape.notation, numbers, degrees, position, record.inverse)
+
+
+def given_pose(value: Any, *, degrees: bool = False, normalize: bool = False) -> Given:
+    """Take one pose: a mapping, its text, a Transform, a Rotation, or what is a `Given` already.
+
+    Raises ValueInvalid, FormatError.
+    """
+    if isinstance(value, Given):
+        return value
+    if isinstance(value, (dict, list)):
+        from frametool.documents.json import dump
+
+        value = Source(INLINE, dump(value))
+    if isinstance(value, str):
+        value = Source(INLINE, value)
+    if isinstance(value, Source):
+        found = given_poses(value, degrees=degrees, normalize=normalize)
+        if len(found) != 1:
+            raise ValueInvalid(f"a derivation is of one pose, {value.name} holds {len(found)}")
+        return found[0]
+    return _of_value(value)
+
+
+def _of_value(value: Any) -> Given:
+    """Take a Transform or a Rotation."""
+    from frametool.geometry.representations import notation
+    from frametool.geometry.rotation import Rotation
+    from frametool.geometry.transform import Transform
+
+    if not isinstance(value, (Transform, Rotation)) or value.shape:
+        raise ValueInvalid(f"expected one pose: a mapping, its text, a Transform or a Rotation; found {value!r:.60}")
+    components = value.components if isinstance(value, Transform) else (0.0, 0.0, 0.0, *value.components)
+    pose = Pose.of(components) if isinstance(value, Transform) else Pose(None, value.components)
+    return Given(pose, notation("quaternion"), components[3:], position=components[:3])
+
+
+def frames_of(count: int, poses: Sequence[Pose]) -> list[str]:
+    """Name the frames along a chain of poses, each as its neighbours call it, else by a letter."""
+    taken = {name for pose in poses for name in (pose.name, pose.parent) if name}
+    letters = (letter for letter in (*"abcdefghijklmnopqrstuvwxyz", *(f"f{n}" for n in range(count + 1)))
+               if letter not in taken)  # fmt: skip
+    names = []
+    for at in range(count):
+        before = poses[at - 1].name if at else None
+        after = poses[at].parent if at < len(poses) else None
+        names.append(printable(before or after or next(letters)))
+    return names

@@ -1,0 +1,361 @@
+"""Tables of Denavit-Hartenberg parameters: a row a joint, in CSV, TSV or between blanks, in YAML or JSON.
+
+    joint,theta,d,a,alpha_deg
+    1,q1,0.089159,0,90
+
+standard: turn by theta about z and shift by d along it, then shift by a along x and turn by alpha about it.
+modified (Craig): alpha and a first, of the joint before, then theta and d.  Nothing in a table says which: `--dh` does.
+Metres and radians; a column that ends in deg or mm has that unit, a cell may have its own.  Joints stand at 0, which is
+added to what theta says, or d of a sliding one.  link0 carries link1 and so on: parent<-child.
+
+The rows of a table of Denavit-Hartenberg parameters, whatever it is written in, each number with its place.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from math import radians
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.documents.document import format_error, parse_documents
+from frametool.documents.json import looks_like_json
+from frametool.documents.source import pointer
+from frametool.errors import FormatError, Unanswered, ValueInvalid, shown
+from frametool.formats.robots.joints import Joint
+from frametool.formats.robots.posture import Posture
+from frametool.geometry import euler, floats, rigid
+from frametool.grammar.edges import Edge
+from frametool.grammar.readers import kind
+from frametool.text.csv_line import LineCell, split_line
+from frametool.text.numbers import NotFinite, parse_angle, parse_length, parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Path
+
+    Fail = Callable[[str], FormatError]
+
+# what people call a column, without its unit and the number of the joint
+COLUMNS = {
+    "theta": ("theta", "\u03b8", "th", "joint_angle", "q"),
+    "d": ("d", "link_offset"),
+    "a": ("a", "r", "link_length"),
+    "alpha": ("alpha", "\u03b1", "twist", "link_twist"),
+    "offset": ("offset", "theta_offset", "joint_offset"),
+    "type": ("type", "joint_type", "kind", "sigma"),
+    "name": ("name", "joint", "joint_name", "link", "i", "j", "id", "#", "no", "frame", "index"),
+}
+NEEDED = ("d", "a", "alpha")
+ANGLES = ("deg", "rad")
+UNITS = {
+    "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radians": "rad",
+    "m": "m", "cm": "cm", "mm": "mm",
+}  # fmt: skip
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0}
+KINDS = {
+    "r": "revolute", "revolute": "revolute", "rotational": "revolute", "rotary": "revolute", "0": "revolute",
+    "continuous": "revolute", "p": "prismatic", "prismatic": "prismatic", "linear": "prismatic", "1": "prismatic",
+    "fixed": "fixed", "f": "fixed",
+}  # fmt: skip
+_BRACKETED = r"(.+?)[ _]*[\[(] *([\w°]+) *[\])]"
+_SUFFIXED = r"(.+)_([a-z]+)"
+_INDEX = r"[ _]*[({\[]*(?:i|n|j|k)(?: *[-_] *1)?[)}\]]*$"  # theta_i, a_(i-1), alpha_{i-1}
+_VARIABLE = r"([^\W\d]\w*)\*?(?: *([-+]) *(.+))?"  # q1, d3*, q2 - pi/2
+_STARRED = r"(.*?) *\*"
+
+
+class Column(NamedTuple):
+    """Which column it is, and its unit, "" where it says none."""
+
+    name: str
+    unit: str
+
+
+class Cell(NamedTuple):
+    """One number as text, the unit of its column, and what makes the error for its place."""
+
+    text: str
+    unit: str
+    fail: Fail
+
+
+class Amount(NamedTuple):
+    """An angle or a length, in degrees or in radians and metres; `variable` is the name of the joint's value in it."""
+
+    number: float = 0.0
+    degrees: bool = False
+    variable: str | None = None
+
+    def plus(self, other: Amount) -> Amount:
+        """Add another one."""
+        if self.degrees == other.degrees or not other.number:
+            return self._replace(number=self.number + other.number)
+        one, two = (radians(each.number) if each.degrees else each.number for each in (self, other))
+        return Amount(one + two, variable=self.variable)
+
+
+class DhRow(NamedTuple):
+    """One joint: theta and d with their offsets, and what makes the error for its place."""
+
+    name: str
+    kind: str
+    theta: Amount
+    d: Amount
+    a: float
+    alpha: Amount
+    fail: Fail
+
+
+def rows_of(file: InputFile) -> list[DhRow]:
+    """Return the rows of a table; raises FormatError with the place."""
+    text = file.text
+    is_document = looks_like_json(text) or re.search(r"(?m)^ *(?:- *)?[{\[]|^ *(?:- +)?[\w.-]+:(?:\s|$)", text)
+    cells = _of_documents(file) if is_document else _of_lines(file)
+    rows = [_row(number, each, fail) for number, (each, fail) in enumerate(cells, 1)]
+    if not rows:
+        raise FormatError("a table without rows", source=file.name)
+    seen: dict[str, int] = {}
+    for number, row in enumerate(rows, 1):
+        if row.name in seen:
+            raise row.fail(f"two joints are called {shown(row.name)}: rows {seen[row.name]} and {number}")
+        seen[row.name] = number
+    return rows
+
+
+def column_of(written: str) -> Column | None:
+    """Return which column a header names, by any of the names in use; None if it is no other's business."""
+    base, unit = written.strip().lower(), ""
+    for pattern in (_BRACKETED, _SUFFIXED):
+        if (match := re.fullmatch(pattern, base)) and match[2] in UNITS:
+            base, unit = match[1], UNITS[match[2]]
+            break
+    for name in (base, re.sub(_INDEX, "", base)):
+        if found := next((column for column, names in COLUMNS.items() if name in names), None):
+            return Column(found, unit)
+    return None
+
+
+def _row(number: int, cells: dict[str, Cell], fail: Fail) -> DhRow:
+    """Read one row."""
+    if missing := [name for name in NEEDED if name not in cells]:
+        raise fail(f"missing {', '.join(missing)}; a row has theta, d, a, alpha, maybe offset, type and joint")
+    none = Cell("0", "", fail)
+    theta = _read(cells.get("theta", none), _angle)
+    d = _read(cells["d"], _length)
+    kind = _kind(cells.get("type"), "prismatic" if d.variable is not None else "revolute")
+    if (d.variable if kind != "prismatic" else theta.variable) is not None:
+        raise fail(f"a {kind} joint with a variable {'d' if kind != 'prismatic' else 'theta'}")
+    if kind == "fixed" and theta.variable is not None:
+        raise fail("a fixed joint with a variable theta")
+    offset = _read(cells.get("offset", none), _length if kind == "prismatic" else _angle)
+    theta, d = (theta, d.plus(offset)) if kind == "prismatic" else (theta.plus(offset), d)
+    told = cells["name"].text if "name" in cells else ""
+    name = theta.variable or d.variable or (f"joint{number}" if not told or told.isdecimal() else told)
+    a, alpha = _read(cells["a"], _length), _read(cells["alpha"], _angle)
+    for column, amount in (("a", a), ("alpha", alpha)):
+        if amount.variable is not None:
+            raise cells[column].fail(f"{shown(cells[column].text)} is not a number; only theta or d vary")
+    return DhRow(name, kind, theta, d, a.number, alpha, fail)
+
+
+def _kind(cell: Cell | None, otherwise: str) -> str:
+    if cell is None or not cell.text:
+        return otherwise
+    if cell.text.lower() not in KINDS:
+        raise cell.fail(f"unknown type {shown(cell.text)}; known: revolute (R, 0), prismatic (P, 1), fixed")
+    return KINDS[cell.text.lower()]
+
+
+def _read(cell: Cell, read: Callable[[str, str], Amount]) -> Amount:
+    """Read a number, or the joint's variable with what is added to it; raises the error of the cell."""
+    text = cell.text
+    try:
+        return read(text, cell.unit)
+    except NotFinite as error:
+        raise cell.fail(str(error)) from None
+    except ValueInvalid as error:
+        try:
+            if match := re.fullmatch(_STARRED, text):
+                constant = read(match[1] or "0", cell.unit)
+                return constant._replace(variable="")
+            if match := re.fullmatch(_VARIABLE, text):
+                constant = read(match[3] or "0", cell.unit)
+                signed = -constant.number if match[2] == "-" else constant.number
+                return constant._replace(number=signed, variable=match[1])
+        except ValueInvalid:
+            pass
+        raise cell.fail(str(error)) from None
+
+
+def _angle(text: str, unit: str) -> Amount:
+    if unit and unit not in ANGLES:
+        raise ValueInvalid(f"an angle in {unit}")
+    number, own = parse_angle(text)
+    return Amount(number, degrees=(own or unit) == "deg")
+
+
+def _length(text: str, unit: str) -> Amount:
+    if unit not in LENGTHS:
+        raise ValueInvalid(f"a length in {unit}")
+    is_bare = not re.search(r"[a-z]", text.lower().replace("e", ""))
+    return Amount(parse_number(text) / LENGTHS[unit] if is_bare else parse_length(text))
+
+
+def _of_lines(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
+    """Yield the rows of a text with a line a row, below a header."""
+    lines = [(number, line) for number, line in enumerate(file.text.split("\n"), 1) if line.strip()]
+    begin = next((at for at, (_, line) in enumerate(lines) if _columns(line)), None)
+    if begin is None:
+        raise FormatError(
+            "no header with d, a and alpha above the rows; write theta,d,a,alpha", source=file.name, line=1
+        )
+    number, header = lines[begin]
+    columns = _columns(header)
+    twice = [column.name for column in columns.values()]
+    for name in twice:
+        if twice.count(name) > 1:
+            raise _line_error(file, number, 1, f"two columns for {name}; keep one")
+    for number, line in lines[begin + 1 :]:
+        if line.lstrip().startswith("#"):
+            continue
+        words = _split(line)
+        if len(words) != len(_split(header)):
+            raise _line_error(file, number, 1, f"expected {len(_split(header))} cells, found {len(words)}")
+        cells = {
+            column.name: Cell(words[at].text, column.unit, partial(_line_error, file, number, words[at].column))
+            for at, column in columns.items()
+        }
+        yield cells, partial(_line_error, file, number, 1)
+
+
+def _columns(line: str) -> dict[int, Column]:
+    """Return the columns that a header names, by their places; nothing for a line that is no header."""
+    found = {at: column for at, word in enumerate(_split(line)) if (column := column_of(word.text))}
+    return found if {"a", "alpha"} <= {column.name for column in found.values()} else {}
+
+
+def _split(line: str) -> list[LineCell]:
+    """Return the cells of a line between tabs, semicolons, commas or blanks; a # before them counts for nothing."""
+    line = re.sub("^( *)#", r"\1 ", line.rstrip())
+    mark = next((mark for mark in "\t;," if mark in line), "")
+    if mark == ",":
+        return split_line(line)
+    pattern = rf"[^{mark}]*" if mark else r"[^\s\[(]+(?: ?[\[(]\S+[\])])?(?: [-+] \S+)?"
+    found = [LineCell(match[0].strip(), match.start() + 1) for match in re.finditer(pattern, line)]
+    return found[:: 2 if mark and line.count(mark) + 1 < len(found) else 1]
+
+
+def _line_error(file: InputFile, line: int, column: int, message: str) -> FormatError:
+    text = file.text.split("\n")[line - 1].rstrip("\r")
+    return FormatError(message, source=file.name, line=line, column=column, snippet=pointer(text, column))
+
+
+def _of_documents(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
+    """Yield the rows of YAML or JSON."""
+    source = file.source
+    for document in parse_documents(source.text, source.name):
+        rows = _find_rows(document.value, ())
+        if rows is None:
+            message = "no table in it: expected a list of {theta, d, a, alpha}, a map of them, or a list a column"
+            raise format_error(source, (document.index,), message)
+        for name, row in rows:
+            cells = {}
+            for key, (value, path) in row.items():
+                fail = partial(format_error, source, (document.index, *path))
+                column = column_of(key)
+                if column is not None and value is not None and type(value) is not str:
+                    raise fail(f"expected a number, found {kind(value)}")
+                if column is not None:
+                    cells[column.name] = Cell(value or "0", column.unit, fail)
+            place = next(iter(row.values()))[1]
+            if name and "name" not in cells:
+                cells["name"] = Cell(name, "", partial(format_error, source, (document.index, *place[:-1])))
+            yield cells, partial(format_error, source, (document.index, *place[:-1]))
+
+
+def _find_rows(value: Any, path: Path, depth: int = 0) -> list[tuple[str, dict[str, tuple[Any, Path]]]] | None:
+    """Return the rows as (name, key -> value and its place); None where there are none."""
+    if depth > 4 or type(value) not in (dict, list) or not value:
+        return None
+    items = list(value.items() if type(value) is dict else enumerate(value))
+    if all(_is_row(each) for _, each in items[:1]) and all(type(each) is dict for _, each in items):
+        named = type(value) is dict
+        return [(str(key) if named else "", _placed(each, (*path, key))) for key, each in items]
+    if _is_row(value):
+        return _turned(value, path)
+    found = (_find_rows(each, (*path, key), depth + 1) for key, each in items)
+    return next((rows for rows in found if rows is not None), None)
+
+
+def _is_row(value: Any) -> bool:
+    names = {column.name for key in value if (column := column_of(key))} if type(value) is dict else set()
+    return {"a", "alpha"} <= names
+
+
+def _placed(row: dict[str, Any], path: Path) -> dict[str, tuple[Any, Path]]:
+    return {key: (each, (*path, key)) for key, each in row.items()}
+
+
+def _turned(columns: dict[str, Any], path: Path) -> list[tuple[str, dict[str, tuple[Any, Path]]]]:
+    """Make rows of a map of columns; of a map of single numbers one row."""
+    known = {key: each for key, each in columns.items() if column_of(key)}
+    if not any(type(each) is list for each in known.values()):
+        return [("", _placed(known, path))]
+    lists = {key: each if type(each) is list else [each] for key, each in known.items()}
+    count = max(map(len, lists.values()))
+    return [
+        ("", {key: (each[at], (*path, key, at)) for key, each in lists.items() if at < len(each)})
+        for at in range(count)
+    ]
+
+
+AXIS = (0.0, 0.0, 1.0)
+TURN = 6.283185307179586
+_IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield an edge a row, its joint as told, else at 0."""
+    rows = rows_of(file)
+    if not options.answers.dh:
+        choice = "--dh standard (a and alpha behind the joint) or --dh modified (Craig: before it)"
+        error = rows[0].fail(f"nothing in a table of Denavit-Hartenberg parameters says which they are: give {choice}")
+        raise Unanswered(error.message, source=error.source, line=error.line, column=error.column)
+    fails = {row.name: row.fail for row in rows}
+    joints = [Joint(row.name, row.kind, AXIS, line=row.fail("").line) for row in rows if row.kind != "fixed"]
+    fixed = [row.name for row in rows if row.kind == "fixed"]
+    posture = Posture(joints, options, lambda joint, problem: fails[joint.name](problem), fixed=fixed)
+    options.tally.about = ", ".join(filter(None, (options.answers.dh, options.tally.about)))
+    frames = options.answers.names(*(f"link{number}" for number in range(len(rows) + 1)))
+    for row, parent, child in zip(rows, frames, frames[1:], strict=False):
+        line = row.fail("").line
+        _tell_degrees(row, line, options)
+        before, behind = _parts(row, modified=options.answers.dh == "modified")
+        motions = posture.motions(row.name) if row.kind != "fixed" else [(None, (_IDENTITY,))]
+        for stamp_ns, (moved,) in motions:
+            pose = rigid.compose(*rigid.compose(*before, *moved), *behind)
+            yield Edge(parent, child, pose, stamp_ns, line)
+
+
+def _parts(row: DhRow, *, modified: bool) -> tuple[Rigid, Rigid]:
+    """Return the poses before and behind the motion of a joint, which turns about z or shifts along it."""
+    along_z: Rigid = (0.0, 0.0, row.d.number, *_turned_by_hand((0.0, 0.0, row.theta.number), row.theta))
+    along_x: Rigid = (row.a, 0.0, 0.0, *_turned_by_hand((row.alpha.number, 0.0, 0.0), row.alpha))
+    return (along_x, along_z) if modified else (_IDENTITY, rigid.compose(*along_z, *along_x))
+
+
+def _turned_by_hand(angles: tuple[float, float, float], amount: Amount) -> tuple[float, float, float, float]:
+    return euler.to_quaternion(*angles, "sxyz", floats, degrees=amount.degrees)
+
+
+def _tell_degrees(row: DhRow, line: int, options: Options) -> None:
+    """Wonder about bare angles beyond a full turn."""
+    for name, amount in (("theta", row.theta), ("alpha", row.alpha)):
+        if not amount.degrees and abs(amount.number) > TURN:
+            message = f"{name} {amount.number:g} is more than a full turn in radians; degrees? write {name}_deg"
+            options.tally.note_each(message, line, "degrees")

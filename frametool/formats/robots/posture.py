@@ -1,0 +1,567 @@
+"""Where the joints of one robot stand, at one time or over time: as told by options and files, else at rest.
+
+A joint that mimics another follows it, in chains too; only its own name overrides that.
+
+Files that say where joints stand: maps in YAML and JSON, JointState messages, tables, states of other forms.
+
+    {shoulder: 30deg, gripper: 2cm, base: {xyz: [1, 0, 0]}}          with `stamp`, one of many: the joints move
+    {name: [shoulder, gripper], position: [0.5, 0.02]}               JointState, of either ROS, one or many
+    t,shoulder_deg,gripper                                           a table; without a stamp its last row counts
+    robot.srdf:ready                                                 a state that another form has a name for
+
+Each statement keeps its place; what it means is for those who know the joint.
+
+Joints among the columns of a table, by name: `elbow`, `elbow_deg`, `elbow [deg]`, `finger (mm)`; also stamps.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from bisect import bisect_left
+from functools import partial
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+from frametool.documents.source import InputFile, Source
+from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
+from frametool.formats.detect import detect
+from frametool.formats.robots.joints import IDENTITY, TURNING, JointValue, followed, motion, read_value
+from frametool.formats.table import FORMATS, readers
+from frametool.frames.stamps import format_stamp, parse_stamp
+from frametool.geometry import floats, rigid
+from frametool.grammar.edges import Edge, Tally
+from frametool.grammar.readers import Misfit, Note, as_mapping, kind
+from frametool.ros import joint_state, messages
+from frametool.ros.message_stream import Message, line_texts, read_messages
+from frametool.text.csv_line import split_line
+from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+
+    from frametool.formats.robots.joints import Joint, Value
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Path
+
+    Series = Mapping[int, Value]
+    Fail = Callable[[Joint, str], FormatError]
+
+SLACK = 1e-9  # by which a value may lie beyond a limit: printed with fewer digits than it has
+HALF_TURN = 3.141592653589793
+STATES = "--joint NAME=VALUE"
+
+
+class Posture:
+    """The values of all joints of a robot: one each, or samples over time.
+
+    still, moving: values by name, or by name and stamp
+    given: names of the joints told of; the others follow them, or are at rest
+    """
+
+    def __init__(self, joints: Iterable[Joint], options: Options, fail: Fail, *, fixed: Collection[str] = ()) -> None:
+        """Take what options and files say.
+
+        joints: those that move, each name once
+        options: `answers` holds what was told; `tally` takes the names nobody here has, and what is odd
+        fail: makes the error for the place of a joint
+        fixed: names of joints that do not move
+        Raises FormatError: a value that is none, mimics in a circle or of no joint.
+        """
+        self.joints = {joint.name: joint for joint in joints}
+        self.still: dict[str, Value] = {}
+        self.moving: dict[str, Series] = {}
+        self._times: dict[str, list[int]] = {}
+        self._options = options
+        self._fixed = frozenset(fixed)
+        self._take_files()
+        self._take_options()
+        self._tell_limits()
+        self.given = frozenset((*self.still, *self.moving))
+        self.told = set(self.given)
+        self._follow(fail)
+        options.tally.has_joints = True
+        options.tally.about = options.tally.about or self._about()
+
+    def edges(self, parent: str, child: str, origin: Rigid, joint: str, line: int = 0) -> Iterator[Edge]:
+        """Yield the edge across one joint: for good, or a sample at each time; `origin` is the pose at rest."""
+        for stamp_ns, (moved,) in self.motions(joint):
+            pose = origin if moved is IDENTITY else rigid.compose(*origin, *moved)
+            yield Edge(parent, child, pose, stamp_ns, line)
+
+    def motions(self, *names: str) -> Iterator[tuple[int | None, tuple[Rigid, ...]]]:
+        """Yield what joints do together to the frames behind them: once without a stamp, or at each of their times.
+
+        A joint without a sample at the time of another one is interpolated.
+        """
+        joints = [self.joints[name] for name in names]
+        moving = [name for name in names if name in self.moving]
+        if not moving:
+            yield None, tuple(motion(joint, self.still[joint.name]) for joint in joints)
+            return
+        for stamp_ns in self._common_times(moving):
+            yield stamp_ns, tuple(motion(joint, self._at(joint.name, stamp_ns)) for joint in joints)
+
+    def _common_times(self, moving: Sequence[str]) -> list[int]:
+        """Return the times at which any of some joints has a sample and all are known."""
+        begin = max(min(self.moving[name]) for name in moving)
+        end = min(max(self.moving[name]) for name in moving)
+        if begin > end:
+            problem = f"joints {listing(moving)} move one frame and have no time in common"
+            files = ", ".join(self._options.answers.joint_files)
+            raise FormatError(f"{problem}; their values end at {format_stamp(end)}, or begin later", source=files)
+        return sorted({at for name in moving for at in self.moving[name] if begin <= at <= end})
+
+    def _at(self, name: str, stamp_ns: int) -> Value:
+        """Return the value of a joint at a time between its first and last sample, or the one it has always."""
+        if name in self.still:
+            return self.still[name]
+        series = self.moving[name]
+        if stamp_ns in series:
+            return series[stamp_ns]
+        times = self._times.setdefault(name, [*series])
+        after = bisect_left(times, stamp_ns)
+        begin, end = times[after - 1], times[after]
+        return _between(series[begin], series[end], (stamp_ns - begin) / (end - begin))
+
+    def _take_files(self) -> None:
+        """Read all files; the later one counts, and of one file all its samples."""
+        if not self._options.answers.joint_files:
+            return
+
+        for path in self._options.answers.joint_files:
+            found: dict[str, list[tuple[int | None, Value]]] = {}
+            setting = None
+            for setting in JointFile(path, self.joints).settings():
+                if setting.joint in self.joints:
+                    found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting)))
+                elif setting.loose and (setting.joint in self._fixed or type(setting.value) is dict):
+                    message = f"{path}: joint {shown(setting.joint)} does not move in the robot; its value is left out"
+                    self._options.tally.note(Note("odd", message, ()), 1)
+                else:
+                    problem = unknown_joint(setting.joint, self.joints, self._fixed)
+                    self._options.tally.unknown_joints.setdefault(setting.joint, setting.refuse(problem, ()))
+            if setting is None:
+                raise FormatError("no values of joints in it", source=path)
+            for name, values in found.items():
+                self._take(name, values)
+
+    def _read(self, setting: Setting) -> Value:
+        normalize = self._options.normalize
+        try:
+            return read_value(self.joints[setting.joint], setting.value, setting.source, normalize=normalize)
+        except Misfit as misfit:
+            raise setting.refuse(str(misfit), misfit.path) from None
+        except ValueInvalid as error:
+            raise setting.refuse(str(error), ()) from None
+
+    def _take(self, name: str, values: Sequence[tuple[int | None, Value]]) -> None:
+        """Keep the samples of one joint; one that stays where it is stands still, and without times the last counts."""
+        self.still.pop(name, None)
+        self.moving.pop(name, None)
+        series = {stamp_ns: value for stamp_ns, value in values if stamp_ns is not None}
+        last = values[-1][1]
+        if any(stamp_ns is None for stamp_ns, _ in values) or all(value == last for value in series.values()):
+            self.still[name] = last
+        else:
+            self.moving[name] = dict(sorted(series.items()))
+
+    def _take_options(self) -> None:
+        """Read what `--joint` says; it wins over files."""
+        for name, text in self._options.answers.joints.items():
+            place = f"--joint {name}={text}"
+            joint = self.joints.get(name)
+            if joint is None:
+                problem = unknown_joint(name, self.joints, self._fixed)
+                self._options.tally.unknown_joints[name] = BadAnswer(f"--joint: {problem}")
+                continue
+            try:
+                value = read_value(joint, text, Source(place, text), normalize=self._options.normalize)
+            except ValueInvalid as error:
+                raise BadAnswer(f"--joint {shown(name)}: {error}") from None
+            self._take(name, [(None, value)])
+
+    def _follow(self, fail: Fail) -> None:
+        """Settle each joint that nobody told of: at its leader's value, along chains of any length, or at rest."""
+        for name, joint in self.joints.items():
+            if joint.mimic is None:
+                if name not in self.given:
+                    self.still[name] = joint.start
+                continue
+            chain = {name: None}
+            last = name
+            while (leader := self._leader(last, fail)) is not None:
+                if leader in chain:
+                    circle = [*chain][[*chain].index(leader) :][:8]
+                    drawn = " -> ".join(map(shown, [*circle, leader]))
+                    raise fail(self.joints[leader], f"joints mimic each other in a circle: {drawn}")
+                chain[leader] = None
+                last = leader
+            for follower in reversed(chain):
+                self._settle(self.joints[follower])
+
+    def _leader(self, name: str, fail: Fail) -> str | None:
+        """Return the joint that decides over one which is not settled yet."""
+        mimic = self.joints[name].mimic
+        if name in self.still or name in self.moving or mimic is None:
+            return None
+        if mimic.joint in self._fixed:
+            return None
+        if mimic.joint not in self.joints:
+            raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is no joint")
+        if self.joints[mimic.joint].posed:
+            kind = self.joints[mimic.joint].kind
+            raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {kind}")
+        return mimic.joint
+
+    def _settle(self, joint: Joint) -> None:
+        """Find the value of a joint whose leader has one."""
+        name, mimic = joint.name, joint.mimic
+        if name in self.still or name in self.moving:
+            return
+        leader = mimic.joint if mimic else ""
+        if leader in self.moving:
+            self.moving[name] = {at: followed(joint, value) for at, value in self.moving[leader].items()}
+        elif leader in self.still:
+            self.still[name] = followed(joint, self.still[leader])
+        else:
+            self.still[name] = followed(joint, JointValue(0.0)) if mimic else joint.start
+        if leader in self.told:
+            self.told.add(name)
+
+    def _tell_limits(self) -> None:
+        """Note the values told that lie beyond limits, and steps that a pose cannot follow."""
+        for name in (*self.still, *self.moving):
+            joint = self.joints[name]
+            series = self.moving.get(name) or {0: self.still[name]}
+            values = [value.plain for value in series.values() if isinstance(value, JointValue)]
+            if joint.lower is not None and joint.upper is not None and joint.lower <= joint.upper:
+                beyond = [value for value in values if not joint.lower - SLACK <= value <= joint.upper + SLACK]
+                if beyond:
+                    self._note("limit", _about_limits(joint, beyond, len(values)), joint)
+            steps = zip(series, values, values[1:], strict=False) if joint.kind == "revolute" else ()
+            if wide := next((at for at, one, two in steps if abs(two - one) >= HALF_TURN), None):
+                far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide)}"
+                self._note("odd", f"{far}; poses between go the shorter way", joint)
+
+    def _note(self, rule: str, message: str, joint: Joint) -> None:
+        self._options.tally.note(Note(rule, message, ()), joint.line)
+
+    def _about(self) -> str:
+        """Say how many joints stand where nobody said."""
+        free = [joint for joint in self.joints.values() if joint.name not in self.told]
+        if not free:
+            return ""
+        at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)
+        many = f"{len(free)} joint{'s' * (len(free) > 1)}"
+        return f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
+
+
+def _about_limits(joint: Joint, beyond: Sequence[float], count: int) -> str:
+    """Say that values of a joint lie beyond its limits."""
+    unit = "rad" if joint.kind in TURNING else "m"
+    limits = f"its limits {joint.lower:g} .. {joint.upper:g} {unit}"
+    samples = f" in {len(beyond)} of {count} samples, first" if count > 1 else ","
+    return f"joint {shown(joint.name)} is beyond {limits}{samples} {beyond[0]:g}"
+
+
+def _between(one: Value, two: Value, fraction: float) -> Value:
+    """Return the value of a joint between two samples: on the line, and by slerp where it is a pose."""
+    if not (isinstance(one, JointValue) and isinstance(two, JointValue)):
+        begin, end = cast("Rigid", one), cast("Rigid", two)
+        return rigid.interpolate(*begin, *end, fraction, floats)
+    if one.degrees == two.degrees:
+        return JointValue(one.number + (two.number - one.number) * fraction, one.degrees)
+    return JointValue(one.plain + (two.plain - one.plain) * fraction)
+
+
+_STAMP = re.compile(
+    r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_(n?s))?(?:\s*[\[(]\s*(n?s)\s*[\])])?", re.IGNORECASE
+)
+_HOLDERS = ("joint", "joints", "position", "positions", "joint_positions")  # before a dot
+_UNIT = re.compile(rf"_({'|'.join((*ANGLES, *filter(None, LENGTHS)))})$")
+
+
+class JointColumn(NamedTuple):
+    """A column that holds the value of a joint: radians or metres, unless its name says degrees or another length.
+
+    per_metre: how many of its units make a metre
+    """
+
+    place: int
+    joint: str
+    degrees: bool = False
+    per_metre: float = 1.0
+
+
+def find_joint_columns(names: Sequence[str], joints: Mapping[str, Joint]) -> list[JointColumn]:
+    """Return the columns that are called as joints, one a joint.
+
+    Raises ValueInvalid: a unit that the joint cannot have, two columns for one joint, a joint whose value is a pose.
+    """
+    found: dict[str, JointColumn] = {}
+    for place, name in enumerate(names):
+        column = _joint_column(place, name, joints)
+        if column is None:
+            continue
+        if column.joint in found:
+            first = names[found[column.joint].place]
+            raise ValueInvalid(f"columns {shown(first)} and {shown(name)} are both joint {shown(column.joint)}")
+        found[column.joint] = column
+    return list(found.values())
+
+
+def _joint_column(place: int, name: str, joints: Mapping[str, Joint]) -> JointColumn | None:
+    bare_name, unit = _with_unit(name.lstrip("#% ").strip(), joints)
+    joint = joints.get(bare_name)
+    if joint is None:
+        return None
+    if joint.posed:
+        raise ValueInvalid(f"column {shown(name)}: joint {shown(joint.name)} is {joint.kind}, which no number says")
+    units = ("rad", "deg") if joint.kind in TURNING else tuple(filter(None, LENGTHS))
+    known = ANGLES if joint.kind in TURNING else LENGTHS
+    if unit and unit not in known:
+        raise ValueInvalid(f"column {shown(name)}: joint {shown(joint.name)} is {joint.kind}; units: {listing(units)}")
+    if joint.kind in TURNING:
+        return JointColumn(place, bare_name, degrees=ANGLES.get(unit, False))
+    return JointColumn(place, bare_name, per_metre=LENGTHS[unit])
+
+
+def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
+    """Part a column's name into a joint and a unit; a joint's own name is taken whole."""
+    if name in joints:
+        return name, ""
+    holder, dot, rest = name.partition(".")
+    if dot and holder in _HOLDERS:
+        return _with_unit(rest, joints)
+    if match := BRACKETS.search(name):
+        return name[: match.start()], match[1]
+    if match := _UNIT.search(name):
+        return name[: match.start()], match[1]
+    return name, ""
+
+
+def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, bool] | None:
+    """Find the column of stamps: its place, and whether they are nanoseconds; None if there is none."""
+    for place, name in enumerate(names):
+        if name.strip() not in joints and (match := _STAMP.fullmatch(name.strip())):
+            return place, "ns" in (match[1], match[2])
+    return None
+
+
+def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
+    """Return what is wrong with the first column that is nearly called as a joint which no other column holds."""
+    held = {column.joint for column in find_joint_columns(names, joints)}
+    for name in names:
+        bare_name = _with_unit(name.strip(), joints)[0]
+        if bare_name not in joints and (near := did_you_mean(bare_name, [*joints.keys() - held], cutoff=0.8)):
+            return f"column {shown(name)} is no joint{near}"
+    return ""
+
+
+def no_joints(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
+    """Say that no column is called as a joint."""
+    return f"no column is a joint; columns: {', '.join(map(bare, names[:20]))}; joints: {listing(joints)}"
+
+
+TIMES = ("stamp", "stamp_ns", "time", "t")
+DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
+
+
+class Setting(NamedTuple):
+    """What a file says of one joint: its value as written, and when; `refuse` makes the error for the value's place.
+
+    loose: it is from a state that speaks of more than the robot has: a fixed joint, or a base that floats, is left out
+    """
+
+    joint: str
+    value: Any
+    stamp_ns: int | None
+    refuse: Callable[[str, Path], FormatError]
+    source: Source
+    loose: bool = False
+
+
+class JointFile:
+    """One file of joint values, and the joints of the robot that it may speak of."""
+
+    def __init__(self, path: str, joints: Mapping[str, Joint]) -> None:
+        """Open it: a file, or FILE:STATE for a state that it has a name for; raises FileProblem."""
+        self.path, self.state = _parted(path)
+        self.joints = joints
+        self.tally = Tally()
+        self.file = InputFile(self.path)
+
+    def settings(self) -> Iterator[Setting]:
+        """Yield what it says, in order, and close it.
+
+        Raises FormatError.
+        """
+        try:
+            yield from self._settings()
+        finally:
+            self.file.close()
+        for told in self.tally.told():
+            warn(f"{self.file.name}:{told.line}: {told.message}")
+
+    def _settings(self) -> Iterator[Setting]:
+        head = self.file.head()
+        name = self.file.name
+        form = detect(head, "joints", "records", "rows", name=self.path, otherwise="yaml")[0]
+        if "joints" in FORMATS[form].reads:
+            yield from import_module(FORMATS[form].reader).read_joints(self.file, self.state)
+        elif self.state:
+            having = " and ".join(readers("joints"))
+            raise FormatError(f"has no states with names; {having} files do", source=name)
+        elif head.lstrip().startswith(b"<"):
+            raise FormatError("this XML has no values of joints; maps, JointState messages, CSV have", source=name)
+        elif "rows" in FORMATS[form].reads:
+            yield from self._table(form, head.decode("utf-8", "replace"))
+        else:
+            for message in read_messages(self.file.stream, name, "echo", self.tally):
+                yield from self._message(message, self._values)
+
+    def _message(
+        self, message: Message | FormatError, read: Callable[[Any, Path, Message], Iterator[Setting]]
+    ) -> Iterator[Setting]:
+        """Yield what one document or row says."""
+        if isinstance(message, FormatError):
+            raise message
+        try:
+            yield from read(message.value, (), message)
+        except Misfit as misfit:
+            raise message.error(misfit) from None
+
+    def _values(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
+        """Yield the settings of a plain value: a JointState, a map, or a list of either."""
+        if type(value) is list:
+            for index, each in enumerate(value):
+                yield from self._values(each, (*path, index), message)
+        elif type(value) is dict and messages.is_envelope(value):
+            yield from self._values(value["msg"], (*path, "msg"), message)
+        else:
+            try:
+                mapping = as_mapping(value, "a map of joints, or a JointState")
+                read = self._state if joint_state.is_joint_state(mapping) else self._map
+                yield from read(mapping, path, message)
+            except Misfit as misfit:
+                raise misfit.below(*path) from None
+
+    def _state(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
+        stamp_ns = joint_state.stamp_of_state(mapping)
+        for joint, position, place in joint_state.positions(mapping):
+            number = _finite(position, place)
+            yield Setting(joint, number, stamp_ns, partial(_refused, message, (*path, *place)), message.source)
+
+    def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
+        """Yield what a map says, or the one map in it, as under `joints:`."""
+        times = [key for key in TIMES if key in mapping and key not in self.joints]
+        stamp_ns = _time(mapping, times[0]) if times else None
+        keys = [key for key in mapping if key not in times]
+        if len(keys) == 1 and keys[0] not in self.joints and type(mapping[keys[0]]) is dict:
+            path, mapping = (*path, keys[0]), mapping[keys[0]]
+            keys = list(mapping)
+        for key in keys:
+            yield Setting(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
+
+    def _table(self, form: str, head: str) -> Iterator[Setting]:
+        """Yield the settings of a table: a column a joint, or what the echo tools write."""
+        first = next((line for line in head.split("\n") if line.strip()), "")
+        name = self.file.name
+        if first.startswith("%time,"):
+            for message in read_messages(self.file.stream, name, "csv1", self.tally):
+                yield from self._message(message, self._numbered)
+        elif joint_state.looks_like_row(first):
+            for line, text in line_texts(self.file.stream, name, self.tally):
+                yield from self._message(Message(text, Source(name, text), line, cells=True), self._row)
+        else:
+            yield from self._columns(form)
+
+    def _numbered(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
+        return self._state(joint_state.of_numbered(value), path, message)
+
+    def _row(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
+        return self._state(joint_state.of_row(joint_state.unquoted(value)), path, message)
+
+    def _cells(self, form: str, line: str) -> list[str]:
+        if form == "csv":
+            return [cell.text for cell in split_line(line)]
+        return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(form))]
+
+    def _columns(self, form: str) -> Iterator[Setting]:
+        """Yield the settings of a table whose header names joints."""
+        rows = line_texts(self.file.stream, self.file.name, self.tally)
+        number, header = next(rows, (1, ""))
+        names = self._cells(form, header.strip("\r\ufeff"))
+        try:
+            columns = find_joint_columns(names, self.joints)
+            if problem := misspelt(names, self.joints) if columns else no_joints(names, self.joints):
+                raise ValueInvalid(problem)
+        except ValueInvalid as error:
+            raise FormatError(str(error), source=self.file.name, line=number) from None
+        stamp = stamp_column(names, self.joints)
+        used = {column.place for column in columns} | {stamp[0] if stamp else -1}
+        if others := [name for place, name in enumerate(names) if place not in used]:
+            warn(f"{self.file.name}:{number}: columns that are no joints were left out: {listing(others)}")
+        source = Source(self.file.name, "")
+        for number, line in rows:
+            if line.lstrip().startswith("#"):
+                continue
+            cells = self._cells(form, line.rstrip("\r"))
+            refuse = partial(_refused_row, self.file.name, number)
+            if len(cells) != len(names):
+                raise refuse(f"expected {len(names)} cells, found {len(cells)}", ())
+            at = ""
+            try:
+                if stamp:
+                    at = names[stamp[0]]
+                    stamp_ns = parse_stamp(f"{cells[stamp[0]]}ns" if stamp[1] else cells[stamp[0]])
+                for place, joint, degrees, per_metre in columns:
+                    at = names[place]
+                    value = JointValue(parse_number(cells[place]) / per_metre, degrees)
+                    yield Setting(joint, value, stamp_ns if stamp else None, refuse, source)
+            except ValueInvalid as error:
+                raise refuse(f"{at}: {error}", ()) from None
+
+
+def _parted(path: str) -> tuple[str, str]:
+    """Part FILE:STATE, unless there is a file of that name."""
+    file, colon, state = path.rpartition(":")
+    return (file, state) if colon and file and not os.path.exists(path) and os.path.exists(file) else (path, "")
+
+
+def _time(mapping: dict[str, Any], key: str) -> int:
+    text = mapping[key]
+    if type(text) is not str:
+        raise Misfit(f"expected a time like 12.5, found {kind(text)}", (key,))
+    try:
+        return parse_stamp(f"{text}ns" if key.endswith("_ns") else text)
+    except ValueInvalid as error:
+        raise Misfit(str(error), (key,)) from None
+
+
+def _finite(value: Any, path: Path) -> JointValue:
+    """Read a position in a message: radians or metres, no units."""
+    try:
+        if type(value) is not str:
+            raise ValueInvalid(f"expected a number, found {kind(value)}")
+        return JointValue(parse_number(value))
+    except ValueInvalid as error:
+        raise Misfit(str(error), path, rule=error.rule) from None
+
+
+def _refused(message: Message, path: Path, problem: str, below: Path) -> FormatError:
+    return message.error(Misfit(problem, (*path, *below)))
+
+
+def _refused_row(name: str, line: int, problem: str, _below: Path) -> FormatError:
+    return FormatError(problem, source=name, line=line)
+
+
+def unknown_joint(joint: str, joints: Mapping[str, Joint], fixed: frozenset[str]) -> str:
+    """Say that a robot has no such joint, or that it does not move."""
+    if joint in fixed:
+        return f"joint {shown(joint)} is fixed and takes no value; joints: {listing(joints)}"
+    near = did_you_mean(joint, joints)
+    return f"no joint {shown(joint)}{near or ';'} joints: {listing(joints)}"

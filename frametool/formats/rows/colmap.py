@@ -1,0 +1,95 @@
+"""COLMAP's images.txt: two lines an image, the second its points (which may be empty, and counts all the same).
+
+# Image list with two lines of data per image:
+#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME
+1 0.8517 0.0165 0.5035 -0.1431 -0.7376 1.0240 3.7463 1 P1180141.JPG
+2362.39 248.498 58396 1784.7 268.254 59027
+
+What is written is the pose of the world in the camera, camera<-world: the camera stands at -R't. Optical axes. The list
+of frames that a rig has since 2025, frames.txt, holds the pose of the world in the rig: FRAME_ID RIG_ID QW .. TZ ..
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.errors import FormatError, shown
+from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, write_rows
+from frametool.formats.rows.trajectory import Poses, Written, numbers_in, samples, text_lines
+from frametool.geometry import rigid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.geometry.types import N
+    from frametool.grammar.edges import Options, Samples
+    from frametool.grammar.result import Result, Style
+
+IMAGE_LINE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
+FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ"
+POSES = Poses("wxyz", inverse=True, axes="optical", frames=("world", "camera"), counted="image ids")
+
+
+def _world_in_camera(*pose: N) -> tuple[N, ...]:
+    tx, ty, tz, x, y, z, w = rigid.inverse(*pose)
+    return w, x, y, z, tx, ty, tz
+
+
+ROWS = RowForm(
+    ("number", b" ", Numbers(7), b" 1 ", IMAGE, b"\n\n"),
+    _world_in_camera,
+    head=b"# Image list with two lines of data per image:\n"
+    b"#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n",
+    first=1,
+    axes="optical",
+    holds=(),
+    beside="every camera is number 1, without points",
+)
+
+
+def poses(file: InputFile, options: Options) -> Iterator[Written]:  # noqa: ARG001 - as the other forms have it
+    """Yield the poses of images.txt, or of frames.txt, as they are written."""
+    comments, lines = True, text_lines(file)
+    of_frames = False
+    for number, line in lines:
+        bare = line.strip()
+        if not bare or bare.startswith("#"):
+            of_frames |= comments and "Frame list" in bare
+            continue
+        comments = False
+        yield _frame(file, number, bare) if of_frames else _image(file, number, bare)
+        if not of_frames:
+            next(lines, None)
+
+
+def read(file: InputFile, options: Options) -> Iterator[Samples]:
+    """Yield the poses of the camera in the world."""
+    return samples(poses(file, options), POSES, file, options)
+
+
+def _image(file: InputFile, number: int, line: str) -> Written:
+    words = line.split(maxsplit=9)  # the name may hold blanks
+    if len(words) != 10:
+        raise FormatError(f"expected 10 words ({IMAGE_LINE}), found {len(words)}", source=file.name, line=number)
+    w, x, y, z, *position = numbers_in(file, number, words[1:8])
+    return Written((*position, w, x, y, z), _count(file, number, words[0]), number, words[9])
+
+
+def _frame(file: InputFile, number: int, line: str) -> Written:
+    words = line.split()
+    if len(words) < 9:
+        raise FormatError(f"expected {FRAME_LINE} .., found {len(words)} words", source=file.name, line=number)
+    w, x, y, z, *position = numbers_in(file, number, words[2:9])
+    return Written((*position, w, x, y, z), _count(file, number, words[0]), number)
+
+
+def _count(file: InputFile, number: int, word: str) -> int:
+    if not word.isdecimal():
+        raise FormatError(f"expected an id, found {shown(word)}", source=file.name, line=number)
+    return int(word)
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Return two lines a pose, the second empty; cameras are all number 1."""
+    return write_rows(ROWS, results, style)

@@ -1,0 +1,37 @@
+"""EuRoC ground truth: CSV with nanoseconds, metres and the quaternion w first; the pose of the body in the world.
+
+#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []
+1403636580838555648,4.688319,-1.786938,0.783338,0.534108,-0.153029,-0.827383,-0.082152
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.formats.rows.pose_rows import Numbers, RowForm, write_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from frametool.geometry.types import N
+    from frametool.grammar.result import Result, Style
+
+
+def _w_first(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> tuple[N, ...]:
+    return tx, ty, tz, w, x, y, z
+
+
+COLUMNS = (
+    "#timestamp [ns]", "p_RS_R_x [m]", "p_RS_R_y [m]", "p_RS_R_z [m]", "q_RS_w []", "q_RS_x []", "q_RS_y []",
+    "q_RS_z []", "v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]", "b_w_RS_S_x [rad s^-1]",
+    "b_w_RS_S_y [rad s^-1]", "b_w_RS_S_z [rad s^-1]", "b_a_RS_S_x [m s^-2]", "b_a_RS_S_y [m s^-2]",
+    "b_a_RS_S_z [m s^-2]",
+)  # fmt: skip
+ROWS = RowForm(
+    ("nanoseconds", b",", Numbers(7, b","), b"\n"), _w_first, head=",".join(COLUMNS[:8]).encode() + b"\n"
+)
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Return the header and one row a pose."""
+    return write_rows(ROWS, results, style)

@@ -1,0 +1,82 @@
+"""g2o pose graphs: the vertices are poses in the world, metres, the quaternion w last; an edge is seen from its first.
+
+VERTEX_SE3:QUAT 0 1.0 2.0 0.5 0.0 0.0 0.0 1.0
+VERTEX_SE2 1 1.0 2.0 0.5
+EDGE_SE3:QUAT 0 1 1.0 0.0 0.0 0.0 0.0 0.0 1.0 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1
+
+Edges measure, and contradict each other: they are no tree; the vertices are what was made of them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.errors import FormatError, shown
+from frametool.formats.rows.pose_rows import Numbers, RowForm, write_rows
+from frametool.formats.rows.trajectory import Poses, Written, numbers_in, samples, text_lines
+from frametool.geometry import euler, floats
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.grammar.edges import Options, Samples
+    from frametool.grammar.result import Result, Style
+
+POSES = Poses("quaternion", counted="ids of vertices")
+ROWS = RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=())
+EDGES = Poses("quaternion", counted="")
+IN_SPACE, IN_PLANE = "x y z qx qy qz qw", "x y theta"
+VERTICES = {"VERTEX_SE3:QUAT": IN_SPACE, "VERTEX_SE2": IN_PLANE}
+MEASURED = {"EDGE_SE3:QUAT": IN_SPACE, "EDGE_SE2": IN_PLANE}
+INFORMATION = {IN_SPACE: 21, IN_PLANE: 6}  # numbers behind an edge
+
+
+def form_of(_file: InputFile, options: Options) -> Poses:
+    """Return what the poses are: of vertices in the world, or of one vertex in another."""
+    return EDGES if options.answers.edges else POSES
+
+
+def poses(file: InputFile, options: Options) -> Iterator[Written]:
+    """Yield the vertices as they are written, or the edges."""
+    edges = options.answers.edges
+    kinds, others = (MEASURED, VERTICES) if edges else (VERTICES, MEASURED)
+    only_others = 0
+    for number, line in text_lines(file):
+        words = line.split()
+        if words and words[0] in others:
+            only_others = only_others or number
+        if words and words[0] in kinds:
+            only_others = -1
+            yield _pose(file, number, words, kinds[words[0]], ids=1 + edges)
+    if only_others > 0:
+        as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
+        found = "vertices in it; leave --edges out" if edges else as_poses
+        raise FormatError(f"only {found}", source=file.name, line=only_others)
+
+
+def _pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int) -> Written:
+    """Read a vertex with its id, or an edge with the two it connects, which holds its information too."""
+    expected = f"{'id' if ids == 1 else 'i j'} {layout}"
+    size = len(expected.split())
+    kind, *rest = words
+    if len(rest) != size and (ids == 1 or len(rest) != size + INFORMATION[layout]):
+        raise FormatError(f"expected {kind} {expected}, found {len(words)} words", source=file.name, line=line)
+    for word in rest[:ids]:
+        if not word.isdecimal():
+            raise FormatError(f"expected the id of a vertex, found {shown(word)}", source=file.name, line=line)
+    numbers = numbers_in(file, line, rest[ids:size])
+    if layout == IN_PLANE:
+        x, y, theta = numbers
+        numbers = [x, y, 0.0, *euler.to_quaternion(0.0, 0.0, theta, "sxyz", floats)]
+    return Written(tuple(numbers), int(rest[0]), line, names=(rest[0], rest[1]) if ids > 1 else None)
+
+
+def read(file: InputFile, options: Options) -> Iterator[Samples]:
+    """Yield the vertices as poses of one body."""
+    return samples(poses(file, options), POSES, file, options)
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Return a vertex a pose, numbered from 0."""
+    return write_rows(ROWS, results, style)

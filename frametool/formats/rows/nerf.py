@@ -1,0 +1,78 @@
+"""NeRF's transforms.json: the pose of each camera in the world as 4x4 rows, with the axes of OpenGL; metres or not.
+
+{"camera_angle_x": 0.69, "frames": [{"file_path": "1.png", "transform_matrix": [[..], [..], [..], [0, 0, 0, 1]]}]}
+
+Axes of OpenGL: x right, y up, z backward. Matrices of three rows occur (Nerfstudio), and `applied_transform`, which
+they contain already.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.document import parse_documents
+from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, rows_of_matrix, write_rows
+from frametool.formats.rows.trajectory import Poses, Written, samples
+from frametool.grammar.readers import Misfit, Note, as_mapping, kind, read_numbers, within
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.grammar.edges import Options, Samples
+    from frametool.grammar.result import Result, Style
+
+POSES = Poses("matrix", axes="opengl", frames=("world", "camera"), counted="places in its list")
+MATRIX = "transform_matrix"
+LAST_ROW = (0.0, 0.0, 0.0, 1.0)
+_ROW = b"], [", Numbers(4, b", ")
+ROWS = RowForm(
+    (b'    {"file_path": "', IMAGE, b'", "transform_matrix": [[', Numbers(4, b", "), *_ROW, *_ROW,
+     b"], [0.0, 0.0, 0.0, 1.0]]}"),
+    rows_of_matrix,
+    head=b'{\n  "frames": [\n',
+    between=b",\n",
+    tail=b"\n  ]\n}\n",
+    axes="opengl",
+    holds=(),
+)  # fmt: skip
+
+
+def poses(file: InputFile, options: Options) -> Iterator[Written]:
+    """Yield the poses of the cameras as they are written."""
+    for document in parse_documents(file.text, file.name):
+        try:
+            whole = as_mapping(document.value, "transforms.json")
+            if "applied_transform" in whole:
+                options.tally.note(Note("odd", "the poses contain its applied_transform; it is not taken out", ()), 1)
+            for index, entry in enumerate(whole.get("frames") or ()):
+                yield within(("frames", index), _pose, entry, index)._replace(
+                    path=(document.index, "frames", index, MATRIX)
+                )
+        except Misfit as misfit:
+            raise misfit.placed(file.source, document.index) from None
+
+
+def _pose(entry: Any, index: int) -> Written:
+    """Read one of the frames."""
+    frame = as_mapping(entry, "a frame {file_path, transform_matrix}")
+    matrix = frame.get(MATRIX)
+    if type(matrix) is not list or len(matrix) not in (3, 4):
+        raise Misfit(f"expected {MATRIX} as 4 rows, found {kind(matrix) if type(matrix) is not list else len(matrix)}")
+    rows = [within((MATRIX, at), read_numbers, row, "1234") for at, row in enumerate(matrix)]
+    if rows[3:] not in ([], [LAST_ROW]):
+        raise Misfit("the last row of a pose is 0 0 0 1", (MATRIX, 3))
+    position = [row[3] for row in rows[:3]]
+    image = frame.get("file_path")
+    turn = [number for row in rows[:3] for number in row[:3]]
+    return Written((*position, *turn), index, image=image if type(image) is str else "")
+
+
+def read(file: InputFile, options: Options) -> Iterator[Samples]:
+    """Yield the poses of the camera in the world."""
+    return samples(poses(file, options), POSES, file, options)
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Return one document with a frame for each pose."""
+    return write_rows(ROWS, results, style)

@@ -1,0 +1,174 @@
+"""How a form writes poses, one after the other: the text around the numbers of each, and what it cannot hold.
+
+    RowForm(("seconds", b" ", Numbers(7, b" "), b"\\n"))                         a row of a TUM trajectory
+    1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0
+
+The same table is filled in here for a few poses, and in bulk by `frametool.stream.writers`.
+"""
+
+from __future__ import annotations
+
+from itertools import chain
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import ValueInvalid, warn
+from frametool.frames.stamps import BILLION, format_stamp
+from frametool.geometry import floats, quaternion, rigid
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from frametool.geometry.types import Components, Rigid
+    from frametool.grammar.result import Result, Style
+
+HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: between optical axes and those of OpenGL
+LOSABLE = {"frames": "names of frames", "stamps": "stamps", "extras": "other columns"}
+IMAGE = "image"  # the extra that names a picture
+NUMBER = "number"  # the extra that says what a pose was counted as in the same form
+
+
+class Numbers(NamedTuple):
+    """So many numbers of a row, with the same text between them."""
+
+    size: int
+    between: bytes = b" "
+
+
+class RowForm(NamedTuple):
+    """The text of one pose.
+
+    row: constant text, `Numbers`, and what else is known of a pose: `seconds`, `nanoseconds`, `number` (counted from
+        `first`), `next` (one more), `image` (the name of its picture, else its seconds)
+    numbers: from tx, ty, tz, x, y, z, w to the numbers in the order they are written
+    head, between, tail: text before the first pose, between two, and behind the last
+    axes: those of a camera, where the form states them
+    holds: which of `frames`, `stamps`, `extras` are written
+    beside: what else a reader of the form finds in it, told whenever it is written
+    """
+
+    row: tuple[str | bytes | Numbers, ...]
+    numbers: Callable[..., Components] = lambda *pose: pose
+    head: bytes = b""
+    between: bytes = b""
+    tail: bytes = b""
+    first: int = 0
+    axes: str = ""
+    holds: tuple[str, ...] = ("stamps",)
+    beside: str = ""
+
+
+def write_rows(form: RowForm, results: Iterable[Result], style: Style) -> str:
+    """Return the results in a form of rows; what it cannot hold is told once.
+
+    Raises ValueInvalid for a result without position or rotation, and for notations that the form does not have.
+    """
+    lost = Lost(form, style)
+    parts: list[str] = [form.head.decode()]
+    for number, result in enumerate(results):
+        parts.append(form.between.decode() if number else "")
+        parts += _row(form, result, style, number, lost)
+    lost.tell()
+    return "".join([*parts, form.tail.decode()])
+
+
+class Lost:
+    """What a form cannot hold of the poses that are written: collected, and told at the end."""
+
+    def __init__(self, form: RowForm, style: Style) -> None:
+        """Collect nothing yet; raises ValueInvalid for notations that the form does not have."""
+        self.form = form
+        self.style = style
+        self.found: set[str] = set()
+        self.counted = False
+        self.by_stamp = False
+        self.turned = False
+        if any(each.spec != "quaternion" for each in style.notations):
+            raise ValueInvalid(f"{style.form} writes rotations in its own way; leave --to out")
+
+    def add(self, *, frames: bool, stamps: bool, extras: bool) -> None:
+        """Take down what a pose has beside its numbers."""
+        said = {"frames": frames, "stamps": stamps, "extras": extras}
+        self.found |= {what for what, there in said.items() if there and what not in self.form.holds}
+
+    def tell(self) -> None:
+        """Warn of all that was left out or made up, in one line."""
+        left = [words for what, words in LOSABLE.items() if what in self.found]
+        said = [f"{', '.join(left)} left out"] if left else []
+        said += [self.form.beside] * bool(self.form.beside)
+        said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
+        said += ["pictures are named by their stamps"] * self.by_stamp
+        if self.turned:
+            said.append(f"camera axes turned from {self.style.axes} to {self.form.axes}, half a turn about x")
+        elif self.form.axes and not self.style.axes:
+            said.append(f"the axes of the poses are taken for {self.form.axes}, as {self.style.form} has them")
+        if said:
+            warn(f"{self.style.form}: {'; '.join(said)}")
+
+
+def with_axes_turned(pose: Components) -> Components:
+    """Turn the axes of a camera by half a turn about x: from optical to those of OpenGL, and back."""
+    tx, ty, tz, x, y, z, w = pose
+    return rigid.compose(tx, ty, tz, x, y, z, w, *HALF_TURN)
+
+
+def turned(form: RowForm, style: Style, pose: Components) -> Components:
+    """Turn a camera's axes to those of a form, where both are known and differ."""
+    return with_axes_turned(pose) if is_turned(form, style) else pose
+
+
+def is_turned(form: RowForm, style: Style) -> bool:
+    """Tell whether the axes of a camera are not those of the form it is written in."""
+    return bool(form.axes and style.axes and form.axes != style.axes)
+
+
+def _row(form: RowForm, result: Result, style: Style, number: int, lost: Lost) -> Iterator[str]:
+    """Yield the text of one pose."""
+    pose, extras = result.pose, dict(result.extras)
+    if pose.rotation is None:
+        raise ValueInvalid(f"{style.form} holds poses; a point has no rotation")
+    stamp_ns, image = extras.pop("stamp_ns", None), extras.pop(IMAGE, None)
+    lost.add(frames=bool(pose.name or pose.parent), stamps=stamp_ns is not None, extras=bool(extras))
+    timed = "stamps" in form.holds
+    lost.counted |= timed and stamp_ns is None
+    lost.turned = is_turned(form, style)
+    stamp = number * BILLION if stamp_ns is None else stamp_ns
+    numbers = iter(form.numbers(*turned(form, style, canonical(pose.components, style))))
+    for piece in form.row:
+        if isinstance(piece, bytes):
+            yield piece.decode()
+        elif isinstance(piece, Numbers):
+            yield piece.between.decode().join(style.number(next(numbers)) for _ in range(piece.size))
+        elif piece == IMAGE:
+            lost.by_stamp |= image is None
+            yield image_name(image, stamp)
+        else:
+            yield field(piece, stamp, number + form.first)
+
+
+def canonical(pose: Rigid, style: Style) -> Rigid:
+    """Return a pose with the sign of the quaternion that is written."""
+    unit = quaternion.unit(*pose[3:], floats)
+    return (*pose[:3], *(unit if style.keep_sign else quaternion.from_quaternion(*unit, floats)))
+
+
+def field(name: str, stamp_ns: int, number: int) -> str:
+    """Return what is written for a field of a row."""
+    if name == "seconds":
+        return format_stamp(stamp_ns)
+    if name == "nanoseconds":
+        return str(stamp_ns)
+    return str(number + (name == "next"))
+
+
+def image_name(image: str | None, stamp_ns: int) -> str:
+    """Return the name of a picture, with what JSON and rows cannot hold left out; else its stamp."""
+    if image is None:
+        return format_stamp(stamp_ns)
+    return "".join(letter for letter in image if letter.isprintable() and letter not in '"\\')
+
+
+def rows_of_matrix(*pose: float) -> Components:
+    """Return the first three rows of the 4x4 of a pose, twelve numbers."""
+    tx, ty, tz, *turn = pose
+    r = quaternion.to_matrix(*turn)
+    return tuple(chain(r[0:3], [tx], r[3:6], [ty], r[6:9], [tz]))

@@ -1,0 +1,596 @@
+"""Bytes to records and back: one file a form of text, and the one table of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Format(NamedTuple):
+    """A form of text: what it holds, how it is recognised, and the modules that read and write it.
+
+    summary: what it is, in a line
+    suffixes: of files in this form; names: what files are called to which it is written
+    reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
+        `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
+        holds one frame that moves
+    writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
+        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`
+    signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
+    states: what its numbers mean (which frame in which, units, order), told when such a file was read
+    asks: the options that say what it leaves open
+    loses: what a tree written in it may have had and it does not hold, told then
+    instead: of a form that is known and not read: what to do
+    """
+
+    summary: str
+    suffixes: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    reader: str = ""
+    writes: tuple[str, ...] = ()
+    writer: str = ""
+    signs: tuple[tuple[str, str | bytes], ...] = ()
+    states: str = ""
+    asks: tuple[str, ...] = ()
+    loses: str = ""
+    instead: str = ""
+    names: tuple[str, ...] = ()
+
+
+# what options say about files whose form leaves it open
+DIRECTIONS = ("parent-from-child", "child-from-parent")
+CAMERA_AXES = ("optical", "opengl")
+DH = ("standard", "modified")
+_TREE = "frametool.formats.trees.tree_reader"
+_MESSAGES = "frametool.ros.message_stream"
+_TABLE = "frametool.stream.table_samples"
+_ARROW = "frametool.formats.rows.arrow_files"
+BAG = "frametool.ros.bags"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
+_ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
+_NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
+_OPEN3D = rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\s*(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}\s*\n){{2}}"
+_MESSAGE_KEYS = (
+    "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
+)
+_SRDF = (
+    "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
+    "(?:disable|enable|disable_default)_collisions"
+)
+
+_AT_HEAD = r"(?=(?s:.{0,2000}?)"
+_LENGTH = r"""(?<!\w)%s(?:[_ ]?[({\[]*[ijkn](?: ?- ?1)?[)}\]]*)?["']?\s*(?:[,;:\t ]|[\[(_](?:m|mm|cm)\b|$)"""
+_DH = (
+    rf"(?im)\A(?!\s*<){_AT_HEAD}(?<![^\W_])(?:alpha|\u03b1|twist))"
+    rf"{_AT_HEAD}(?:{_LENGTH % '[ar]'}|link_length)){_AT_HEAD}(?:{_LENGTH % 'd'}|link_offset))"
+)
+_PCD = rb"# ?\.PCD|(?:\s*#[^\n]*\n)*\s*(?:VERSION|FIELDS|COLUMNS)[ \t][^\n]*\n(?:[^\n]*\n){0,5}?SIZE "
+_KITTI = (
+    r"\A(?:#[^\n]*\n)*(?:calib_time: *\d|"
+    r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
+)
+
+FORMATS = {
+    "yaml": Format(
+        "YAML: trees, poses, documents parted by ---",
+        suffixes=(".yaml", ".yml"),
+        reads=("tree", "records"),
+        reader=_TREE,
+        writes=("poses", "points", "tree", "report"),
+        writer="frametool.formats.trees.yaml_format",
+        signs=(
+            ("own key", "frames|children"),
+            ("line", r"\{ *[A-Za-z_][\w.]*: "),  # no JSON, whatever the suffix says: its keys have quotes
+            # a header of CSV whose first column ends in a colon is no key
+            ("header", r"""(?!(?!.*(?:[{\[]|: )).*,)(?:---(?:\s|$)|%YAML|- |(?:[\w./-]+|"[^"\n]*"):(?:\s|$)|[\[{])"""),
+        ),
+    ),
+    "json": Format(
+        "JSON: trees, one object a line, or an array",
+        suffixes=(".json", ".jsonl", ".ndjson"),
+        reads=("tree", "records"),
+        reader=_TREE,
+        writes=("poses", "points", "tree", "report"),
+        writer="frametool.formats.trees.json_format",
+        signs=(("json key", "frames"), ("begin", r"""\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))""")),
+    ),
+    "csv": Format(
+        "CSV with a header",
+        suffixes=(".csv",),
+        reads=("tree", "rows"),
+        reader=_TABLE,
+        writes=("poses", "points", "report", "trajectory"),
+        writer="frametool.formats.rows.csv",
+        signs=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
+    ),
+    "tsv": Format(
+        "tab-separated values with a header",
+        (".tsv", ".tab"),
+        reads=("tree", "rows"),
+        reader=_TABLE,
+        signs=(("header", r".*\t"),),
+    ),
+    "semicolon": Format(
+        "CSV with semicolons and a header",
+        reads=("tree", "rows"),
+        reader=_TABLE,
+        signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),),
+    ),
+    "columns": Format("columns between blanks, # comments", reads=("rows",), signs=(("header", r"#|\s*\S+\s+\S"),)),
+    "tum": Format(
+        "trajectory: t x y z qx qy qz qw",
+        suffixes=(".tum",),
+        reads=("tree", "trajectory", "rows"),
+        reader=_TABLE,
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.rows.tum",
+        signs=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
+        states="world<-body, seconds, metres, quaternion x y z w",
+        asks=("frames",),
+    ),
+    "echo": Format(
+        "messages as `ros2 topic echo` or `rostopic echo` print them",
+        reads=("tree",),
+        reader=_MESSAGES,
+        signs=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
+    ),
+    "jsonl": Format(
+        "messages as JSON, one a line (rosbridge, Foxglove)",
+        reads=("tree",),
+        reader=_MESSAGES,
+        signs=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
+    ),
+    "csv1": Format("CSV of `rostopic echo -p`", reads=("tree",), reader=_MESSAGES, signs=(("line", "%time,"),)),
+    "csv2": Format(
+        "CSV of `ros2 topic echo --csv`",
+        reads=("tree",),
+        reader=_MESSAGES,
+        signs=(("line", r"-?\d{1,12},\d{1,10},[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$"),),
+    ),
+    "calls": Format(
+        "static_transform_publisher calls",
+        reads=("tree",),
+        reader="frametool.ros.publisher",
+        signs=(
+            ("line", r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]"),
+            # numbers and two names: poses of a trajectory are numbers only
+            ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
+        ),
+    ),
+    "bag1": Format("ROS 1 bag", (".bag",), ("tree",), BAG, signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),)),
+    "bag2": Format(
+        "ROS 2 bag: sqlite3, or a folder",
+        suffixes=(".db3",),
+        reads=("tree",),
+        reader=BAG,
+        signs=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
+    ),
+    "mcap": Format("MCAP file", (".mcap",), ("tree",), BAG, signs=(("magic", rb"\x89MCAP0\r\n"),)),
+    "ros1": Format(
+        "messages as `rostopic echo` prints them",
+        writes=("poses", "points", "tree"),
+        writer="frametool.ros.echo_format",
+    ),
+    "ros2": Format(
+        "messages as `ros2 topic echo` prints them",
+        writes=("poses", "points", "tree"),
+        writer="frametool.ros.echo_format",
+    ),
+    "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
+    "static1": Format(
+        "static_transform_publisher of ROS 1", writes=("poses", "tree"), writer="frametool.ros.publisher"
+    ),
+    "static2": Format(
+        "static_transform_publisher of ROS 2", writes=("poses", "tree"), writer="frametool.ros.publisher"
+    ),
+    "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
+    "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.trees.dot"),
+    "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.mermaid"),
+    "euroc": Format(
+        "EuRoC ground truth",
+        reads=("tree", "trajectory", "rows"),
+        reader=_TABLE,
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.rows.euroc",
+        signs=(
+            ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
+            ("line", rf"\d{{19}}(?:\s*,\s*{_NUMBER}){{7}}(?:(?:\s*,\s*{_NUMBER}){{9}})?\s*$"),
+        ),
+        states="world<-body (R<-S), nanoseconds, metres, quaternion w x y z",
+        asks=("frames",),
+    ),
+    "colmap": Format(
+        "COLMAP images.txt",
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.rows.colmap",
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.rows.colmap",
+        names=("images.txt",),
+        signs=(
+            ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
+            ("line", rf"\d+(?:[ \t]+{_NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
+        ),
+        states="the file holds camera<-world, quaternion w x y z",
+        asks=("frames", "stamps", "camera_axes"),
+    ),
+    "nerf": Format(
+        "NeRF transforms.json",
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.rows.nerf",
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.rows.nerf",
+        names=("transforms.json",),
+        signs=(("json path", "frames/transform_matrix"),),
+        states="world<-camera; opengl: x right, y up, z backward",
+        asks=("frames", "stamps", "camera_axes"),
+    ),
+    "kitti": Format(
+        "KITTI poses",
+        reads=("tree", "trajectory", "rows"),
+        reader=_TABLE,
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.rows.kitti",
+        signs=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),),
+        states="world<-cam0, metres",
+        asks=("frames", "stamps", "camera_axes"),
+    ),
+    "g2o": Format(
+        "g2o pose graph",
+        suffixes=(".g2o",),
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.rows.g2o",
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.rows.g2o",
+        signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
+        states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
+        asks=("frames", "stamps"),
+    ),
+    "open3d": Format(
+        "Open3D camera trajectory",
+        suffixes=(".log",),
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.rows.open3d",
+        writes=("poses", "trajectory"),
+        writer="frametool.formats.rows.open3d",
+        signs=(
+            ("text", _OPEN3D),
+            ("json path", "parameters/extrinsic"),
+        ),
+        states=".log holds world<-camera, .json camera<-world",
+        asks=("frames", "stamps", "camera_axes"),
+    ),
+    "bundler": Format(
+        "Bundler's bundle.out",
+        reads=("tree", "trajectory", "rows"),
+        reader="frametool.formats.rows.bundler",
+        signs=(("text", r"\A\ufeff?# *Bundle file v"),),
+        states="the file holds camera<-world; opengl: cameras look along -z",
+        asks=("frames", "stamps", "camera_axes"),
+    ),
+    "colmap-bin": Format(
+        "COLMAP images.bin",
+        signs=(("magic", rb".{4}\0{4}.{4}.{56}.{4}[\x20-\x7e]{1,200}\0"),),
+        instead="write it as text: colmap model_converter --input_path . --output_path . --output_type TXT",
+    ),
+    "autoware": Format(
+        "Autoware sensor calibration",
+        reads=("tree",),
+        reader="frametool.formats.trees.autoware",
+        writes=("tree",),
+        writer="frametool.formats.trees.autoware",
+        signs=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
+        states="parent<-child, metres, radians, roll pitch yaw about fixed axes",
+    ),
+    "camchain": Format(
+        "camera chain of Kalibr, OpenVINS or okvis; matrices by name",
+        reads=("tree",),
+        reader="frametool.formats.trees.camchain",
+        writes=("tree",),
+        writer="frametool.formats.trees.camchain",
+        signs=(
+            ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),
+            ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
+        ),
+        states="target<-source as each key says; metres; intrinsics are not kept",
+        asks=("direction", "frames"),
+    ),
+    "opencv": Format(
+        "OpenCV FileStorage",
+        reads=("tree",),
+        reader="frametool.formats.trees.opencv",
+        writes=("tree",),
+        writer="frametool.formats.trees.opencv",
+        signs=(
+            ("xml", "opencv_storage"),
+            ("json path", "*/type_id"),
+            ("magic", rb"(?:\xef\xbb\xbf)?\s*%YAML:1\.0(?!.*\bT_(?:cam_imu|imu_cam|cn_cnm1|i_b|SC|BS) *:)"),
+            ("text", ": *!!opencv-"),
+        ),
+        states="target<-source as each key says, camera<-object by rvec and tvec; metres",
+        asks=("direction", "frames"),
+    ),
+    "euroc-sensor": Format(
+        "sensor.yaml of EuRoC",
+        reads=("tree",),
+        reader="frametool.formats.trees.euroc_sensor",
+        signs=(("yaml key", "T_BS"),),
+        states="T_BS is body<-sensor, metres",
+        asks=("frames",),
+    ),
+    "kitti-calib": Format(
+        "KITTI calibration",
+        reads=("tree",),
+        reader="frametool.formats.trees.kitti_calib",
+        signs=(("text", _KITTI),),
+        states="parent<-child, metres, optical axes of cameras",
+        asks=("frames",),
+    ),
+    "drake": Format(
+        "Drake model directives",
+        reads=("tree",),
+        reader="frametool.formats.robots.drake",
+        signs=(("yaml key", "directives"),),
+        states="parent<-frame, metres, degrees, rpy about fixed axes",
+    ),
+    "handeye": Format(
+        "hand-eye calibration of easy_handeye",
+        reads=("tree",),
+        reader="frametool.formats.trees.handeye",
+        writes=("tree",),
+        writer="frametool.formats.trees.handeye",
+        signs=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
+        states="effector (base if not on the hand)<-tracking base, metres, x y z w",
+    ),
+    "nuscenes": Format(
+        "nuScenes table",
+        reads=("tree",),
+        reader="frametool.formats.trees.nuscenes",
+        signs=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
+        states="ego<-sensor, global<-ego, metres, w first, microseconds",
+        asks=("frames",),
+    ),
+    "dh": Format(
+        "Denavit-Hartenberg table",
+        reads=("tree",),
+        reader="frametool.formats.robots.dh",
+        signs=(("text", _DH),),
+        states="parent<-child, metres, radians unless their names say deg",
+        asks=("dh", "frames"),
+    ),
+    "launch": Format(
+        "launch file",
+        suffixes=(".launch",),
+        reads=("tree",),
+        reader="frametool.formats.trees.launch",
+        writes=("tree",),
+        writer="frametool.formats.trees.launch",
+        signs=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
+        states="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
+    ),
+    "mjcf": Format(
+        "MJCF of MuJoCo",
+        suffixes=(".mjcf",),
+        reads=("tree", "joints"),
+        reader="frametool.formats.robots.mjcf",
+        signs=(("xml", "mujoco"),),
+        states="parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)",
+    ),
+    "sdf": Format(
+        "SDF of Gazebo",
+        suffixes=(".sdf", ".world"),
+        reads=("tree",),
+        reader="frametool.formats.robots.sdf",
+        signs=(("xml", "sdf"),),
+        states="parent<-child, metres, radians unless degrees; frames are model::link",
+    ),
+    "urdf": Format(
+        "URDF robot",
+        suffixes=(".urdf",),
+        reads=("tree",),
+        reader="frametool.formats.robots.urdf",
+        writes=("tree",),
+        writer="frametool.formats.robots.urdf",
+        signs=(("xml", "robot"),),
+        loses="written as links that are fixed to one another; joints, limits and shapes are no frames",
+        states="parent<-child, metres, radians, rpy about fixed axes",
+    ),
+    "srdf": Format(
+        "SRDF, the semantics of a robot",
+        suffixes=(".srdf",),
+        reads=("tree", "joints"),
+        reader="frametool.formats.robots.srdf",
+        signs=(("xml child", f"robot/(?:{_SRDF})"),),
+        states="virtual joints: parent_frame<-child_link; its states are values of joints (--joints FILE:STATE)",
+    ),
+    "npy": Format(
+        "NPY of numpy: n x 3 points, n x 7 poses, records with fields",
+        suffixes=(".npy",),
+        reads=("arrays",),
+        reader="frametool.formats.rows.npy",
+        writes=("poses", "points", "arrays"),
+        writer="frametool.formats.rows.npy",
+        signs=(("magic", rb"\x93NUMPY"),),
+    ),
+    "npz": Format(
+        "NPZ of numpy, several arrays in a zip file",
+        suffixes=(".npz",),
+        reads=("arrays",),
+        reader="frametool.formats.rows.npz",
+        writes=("poses", "points", "arrays"),
+        writer="frametool.formats.rows.npz",
+        signs=(("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
+        asks=("array",),
+    ),
+    "pcd": Format(
+        "PCD point cloud",
+        suffixes=(".pcd",),
+        reads=("arrays",),
+        reader="frametool.formats.rows.pcd",
+        writes=("points", "arrays"),
+        writer="frametool.formats.rows.pcd",
+        signs=(("magic", _PCD),),
+        states="metres; VIEWPOINT: pose of the sensor among the points, w first",
+    ),
+    "ply": Format(
+        "PLY point cloud or mesh",
+        suffixes=(".ply",),
+        reads=("arrays",),
+        reader="frametool.formats.rows.ply",
+        writes=("points", "arrays"),
+        writer="frametool.formats.rows.ply",
+        signs=(("magic", rb"ply\r?\n"),),
+        states="metres",
+    ),
+    "las": Format(
+        "LAS laser scan",
+        suffixes=(".las",),
+        reads=("arrays",),
+        reader="frametool.formats.rows.las",
+        writes=("points", "arrays"),
+        writer="frametool.formats.rows.las",
+        signs=(("magic", rb"LASF.{100}[\x00-\x7f]"),),
+        states="metres",
+    ),
+    "laz": Format(
+        "LAZ laser scan",
+        suffixes=(".laz",),
+        reads=("arrays",),
+        reader="frametool.formats.rows.las",
+        writes=("points", "arrays"),
+        writer="frametool.formats.rows.las",
+        signs=(("magic", rb"LASF.{100}[\x80-\xff]"),),
+        states="metres",
+    ),
+    "parquet": Format(
+        "Parquet (pip install 'frametool[arrow]')",
+        suffixes=(".parquet", ".pq"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"PAR1"),),
+    ),
+    "arrow": Format(
+        "a file of Arrow, Feather (pip install 'frametool[arrow]')",
+        suffixes=(".arrow", ".feather", ".ipc"),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"ARROW1"),),
+    ),
+    "arrows": Format(
+        "a stream of Arrow (pip install 'frametool[arrow]')",
+        suffixes=(".arrows",),
+        reads=("arrays",),
+        reader=_ARROW,
+        writes=("poses", "points", "arrays"),
+        writer=_ARROW,
+        signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
+    ),
+    "feather1": Format(
+        "Feather of the first version",
+        signs=(("magic", rb"FEA1"),),
+        instead="write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)",
+    ),
+    "xacro": Format(
+        "xacro, from which URDF is made",
+        suffixes=(".xacro",),
+        signs=(  # launch files have the same substitutions
+            ("xml text", r"(?s)\A(?!<launch\b).*?(?:<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b)"),
+        ),
+        instead="expand it: xacro FILE > robot.urdf (pip install xacro)",
+    ),
+    "ur": Format(
+        "UR kinematics, a chain that xacro puts into the robot",
+        signs=(("yaml key", "kinematics"),),
+        instead="expand the robot's URDF with it: xacro ur.urdf.xacro kinematics_params:=FILE ..",
+    ),
+    "camera_info": Format(
+        "camera_info, the intrinsics of a camera",
+        signs=(("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
+        instead="there is no pose in it; its frame stands in the tree of the robot",
+    ),
+    "intrinsics": Format(
+        "cameras of Kalibr that were calibrated alone",
+        signs=(("yaml inner", r"distortion_coeffs|cam_overlaps"),),
+        instead="there is no pose in it; one would stand under T_cam_imu or T_cn_cnm1",
+    ),
+    "cameras": Format(
+        "cameras.txt of COLMAP, the intrinsics",
+        signs=(("text", rf"\A(?:\s*#[^\n]*\n)*\s*\d+ (?:{_COLMAP_MODELS}) \d+ \d+ "),),
+        instead="there is no pose in it; those of the cameras stand in images.txt beside it",
+    ),
+    "lio": Format(
+        "parameters of FAST-LIO or LIO-SAM",
+        signs=(("yaml inner", r"extrinsic_[TR]|extrinsic(?:Trans|Rot|RPY)|[RP]cl"), ("yaml key", r"extrinsic_[TR]")),
+        instead="extrinsic_T, R are imu<-lidar, extrinsicRot is lidar<-imu; write {xyz: .., matrix: ..} as a tree",
+    ),
+    "map": Format(
+        "map.yaml of a map server",
+        signs=(("yaml key", "occupied_thresh"),),
+        instead="its origin is the lower left corner of the picture in the map: {xyz: [x, y, 0], rpy: [0, 0, yaw]}",
+    ),
+    "usd": Format(
+        "a USD scene",
+        suffixes=(".usd", ".usda", ".usdc", ".usdz"),
+        signs=(("magic", rb"#usda |PXR-USDC"),),
+        instead="its units and axes differ from file to file; export URDF, or the poses as JSON",
+    ),
+    "gltf": Format(
+        "a glTF scene",
+        suffixes=(".gltf", ".glb"),
+        signs=(("magic", rb"glTF"), ("json path", "asset/version")),
+        instead="glTF has y up and z forward; export URDF, or the poses as JSON",
+    ),
+    "unity": Format(
+        "a Unity scene",
+        suffixes=(".unity", ".prefab"),
+        signs=(("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),),
+        instead="Unity is left-handed with y up; export poses as JSON and convert them",
+    ),
+    "itk": Format(
+        "an ITK or ANTs transform",
+        suffixes=(".tfm",),
+        signs=(("magic", rb"#Insight Transform File"),),
+        instead="it maps points about a centre in LPS axes, in mm; convert it to a 4x4 matrix first",
+    ),
+}
+
+
+def readers(*what: str) -> tuple[str, ...]:
+    """Name the forms from which any of `tree`, `records` and `rows` is read."""
+    return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
+
+
+def unread() -> tuple[str, ...]:
+    """Name the forms that are known by their signs and not read."""
+    return tuple(name for name, row in FORMATS.items() if row.instead)
+
+
+def writers(*what: str) -> tuple[str, ...]:
+    """Name the forms in which any of `poses`, `points`, a `trajectory`, a `tree` or a `report` is written."""
+    return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.writes))
+
+
+def is_trajectory(name: str) -> bool:
+    """Tell whether a form is that of the poses of one frame over time, and of nothing else."""
+    return name in FORMATS and "trajectory" in FORMATS[name].reads
+
+
+def holds_arrays(name: str) -> bool:
+    """Tell whether a form holds columns of numbers and no text."""
+    return name in FORMATS and not {"arrays"}.isdisjoint((*FORMATS[name].reads, *FORMATS[name].writes))
+
+
+def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
+    """Return which of some forms is written to a file of this name: by the whole name, then by its suffix."""
+    last = (path or "").rpartition("/")[2]
+    return next((name for name in names if last in FORMATS[name].names), None) or by_suffix(path, names)
+
+
+def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:
+    """Return which of some forms the suffix of a file stands for, if any."""
+    begin, dot, suffix = (path or "").rpartition(".")
+    told = f"{dot}{suffix}".lower() if begin and "/" not in suffix else ""
+    return next((name for name in names if told in FORMATS[name].suffixes), None)

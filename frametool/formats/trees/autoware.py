@@ -1,0 +1,82 @@
+"""Autoware's calibration of sensors: a map of frames, in it the poses of others, six numbers each.
+
+    base_link:
+      sensor_kit_base_link: {x: 0.9, y: 0.0, z: 2.0, roll: -0.001, pitch: 0.015, yaw: -0.0364}
+
+Metres, radians; roll, pitch, yaw about the fixed axes x, y, z: the pose of the inner frame in the outer one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.yaml_writer import flow, quoted
+from frametool.errors import listing, shown, warn
+from frametool.formats.trees.tree_reader import document_edges
+from frametool.formats.trees.written_poses import Precision, angles_of, standing_edges, tell_lonely_roots
+from frametool.geometry.representations import notation
+from frametool.grammar.edges import Edge
+from frametool.grammar.readers import Misfit, as_mapping, read_numbers, within
+from frametool.grammar.rotation_spelling import rotation_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.lookups import FrameTree
+    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Path, Reading
+    from frametool.grammar.result import Style
+
+NAME = "autoware"
+XYZ = ("x", "y", "z")
+RPY = ("roll", "pitch", "yaw")
+_RPY = notation("rpy")
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield an edge a pose."""
+
+    def take(value: Any, reading: Reading) -> Iterator[Edge]:
+        for parent, children in as_mapping(value, "frames with the poses of others in them").items():
+            inner = within((parent,), as_mapping, children, f"the poses of frames in {shown(parent)}")
+            for child, pose in inner.items():
+                path: Path = (parent, child)
+                reading.here = path
+                try:
+                    yield _edge(parent, child, pose, reading)
+                except Misfit as misfit:
+                    reading.refuse(misfit.below(*path))
+
+    yield from document_edges(file, options, take)
+
+
+def _edge(parent: str, child: str, pose: Any, reading: Reading) -> Edge:
+    """Read one pose; raises Misfit."""
+    expected = ", ".join((*XYZ, *RPY))
+    for key in as_mapping(pose, f"the pose of {shown(child)} as {{{expected}}}"):
+        if key not in (*XYZ, *RPY):
+            raise Misfit(f"unknown key {shown(key)}; a pose has {expected}", (key,), key=True)
+    if missing := [key for key in (*XYZ, *RPY) if key not in pose]:
+        raise Misfit(f"missing {', '.join(missing)}; a pose has {expected}")
+    x, y, z = read_numbers({key: pose[key] for key in XYZ}, XYZ)
+    turned = rotation_of(_RPY, [pose[key] for key in RPY], [(key,) for key in RPY], reading)
+    return Edge(parent, child, (x, y, z, *turned), path=(parent, child))
+
+
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+    """Return a map a parent; raises ValueInvalid for frames that move."""
+    precision = Precision(NAME, "x y z roll pitch yaw")
+    texts: dict[str, list[str]] = {}
+    for parent, child, pose in standing_edges(tree, NAME):
+        angles, back = angles_of(pose[3:])
+        precision.add(pose, (*pose[:3], *back))
+        numbers = zip((*XYZ, *RPY), (*pose[:3], *angles), strict=True)
+        lines = "".join(f"    {key}: {flow(number, style.number)}\n" for key, number in numbers)
+        texts.setdefault(parent, []).append(f"  {quoted(child)}:\n{lines}")
+    if len(texts) > 1:
+        warn(f"Autoware has a file for each frame that holds others; here in one: {listing(texts)}")
+    tell_lonely_roots(tree, NAME)
+    precision.tell(style)
+    return "".join(f"{quoted(parent)}:\n{''.join(children)}" for parent, children in texts.items())

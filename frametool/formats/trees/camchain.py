@@ -1,0 +1,118 @@
+"""Camera chains of Kalibr, OpenVINS and okvis: 4x4 matrices in a block a camera; what they do stands in their key.
+
+    cam0:
+      T_cam_imu: [[..], [..], [..], [0.0, 0.0, 0.0, 1.0]]     Kalibr: takes points of the IMU to the camera
+      T_imu_cam: ..                                           OpenVINS: its inverse, the pose of the camera in the IMU
+    cam1:
+      T_cn_cnm1: ..                                           from cam0 to cam1; beside T_cam_imu only a check
+    cameras: [{T_SC: [16 numbers]}, ..]                       okvis: the pose of the camera in the sensor, its IMU
+
+Metres, row-major.  The cameras hang under the IMU: `imu`, or okvis' `body`.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.yaml_writer import flow, quoted
+from frametool.errors import ValueInvalid, listing, shown, warn
+from frametool.formats.trees.matrices import FrameNames, Matrices
+from frametool.formats.trees.matrix_keys import TAGS, made_ordinary
+from frametool.formats.trees.tree_reader import document_edges
+from frametool.formats.trees.written_poses import Precision, rows_of, standing_edges
+from frametool.geometry import rigid
+from frametool.grammar.readers import Misfit, as_mapping
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.lookups import FrameTree
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Edge, Options
+    from frametool.grammar.readers import Reading
+    from frametool.grammar.result import Style
+
+NAME = "camchain"
+_CAMERA = r"cam([0-9]+)"
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield an edge a camera, and check what is stated twice."""
+
+    def take(value: Any, reading: Reading) -> Iterator[Edge]:
+        told = options.answers.frames
+        naming = FrameNames(base=told[0] if told else "", alone="cam", told=told, blocks=told[1:])
+        matrices = Matrices(as_mapping(value, "blocks of cameras"), naming, options.answers, reading)
+        if not matrices.poses:
+            raise Misfit("no pose in it: a camera has T_cam_imu, T_imu_cam, T_cn_cnm1 or T_SC")
+        edges = matrices.edges()
+        options.tally.about = matrices.about(edges)
+        yield from edges
+
+    yield from document_edges(made_ordinary(file), options, take, TAGS)
+
+
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+    """Return a block a camera; raises ValueInvalid for several trees, and for frames that move.
+
+    Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of cameras alone,
+    cam0, cam1 .., gets T_cn_cnm1.
+    """
+    edges = standing_edges(tree, NAME)
+    if len(tree.roots) != 1:
+        raise ValueInvalid(f"{NAME} holds one tree of cameras; the roots here: {listing(tree.roots)}")
+    precision = Precision(NAME, "matrices")
+    cameras = [frame for frame in tree.frames if re.fullmatch(_CAMERA, frame)]
+    if len(cameras) == len(tree.frames):
+        text = _chain(tree, cameras, precision, style)
+    else:
+        _tell(tree.roots[0], edges)
+        text = _star(tree, tree.roots[0], precision, style)
+    precision.tell(style)
+    return text
+
+
+def _tell(root: str, edges: list[tuple[str, str, Rigid]]) -> None:
+    """Warn of what a camchain does not say or Kalibr does not read."""
+    if root != "imu":
+        warn(f"{NAME} has no name for its root {shown(root)}; read it back with --frames {root}")
+    if deeper := [child for parent, child, _ in edges if parent != root]:
+        warn(f"{NAME} holds cameras under one IMU; as seen from {shown(root)} are written: {listing(deeper)}")
+    if others := [child for _, child, _ in edges if not re.fullmatch(_CAMERA, child)]:
+        warn(f"Kalibr calls cameras cam0, cam1 ..; these keep their names: {listing(others)}")
+
+
+def _star(tree: FrameTree | TransformBuffer, root: str, precision: Precision, style: Style) -> str:
+    """Write every frame as seen from the root, in both directions."""
+    text = ""
+    for frame in tree.frames:
+        if frame != root:
+            pose = tree.lookup_components(root, frame)
+            rows, back = rows_of(pose)
+            precision.add(pose, back)
+            text += f"{quoted(frame)}:\n{_matrix('T_cam_imu', rows_of(rigid.inverse(*pose))[0], style)}"
+            text += _matrix("T_imu_cam", rows, style)
+    return text
+
+
+def _chain(tree: FrameTree | TransformBuffer, cameras: list[str], precision: Precision, style: Style) -> str:
+    """Write every camera as seen from the next; Kalibr's first camera has no pose."""
+    text, before = "", ""
+    for frame in sorted(cameras, key=lambda name: int(name[3:])):
+        text += f"{frame}:\n"
+        if before:
+            pose = tree.lookup_components(frame, before)
+            rows, back = rows_of(pose)
+            precision.add(tree.lookup_components(before, frame), rigid.inverse(*back))
+            text += _matrix("T_cn_cnm1", rows, style)
+        else:
+            text += "  cam_overlaps: []\n"
+        before = frame
+    return text
+
+
+def _matrix(key: str, rows: list[list[float]], style: Style) -> str:
+    return f"  {key}:\n" + "".join(f"  - {flow(row, style.number)}\n" for row in rows)

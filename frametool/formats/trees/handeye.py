@@ -1,0 +1,120 @@
+"""Hand-eye calibrations of easy_handeye and easy_handeye2: where a camera sits on a robot's hand, or beside its base.
+
+    parameters: {eye_on_hand: true, robot_effector_frame: tool0, tracking_base_frame: camera_link, ..}
+    transformation: {x: .., y: .., z: .., qx: .., qy: .., qz: .., qw: ..}
+    parameters: {calibration_type: eye_in_hand, ..}                        easy_handeye2
+    transform: {translation: {x: .., ..}, rotation: {x: .., y: .., z: .., w: ..}}
+
+Metres, x y z w: the pose of tracking_base_frame in robot_effector_frame if the eye is on the hand, else in
+robot_base_frame.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.yaml_writer import flow, quoted
+from frametool.errors import ValueInvalid, listing, shown, warn
+from frametool.formats.trees.tree_reader import document_edges
+from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
+from frametool.geometry import floats, quaternion
+from frametool.geometry.representations import notation
+from frametool.grammar.edges import Edge
+from frametool.grammar.pose import read_name
+from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
+from frametool.grammar.rotation_spelling import rotation_of
+from frametool.ros.message_parts import only, read_rigid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.lookups import FrameTree
+    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Quaternion, Reading, Vector
+    from frametool.grammar.result import Style
+
+NAME = "handeye"
+CHILD = "tracking_base_frame"
+EFFECTOR, BASE = "robot_effector_frame", "robot_base_frame"
+# what the parameters say -> which of their frames the camera is seen from
+MOUNTS = {
+    "eye_on_hand": {"true": EFFECTOR, "false": BASE},
+    "calibration_type": {"eye_in_hand": EFFECTOR, "eye_on_hand": EFFECTOR, "eye_on_base": BASE, "eye_to_hand": BASE},
+}
+POSES = ("transformation", "transform")
+XYZ = ("x", "y", "z")
+QUATERNION = ("qx", "qy", "qz", "qw")
+_XYZW = notation("xyzw")
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the one edge."""
+
+    def take(value: Any, reading: Reading) -> Iterator[Edge]:
+        calibration = as_mapping(value, "parameters and transformation")
+        # the first easy_handeye had no parameters: around them
+        inner = "parameters" in calibration
+        path = ("parameters",) if inner else ()
+        parameters = within(path, as_mapping, calibration["parameters"] if inner else calibration, "the parameters")
+        parent = within(path, _frame, parameters, within(path, _mount, parameters))
+        child = within(path, _frame, parameters, CHILD)
+        key = next((key for key in POSES if key in calibration), None)
+        if key is None:
+            raise Misfit(f"missing {POSES[0]} (easy_handeye) or {POSES[1]} (easy_handeye2)")
+        reading.here = (key,)
+        pose = within((key,), as_mapping, calibration[key], "the pose of the camera")
+        position, rotation = within((key,), _pose, pose, reading)
+        options.tally.about = f"the pose of {shown(child)} in {shown(parent)}"
+        yield Edge(parent, child, (*position, *rotation), path=(key,))
+
+    yield from document_edges(file, options, take)
+
+
+def _mount(parameters: dict[str, Any]) -> str:
+    """Return the key of the frame that the camera is seen from."""
+    key = next((key for key in MOUNTS if key in parameters), None)
+    if key is None:
+        raise Misfit("missing eye_on_hand (easy_handeye) or calibration_type (easy_handeye2)")
+    found = parameters[key]
+    if type(found) is not str or found not in MOUNTS[key]:
+        said = shown(found) if type(found) is str else kind(found)
+        raise Misfit(f"{key} must be {' or '.join(MOUNTS[key])}, found {said}", (key,))
+    return MOUNTS[key][found]
+
+
+def _frame(parameters: dict[str, Any], key: str) -> str:
+    name = read_name(parameters, key)
+    if name is None:
+        raise Misfit(f"missing {key}")
+    return name
+
+
+def _pose(pose: dict[str, Any], reading: Reading) -> tuple[Vector, Quaternion]:
+    """Read either spelling; the keys come in any order."""
+    if "rotation" in pose or "translation" in pose:
+        only(pose, ("translation", "rotation"))
+        return read_rigid(pose, ("translation", "rotation"), reading)
+    only(pose, (*XYZ, *QUATERNION))
+    if missing := [key for key in (*XYZ, *QUATERNION) if key not in pose]:
+        raise Misfit(f"missing {', '.join(missing)}; a pose has {', '.join((*XYZ, *QUATERNION))}")
+    x, y, z = read_numbers({key: pose[key] for key in XYZ}, XYZ)
+    turned = rotation_of(_XYZW, [pose[key] for key in QUATERNION], [(key,) for key in QUATERNION], reading)
+    return (x, y, z), turned
+
+
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+    """Return the one edge of a tree as easy_handeye has it, as if on the hand; raises ValueInvalid for other trees."""
+    edges = standing_edges(tree, NAME)
+    if len(edges) != 1:
+        children = listing(child for _, child, _ in edges)
+        raise ValueInvalid(f"{NAME} holds one pose, and here are {len(edges)}: {children}")
+    ((parent, child, pose),) = edges
+    turned = quaternion.from_quaternion(*pose[3:], floats)
+    numbers = zip((*XYZ, *QUATERNION), (*pose[:3], *turned), strict=True)
+    lines = "".join(f"  {key}: {flow(number, style.number)}\n" for key, number in numbers)
+    warn(f"{NAME}: {shown(parent)} is written as the hand; beside the base write eye_on_hand: false and {BASE}")
+    tell_lonely_roots(tree, NAME)
+    frames = f"  eye_on_hand: true\n  {EFFECTOR}: {quoted(parent)}\n  {CHILD}: {quoted(child)}\n"
+    return f"parameters:\n{frames}transformation:\n{lines}"

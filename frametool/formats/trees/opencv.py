@@ -1,0 +1,98 @@
+"""OpenCV's FileStorage as YAML, JSON or XML: matrices by name, of which those are poses whose name says two frames.
+
+    %YAML:1.0
+    ---
+    body_T_cam0: !!opencv-matrix            takes points of cam0 to body: the pose of cam0 in body
+       rows: 4
+       cols: 4
+       dt: d
+       data: [ 1., 0., 0., 0.05, .. ]       row-major
+
+A pair rvec, tvec takes points of the object to the camera, as all of OpenCV does.  Lengths are in metres if the board's
+squares were.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.xml import XmlFile
+from frametool.documents.yaml_writer import flow
+from frametool.errors import FormatError, ValueInvalid, shown
+from frametool.formats.trees.matrices import FrameNames, Matrices
+from frametool.formats.trees.matrix_keys import HEAD, TAGS, Meaning, StoredXml, made_ordinary, meaning_of
+from frametool.formats.trees.tree_reader import Unclear, answerable, document_edges, remember
+from frametool.formats.trees.written_poses import Precision, rows_of, standing_edges, tell_lonely_roots
+from frametool.grammar.readers import Misfit, Reading, as_mapping
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.lookups import FrameTree
+    from frametool.grammar.edges import Edge, Options
+    from frametool.grammar.result import Style
+
+NAME = "opencv"
+_KEY = r"[A-Za-z_][\w-]*"  # what FileStorage takes for a name, without blanks
+_NO_NAMES = dict.fromkeys(("me", "before", "imu", "body", "sensor"), "")
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield an edge a pose, and check what is stated twice."""
+
+    def take(value: Any, reading: Reading) -> Iterator[Edge]:
+        told = options.answers.frames
+        naming = FrameNames(base=told[0] if told else "", alone="cam", told=told)
+        matrices = Matrices(as_mapping(value, "matrices by name"), naming, options.answers, reading)
+        if not matrices.poses:
+            found = f"; {', '.join(matrices.left[:3])}" if matrices.left else ""
+            raise Misfit(f"no pose in it{found}; a pose is named after its two frames, as body_T_cam0")
+        edges = matrices.edges()
+        options.tally.about = matrices.about(edges)
+        yield from edges
+
+    if file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
+        yield from _read_xml(file, options, take)
+    else:
+        yield from document_edges(made_ordinary(file), options, take, TAGS)
+
+
+def _read_xml(file: InputFile, options: Options, take: Any) -> Iterator[Edge]:
+    """Read the XML form."""
+    xml = XmlFile(file)
+    try:
+        stored = StoredXml(xml)
+        reading = Reading(xml.source, normalize=options.normalize)
+        for edge in take(stored.value, reading):
+            yield edge._replace(path=(), line=stored.element(edge.path).line)
+        remember(reading.notes, [stored.element(note.path).line for note in reading.notes], options.tally)
+    except Misfit as misfit:
+        error = xml.error(stored.element(misfit.path), str(misfit), rule=misfit.rule)
+        if isinstance(misfit, Unclear):
+            raise answerable(error) from None
+        options.report(error)
+    except FormatError as error:
+        options.report(error)
+
+
+def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+    """Return a matrix an edge, called `parent_T_child`; raises ValueInvalid for names that OpenCV does not take."""
+    precision = Precision(NAME, "matrices")
+    text = f"{HEAD}\n---\n"
+    for parent, child, pose in standing_edges(tree, NAME):
+        key = f"{parent}_T_{child}"
+        if not re.fullmatch(_KEY, key) or meaning_of(key, _NO_NAMES) != Meaning(parent, child, child):
+            raise ValueInvalid(
+                f"{NAME} cannot name the pose of {shown(child)} in {shown(parent)}: names there have letters, digits "
+                f"and _, begin with a letter and do not hold _T_"
+            )
+        rows, back = rows_of(pose)
+        precision.add(pose, back)
+        lines = ",\n       ".join(flow(row, style.number)[1:-1] for row in rows)
+        text += f"{key}: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   data: [ {lines} ]\n"
+    tell_lonely_roots(tree, NAME)
+    precision.tell(style)
+    return text

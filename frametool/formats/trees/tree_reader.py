@@ -1,0 +1,349 @@
+"""Frame trees in YAML and JSON: nested, as a list, or as ROS messages; documents in, edges out.
+
+    frames: {base: {lidar: {xyz: [0.9, 0, 2], rpy_deg: [0, 0, 90]}}}          nested: a root's keys are its children
+    frames: [{name: lidar, parent: base, xyz: [0.9, 0, 2]}]                   list, any order
+    {name: lidar, parent: base, xyz: [0.9, 0, 2]}                             one edge, as `lookup` prints it
+    {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a frame that moves; seconds
+
+Metres, radians unless said; every pose is that of the frame in its parent: parent_from_child.
+
+What forms in YAML and JSON share: each document through one function, what is wrong or odd with its place.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.document import locate_many, parse_documents
+from frametool.documents.source import Pasted
+from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown, warn
+from frametool.frames.stamps import parse_stamp
+from frametool.grammar.edges import Edge
+from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, within
+from frametool.ros import messages
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Iterator
+
+    from frametool.documents.source import InputFile, Source
+    from frametool.grammar.edges import Options, Tally
+    from frametool.grammar.readers import Note, Path
+
+    Take = Callable[[Any, Reading], Iterable[Edge]]
+
+TREE_KEYS = frozenset(("frames", "angles"))
+STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
+TIMED = frozenset(("samples", *STAMP_KEYS))
+CHILDREN = frozenset(("children", *TIMED))
+IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the edges of a text of trees, then tell of what was odd in it."""
+    source = file.source
+    notes: list[Note] = []
+    for document in parse_documents(source.text, source.name):
+        reading = Reading(source, raw=options.raw, normalize=options.normalize)
+        try:
+            for edge in read_edges(document.value, reading):
+                bare = edge if options.raw else without_slashes(edge, reading)
+                yield bare._replace(path=(document.index, *edge.path))
+        except Misfit as misfit:
+            raise misfit.placed(source, document.index) from None
+        notes += [note._replace(path=(document.index, *note.path)) for note in reading.notes]
+    tell(source, notes)
+
+
+def without_slashes(edge: Edge, reading: Reading) -> Edge:
+    """Take one leading `/` off the names, which tf2 has given up, and note it."""
+    if edge.child[0] != "/" and (edge.parent or "")[:1] != "/":
+        return edge
+    reading.here = edge.path
+    return edge._replace(child=reading.bare(edge.child), parent=edge.parent and reading.bare(edge.parent))
+
+
+def tell(source: Source, notes: list[Note], most: int = 10) -> None:
+    """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
+    if not notes:
+        return
+    firsts: dict[str, Note] = {}
+    for note in notes:
+        firsts.setdefault(_alike(note), note)
+    counts = Counter(map(_alike, notes))
+    told = list(firsts.values())[:most]
+    places = locate_many(source.text, [note.path for note in told])
+    for (line, column), note in zip(places, told, strict=True):
+        place = source.name if isinstance(source, Pasted) else f"{source.name}:{line}:{column}"
+        again = counts.pop(_alike(note)) - 1
+        warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}", rule=note.rule)
+    if counts:
+        warn(f"{source.name}: {counts.total()} more like these")
+
+
+def _alike(note: Note) -> str:
+    """Return what notes have in common that are told once; names with a slash are, whatever they are."""
+    return note.rule if note.rule == "slash" else note.message
+
+
+def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
+    """Yield the edges of one document, in its order.
+
+    Raises Misfit with the path from the document's top.
+    """
+    if type(value) is list:
+        yield from _entries(value, (), reading)
+    elif type(value) is not dict:
+        as_mapping(value, "a frame tree")
+    elif "frames" in value:
+        yield from _tree(value, reading)
+    elif messages.is_message(value):
+        yield from _messages(value, (), reading)
+    elif "name" in value or "parent" in value:
+        yield from _entry(value, (), reading)
+    else:
+        raise Misfit(
+            f"no frame tree: expected frames:, transforms: or an entry with name: and parent:; "
+            f"found the keys {shown_keys(value)}",
+        )
+
+
+def shown_keys(value: dict[str, Any]) -> str:
+    """Name the first keys of a mapping in quotes, within some sixty characters."""
+    named = ""
+    for key in value:
+        if len(more := f"{named}{', ' * bool(named)}{shown(key)}") > MOST_SHOWN and named:
+            return f"{named} .."
+        named = more
+    return named
+
+
+MOST_SHOWN = 70  # characters of the keys found
+
+
+def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
+    if unknown := [key for key in document if key not in TREE_KEYS]:
+        raise Misfit(f"unknown key {shown(unknown[0])} beside frames; expected angles", (unknown[0],), key=True)
+    if "angles" in document:
+        reading.degrees = read_angle_unit(document["angles"])
+    frames = document["frames"]
+    if type(frames) is list:
+        yield from _entries(frames, ("frames",), reading)
+    elif frames is not None:
+        for root, children in as_mapping(frames, "a mapping of root frames or a list of entries").items():
+            yield from _below_root(root, children, reading)
+
+
+def _below_root(root: str, children: Any, reading: Reading) -> Iterator[Edge]:
+    """Walk one nested tree, parents before children; a stack, so that no tree is too deep."""
+    path: Path = ("frames", root)
+    yield Edge(None, root, IDENTITY, path=path)
+    pending = [(root, children, path)]
+    while pending:
+        parent, entries, path = pending.pop()
+        if entries is None:
+            continue
+        deeper = []
+        for child, entry in _children(entries, path, reading).items():
+            here = (*path, child)
+            yield from _nested(parent, child, entry, here, reading)
+            if type(entry) is dict and "children" in entry:
+                deeper.append((child, entry["children"], (*here, "children")))
+        pending.extend(reversed(deeper))
+
+
+def _children(entries: Any, path: Path, reading: Reading) -> dict[str, Any]:
+    try:
+        return as_mapping(entries, "the children as a mapping by name")
+    except Misfit as misfit:
+        reading.refuse(misfit.below(*path))
+        return {}
+
+
+def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -> Iterator[Edge]:
+    """Yield the edge of a nested entry, or its samples."""
+    reading.here = path
+    try:
+        if entry is None:
+            entry = {}
+        if child in POSE_KEYS and type(entry) is not dict:
+            raise Misfit(
+                f"{shown(child)} stands where a frame's name is expected: "
+                "a root has no pose, its keys are its children",
+                key=True,
+            )
+        for key in ("name", "parent"):
+            if key in as_mapping(entry, f"the pose of frame {shown(child)}"):
+                raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)
+        pose = read_pose(entry, reading, CHILDREN)
+        yield from _edges(entry, pose, parent, child, path, reading)
+    except Misfit as misfit:
+        reading.refuse(misfit.below(*path))
+
+
+def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]:
+    """Walk a list of entries, ours or ROS messages."""
+    for index, entry in enumerate(entries):
+        here = (*path, index)
+        reading.here = here
+        if type(entry) is dict and messages.is_message(entry):
+            yield from _messages(entry, here, reading)
+        else:
+            yield from _entry(entry, here, reading)
+        entries[index] = None  # a million of them need no room beside their edges
+
+
+def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
+    """Read {name, parent, pose} or {name, parent, samples}; without parent and pose it only names a root."""
+    try:
+        pose = read_pose(as_mapping(entry, "an entry {name, parent, ..}"), reading, TIMED)
+        if pose.name is None:
+            raise Misfit("missing name; an entry is {name: .., parent: .., xyz: [..], ..}")
+        if pose.parent is None and (pose.position or pose.rotation):
+            raise Misfit(f"frame {shown(pose.name)} has a pose but no parent")
+        return _edges(entry, pose, pose.parent, pose.name, path, reading)
+    except Misfit as misfit:
+        reading.refuse(misfit.below(*path))
+        return []
+
+
+def _edges(
+    entry: dict[str, Any] | None, pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
+) -> list[Edge]:
+    """Return what one entry says: an edge that stands still or has one stamp, or the samples of one that moves."""
+    if entry is not None and "samples" in entry:
+        return read_samples(entry, pose, parent, child, path, reading)
+    if parent is not None and pose.position is None and pose.rotation is None:
+        reading.note(f"frame {shown(child)} has neither position nor rotation: taken as the identity", rule="identity")
+    return [Edge(parent, child, pose.components, stamp_of(entry or {}), path=path)]
+
+
+def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[Edge]:
+    """Read every TransformStamped of a ROS message."""
+    for message, here in messages.messages(value, path):
+        reading.here = here
+        try:
+            yield _message(message, here, reading)
+        except Misfit as misfit:
+            reading.refuse(misfit.below(*here))
+        message.clear()  # a million of them need no room beside their edges
+
+
+def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
+    """Read one TransformStamped, checked, or as tf2 receives it."""
+    if reading.raw:
+        from frametool.ros.tf2_input import read_transform
+
+        parent, child, components, stamp_ns = read_transform(message)
+        return Edge(parent, child, components, stamp_ns, path=path)
+    parent, child, position, rotation, stamp_ns = messages.read_transform(message, reading)
+    return Edge(parent, child, (*position, *rotation), stamp_ns, path=path)
+
+
+def read_samples(
+    entry: dict[str, Any], pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
+) -> list[Edge]:
+    """Read `samples: [{stamp: 0.0, xyz: [..]}, ..]`; a sample may name a parent of its own."""
+    if pose.position is not None or pose.rotation is not None or not STAMP_KEYS.isdisjoint(entry):
+        message = f"frame {shown(child)} has samples and a pose or a stamp beside them; put all into samples"
+        raise Misfit(message, ("samples",), key=True)
+    samples = entry["samples"]
+    if type(samples) is not list or not samples:
+        raise Misfit(f"expected samples as a list of {{stamp: .., xyz: [..], ..}}, found {kind(samples)}", ("samples",))
+    outer = reading.degrees
+    edges = []
+    try:
+        reading.degrees = read_angle_unit(entry["angles"]) if "angles" in entry else outer
+        for index, sample in enumerate(samples):
+            reading.here = (*path, "samples", index)
+            moved, stamp_ns = within(("samples", index), _sample, sample, reading)
+            above = moved.parent or parent
+            if above is None:
+                raise Misfit(f"frame {shown(child)} moves but has no parent", ("samples", index))
+            edges.append(Edge(above, child, moved.components, stamp_ns, path=reading.here))
+    finally:
+        reading.degrees = outer
+    return edges
+
+
+def _sample(sample: Any, reading: Reading) -> tuple[Pose, int]:
+    """Read one pose with its stamp."""
+    pose = read_pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
+    if pose.name is not None:
+        raise Misfit("name is given by the entry; leave it out", ("name",), key=True)
+    stamp_ns = stamp_of(sample)
+    if stamp_ns is None:
+        raise Misfit("missing stamp; a sample is {stamp: 12.5, xyz: [..], ..}, in seconds")
+    return pose, stamp_ns
+
+
+def stamp_of(entry: dict[str, Any]) -> int | None:
+    """Read `stamp: 12.5` in seconds or `stamp_ns: 12500000000`, exactly; None where there is neither."""
+    if STAMP_KEYS.isdisjoint(entry):
+        return None
+    keys = [key for key in ("stamp", "stamp_ns") if key in entry]
+    if len(keys) > 1:
+        raise Misfit("stamp and stamp_ns in one entry; keep one", ("stamp",), key=True)
+    text = entry[keys[0]]
+    if type(text) is not str:
+        raise Misfit(f"expected a time, found {kind(text)}", (keys[0],))
+    try:
+        return parse_stamp(text if keys[0] == "stamp" else f"{text}ns")
+    except ValueInvalid as error:
+        raise Misfit(str(error), (keys[0],)) from None
+
+
+class Unclear(Misfit):
+    """Report a value whose meaning an option has to tell."""
+
+    def placed(self, source: Source, document: int) -> FormatError:
+        """Make the error that names the line and column."""
+        return answerable(super().placed(source, document))
+
+
+def answerable(error: FormatError) -> Unanswered:
+    """Make of an error one that an option answers."""
+    place = {"source": error.source, "line": error.line, "column": error.column, "snippet": error.snippet}
+    return Unanswered(error.message, **place)  # type: ignore[arg-type]
+
+
+def document_edges(file: InputFile, options: Options, take: Take, tags: Collection[str] = ()) -> Iterator[Edge]:
+    """Yield the edges that `take` finds in each document of a file, with their paths from the top of the text.
+
+    take: (value, reading) to edges whose paths begin in the document; raises Misfit, or keeps it with `reading.refuse`.
+    tags: of YAML, that the form has.
+    Errors go to `options.report`, what is odd to `options.tally`.
+    """
+    source = file.source
+    try:
+        documents = parse_documents(source.text, source.name, tags)
+    except FormatError as error:
+        options.report(error)
+        return
+    for document in documents:
+        reading = Reading(source, normalize=options.normalize)
+        reading.faults = []
+        try:
+            for edge in take(document.value, reading):
+                yield without_slashes(edge, reading)._replace(path=(document.index, *edge.path))
+        except Misfit as misfit:
+            reading.faults.append(misfit)
+        for fault in reading.faults:
+            placed = fault.placed(source, document.index)
+            if isinstance(placed, Unanswered):
+                raise placed
+            options.report(placed)
+        paths = [(document.index, *note.path) for note in reading.notes]
+        remember(reading.notes, (line for line, _ in locate_many(source.text, paths)), options.tally)
+
+
+def remember(notes: Iterable[Note], lines: Iterable[int], tally: Tally) -> None:
+    """Keep what was odd, each with its line and behind the keys that lead to it."""
+    for note, line in zip(notes, lines, strict=True):
+        tally.note_each(f"{bare(dotted(note.path))}: {note.message}" if note.path else note.message, line, note.rule)
+
+
+def dotted(path: Path) -> str:
+    """Name a place in a document by its keys: `cam0.T_cam_imu`."""
+    return ".".join(str(step) for step in path)

@@ -1,0 +1,99 @@
+"""Poses as the numbers of other forms: angles and matrices that read back to the same rotation where such ones exist.
+
+A quaternion has more bits than three angles or nine entries give back.  What then differs is told, once and how much.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from math import copysign, pi
+from typing import TYPE_CHECKING
+
+from frametool.errors import ValueInvalid, listing, shown, warn
+from frametool.geometry import euler, floats, matrix, quaternion, rigid
+
+if TYPE_CHECKING:
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.lookups import FrameTree
+    from frametool.geometry.types import Rigid, Three
+    from frametool.grammar.readers import Quaternion
+    from frametool.grammar.result import Style
+
+MOST_DECIMALS = 17
+
+
+def standing_edges(tree: FrameTree | TransformBuffer, form: str) -> list[tuple[str, str, Rigid]]:
+    """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
+    tracks = list(tree.tracks())
+    if moving := next((track.child for track in tracks if not track.standing), None):
+        raise ValueInvalid(f"{form} holds no frames that move, and {shown(moving)} does; give --at TIME")
+    if not tracks:
+        raise ValueInvalid(f"{form} holds poses, and there is none: {listing(tree.frames)}")
+    return [(track.parent, track.child, track.components) for track in tracks]
+
+
+def tell_lonely_roots(tree: FrameTree | TransformBuffer, form: str) -> None:
+    """Warn of frames that a form cannot name because nothing is connected with them."""
+    parents = {track.parent for track in tree.tracks()}
+    if lonely := [frame for frame in tree.roots if frame not in parents]:
+        warn(f"{form} has no place for frames without a pose: {', '.join(map(shown, lonely[:5]))} left out")
+
+
+class Precision:
+    """How far what was written lies from what is read back."""
+
+    def __init__(self, form: str, notation: str) -> None:
+        """Start with nothing written; `notation` says in what rotations are written."""
+        self.form = form
+        self.notation = notation
+        self.metres = 0.0
+        self.radians = 0.0
+
+    def add(self, given: Rigid, back: Rigid) -> None:
+        """Compare one pose with what is read back."""
+        same = (*given[:3], *quaternion.from_quaternion(*given[3:], floats))
+        if same != back:
+            metres, radians = rigid.distance(*given, *back, floats)
+            self.metres, self.radians = max(self.metres, metres), max(self.radians, radians)
+
+    def tell(self, style: Style) -> None:
+        """Warn if anything differs that could be written better; fixed decimals were asked for."""
+        if style.precision is None and (self.metres or self.radians):
+            off = " and ".join(
+                f"{value:.1g} {unit}" for value, unit in ((self.metres, "m"), (self.radians, "rad")) if value
+            )
+            warn(f"{self.form}: poses are written as {self.notation}; they read back to within {off}")
+
+
+def angles_of(rotation: Quaternion) -> tuple[Three[float], Quaternion]:
+    """Return roll, pitch, yaw of a rotation, and the rotation that they read back to.
+
+    The angles with the fewest decimals that give the same bits, which are those of a file the rotation came from;
+    without such ones the nearest angles.
+    """
+    given = quaternion.from_quaternion(*rotation, floats)
+    exact: Three[float] = euler.from_quaternion(*given, "sxyz", floats)
+    for decimals in range(MOST_DECIMALS):
+        for roll, yaw in product(*map(_turns, (exact[0], exact[2]))):
+            angles = (round(roll, decimals), round(exact[1], decimals), round(yaw, decimals))
+            if _turned(angles) == given:
+                return angles, given
+    return exact, _turned(exact)
+
+
+def _turns(angle: float) -> tuple[float, float]:
+    """Return an angle, and the same one reached the other way round."""
+    return angle, angle - copysign(2.0 * pi, angle)
+
+
+def _turned(angles: Three[float]) -> Quaternion:
+    return quaternion.canonical(*euler.to_quaternion(*angles, "sxyz", floats), floats)
+
+
+def rows_of(pose: Rigid) -> tuple[list[list[float]], Rigid]:
+    """Return the rows of the 4x4 matrix of a pose, and the pose that they read back to."""
+    position, given = pose[:3], quaternion.from_quaternion(*pose[3:], floats)
+    numbers = rigid.to_homogeneous(*position, *given, floats)
+    turn = matrix.check(*numbers[0:3], *numbers[4:7], *numbers[8:11])
+    back = quaternion.canonical(*matrix.to_quaternion(*turn, floats), floats)
+    return [list(numbers[at : at + 4]) for at in (0, 4, 8, 12)], (*position, *back)

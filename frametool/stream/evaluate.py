@@ -1,0 +1,411 @@
+"""One block of rows through the operation: numbers read, checked, moved, written; faults collected, nothing lost."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.errors import FrametoolError, ValueInvalid
+from frametool.geometry import arrays, floats, rigid
+from frametool.geometry.batch_validation import read_rotations
+from frametool.stream.faults import NULL, STOP, Fault
+from frametool.stream.request import START
+from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, POSE, TURN, pose_of
+from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
+from frametool.stream.stamp_columns import (
+    NOWHERE,
+    by_frame,
+    by_time,
+    parse_header_stamps,
+    parse_stamps,
+    seconds_before,
+    stamps_of,
+    weights_of,
+)
+from frametool.stream.text_parts import Const, In, Instead, Out
+from frametool.text.numbers import read_number_or_angle
+from frametool.text.parse import parse_floats
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.types import Components, Rigid
+    from frametool.stream.gathering import Gathered
+    from frametool.stream.request import Formula, Operation
+    from frametool.stream.row_layout import Shape, Target
+    from frametool.stream.rows import Block
+    from frametool.stream.stamp_source import Timed
+    from frametool.stream.text_parts import Piece
+    from frametool.text.spans import Flags, Floats, Ints, Spans
+
+
+
+
+class Plan(NamedTuple):
+    """What is done to every row of one layout.
+
+    shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
+    pieces: the text of a result; null: what stands for each number of a row without one
+    edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
+    beside: the name of what is read beside the numbers, a stamp or a weight; gathered: takes the poses
+    timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
+    yaml: numbers need a point before the exponent; frame_column: the name of the column that names frames
+    """
+
+    shapes: tuple[Shape, ...]
+    targets: tuple[Target, ...]
+    operation: Operation
+    pieces: tuple[Piece, ...]
+    names: tuple[str, ...]
+    null: bytes = b""
+    edge_of: Callable[..., Rigid] | None = None
+    normalize: bool = False
+    precision: int | None = None
+    on_error: str = STOP
+    unwrap: bool = False
+    yaml: bool = False
+    edges: tuple[Rigid | None, ...] = ()
+    timed: Timed | None = None
+    sources: tuple[str | None, ...] = ()
+    frame_column: str = ""
+    beside: str = ""
+    gathered: Gathered | None = None
+
+
+class State:
+    """What one block leaves for the next: the row before, and how often each angle has turned around."""
+
+    __slots__ = ("angles", "previous", "stamp_ns", "turns")
+
+    def __init__(self) -> None:
+        """Begin before the first row."""
+        self.previous: list[float] | None = None
+        self.stamp_ns: int | None = None
+        self.angles: dict[int, float] = {}
+        self.turns: dict[int, float] = {}
+
+
+class Run:
+    """The steps of one block; rows are numbered as in the block.
+
+    reasons: row -> column and why it is bad; mended: rows whose rotation was off and normalised
+    doubted: rows with angles that look like degrees, and which
+    """
+
+    def __init__(self, plan: Plan, block: Block, state: State) -> None:
+        """Do all of it."""
+        self.plan = plan
+        self.block = block
+        self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
+        self.mended: list[int] = []
+        self.doubted: list[tuple[int, str]] = []
+        self.off = 0.0  # how far the worst rotation was from one, of those that are none too far
+        self.evaluated: list[tuple[str, Components, list[Floats], Ints | None]] = []
+        self.count = len(block.places)
+        numbers = self._read()
+        movers = self._movers()
+        self.lone: int | None = None
+        with np.errstate(all="ignore"):
+            moved = self._compute(list(np.ascontiguousarray(numbers.T)), movers, state)
+            self.results, self.locked = self._results(moved)
+        self.rows = np.arange(self.count)
+        weights = weights_of(self.block, plan.beside, self._blame) if plan.gathered and plan.beside else None
+        if self.reasons or self.lone is not None:
+            gone = {*self.reasons, self.lone}
+            self._keep(np.array([row not in gone for row in range(self.count)], np.bool_))
+        if plan.gathered:
+            kept = np.isin(np.arange(self.count), self.rows)
+            plan.gathered.take(plan.shapes[0], moved[0], kept, weights)
+        if plan.unwrap and len(self.rows):
+            _unwrap(self.results, plan.targets[0].angle_columns(), state)
+
+    def _blame(self, row: int, column: str, reason: str | FrametoolError) -> None:
+        """Keep the first reason why a row is bad."""
+        self.reasons.setdefault(row, (column, reason))
+
+    def _read(self) -> Floats:
+        """Read all numbers; those that are none are nan."""
+        if self.block.values is not None:
+            return self.block.values
+        numbers, bad = parse_floats(self.block.numbers)
+        for place in bad.tolist():
+            row, column = divmod(place, numbers.shape[1])
+            text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
+            try:
+                numbers[row, column] = read_number_or_angle(text, self._unit_of(column))
+            except ValueInvalid as error:
+                self._blame(row, self.plan.names[column], str(error))
+        return numbers
+
+    def _unit_of(self, column: int) -> bool | None:
+        """Tell whether a number is in degrees; None if it is no angle."""
+        for shape in self.plan.shapes:
+            if column < shape.size:
+                return shape.in_degrees(column)
+            column -= shape.size
+        return None
+
+    def _movers(self) -> list[Rigid | None]:
+        """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
+        plan, block = self.plan, self.block
+        shapes = max(len(plan.shapes), 1)
+        if plan.operation.formula is not None:
+            return [None] * shapes
+        if plan.timed is not None and self.count:
+            frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
+            edges = plan.edges or [None] * shapes
+            if block.times is not None:
+                return [by_time(plan.timed, block.times, frames[0], self._blame, plan.frame_column)] * shapes
+            each = slice(None, len(block.stamps))  # the rows of a table have one stamp for all their points
+            movers = [
+                by_time(plan.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
+                for stamps, names, edge in zip(block.stamps, frames, edges[each], strict=True)
+            ]
+            return movers * (shapes // len(movers))
+        if plan.edge_of is not None and self.count:
+            return [by_frame(plan.edge_of, block.frames, self._blame, plan.frame_column)] * shapes
+        return list(plan.edges) or [None] * shapes
+
+    def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
+        """Apply the operation to each point or pose of the rows."""
+        shapes, operation = self.plan.shapes, self.plan.operation
+        moved: list[Components] = []
+        poses: list[Rigid] = []
+        first = 0
+        for shape, mover in zip(shapes, movers, strict=False):
+            numbers = columns[first : first + shape.size]
+            if operation.formula is not None:
+                moved.append(self._evaluated(operation.formula, shape, numbers, first, len(moved)))
+                first += shape.size
+                continue
+            own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
+            if shape.kind != POSE:
+                start = shape.position(own) if shape.unit is not None else tuple(own)
+                moved.append(operation.move(shape, (*start, *beside), mover))
+            else:
+                pose = pose_of(shape.position(own), self._rotation(shape, own, first))
+                poses.append(rigid.inverse(*pose) if shape.inverse else pose)
+                if len(self.plan.targets) > 1 or operation.of != "pair":
+                    done = operation.pose(self._with_before(poses.pop(), state), mover, arrays)
+                    if operation.velocity:
+                        done = operation.with_velocity(done, self._seconds(state), arrays)
+                    moved.append((*done, *operation.covariance(shape, beside, mover)))
+            first += shape.size
+        if poses or not shapes:
+            moved.append(operation.pose(poses or [NOWHERE], movers[0], arrays))
+        return moved
+
+    def _evaluated(
+        self, formula: Formula, shape: Shape, numbers: list[Floats], first: int, at: int
+    ) -> Components:
+        """Return what an expression makes of the rows, a constant as often as there are rows."""
+        own = numbers[: shape.own_size]
+        parts: Components = ()
+        if shape.kind == POSE:
+            pose = pose_of(shape.position(own), self._rotation(shape, own, first))
+            parts = rigid.inverse(*pose) if shape.inverse else pose
+        elif shape.kind:
+            parts = shape.position(own)
+        cells = numbers[shape.size - shape.beside :]
+        times = self._times(at) if formula.needs_time else None
+        self.evaluated.append((shape.kind, parts, cells, times))
+        found = formula.result(shape.kind, parts, cells, times, arrays)
+        return tuple(np.full(self.count, part) if type(part) is float else part for part in found)
+
+    def _times(self, at: int) -> Ints:
+        """Read the stamps of the rows."""
+        if self.block.times is not None:
+            return self.block.times
+        stamps, column = self.block.stamps[at], self.plan.timed.column if self.plan.timed else ""
+        in_ns = self.plan.timed is not None and self.plan.timed.in_ns
+        times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=in_ns)
+        for row, reason in reasons.items():
+            self._blame(row, column, reason)
+        return times
+
+    def _why_no_value(self, formula: Formula, row: int) -> str | FrametoolError:
+        """Evaluate an expression for one row alone, which says why it has no value there."""
+        for kind, parts, cells, times in self.evaluated:
+            given = tuple(part if type(part) is float else float(part[row]) for part in parts)
+            own = [float(cell[row]) for cell in cells]
+            try:
+                formula.result(kind, given, own, None if times is None else int(times[row]), floats)
+            except FrametoolError as error:
+                return error
+        return "the result is not finite: the numbers are too large"
+
+    def _good(self) -> list[int]:
+        return [row for row in range(self.count) if row not in self.reasons]
+
+    def _with_before(self, pose: Rigid, state: State) -> list[Rigid]:
+        if not self.plan.operation.looks_back:
+            return [pose]
+        with_before = _with_first if self.plan.operation.of == START else _with_previous
+        return with_before(pose, self._good(), state, self.count)
+
+    def _seconds(self, state: State) -> Floats:
+        """Return the time since the good row before each; the very first row has no velocity and no result."""
+        name = self.plan.beside
+        stamps = stamps_of(self.block, name, self._blame)
+        good = self._good()
+        seconds = seconds_before(stamps, good, state.stamp_ns, name, self._blame)
+        if good:
+            self.lone = good[0] if state.stamp_ns is None else None
+            state.stamp_ns = int(stamps[good[-1]])
+        return seconds
+
+    def _rotation(self, shape: Shape, numbers: list[Floats], first: int) -> Components:
+        if shape.notation is None:
+            return IDENTITY
+        given = list(shape.rotation(numbers))
+        names = self.plan.names[first : first + shape.size]
+        if shape.joined:
+            self._check_tail(numbers, names, shape.joined.tail)
+        found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
+        for row, reason in found.reasons.items():
+            self._blame(row, names[shape.rotation_at[0]], reason)
+        self.mended += found.mended.tolist()
+        self.off = max(self.off, found.off)
+        self.doubted += _doubtful_angles(shape, given)
+        return found.quaternions
+
+    def _check_tail(self, numbers: list[Floats], names: Sequence[str], tail: Sequence[float]) -> None:
+        """Refuse rows whose last numbers are not what they always are: 0 0 0 1 of a 4x4 matrix."""
+        first = len(numbers) - len(tail)
+        wrong = {row for at, each in enumerate(tail) for row in np.flatnonzero(numbers[first + at] != each).tolist()}
+        wanted = " ".join(f"{each:g}" for each in tail)
+        for row in wrong:
+            found = " ".join(f"{number[row]:g}" for number in numbers[first:])
+            self._blame(row, names[first], f"the last row of a 4x4 pose is {wanted}, found {found}")
+
+    def _results(self, moved: list[Components]) -> tuple[Floats, Ints]:
+        """Return the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
+        numbers: list[Floats] = []
+        locked = np.zeros(self.count, np.int64)
+        for target, parts in zip(self.plan.targets, moved, strict=True):
+            numbers += target.written(parts, arrays)
+            for name, number in target.left_out(parts, arrays):
+                for row in np.flatnonzero(abs(number) > FLAT).tolist():
+                    self._blame(row, "", LEAVES_PLANE.format(name, number[row]))
+            flags = target.locked(parts)
+            if flags is not None:
+                locked |= flags
+        results = np.empty((self.count, len(numbers)))
+        for column, number in enumerate(numbers):
+            results[:, column] = number
+        if not np.isfinite(results.sum()):
+            for row in np.flatnonzero(~np.isfinite(results).all(axis=1)).tolist():
+                if row not in self.reasons:
+                    formula = self.plan.operation.formula
+                    too_large = "the result is not finite: the numbers are too large"
+                    self._blame(row, "", self._why_no_value(formula, row) if formula else too_large)
+        return results, locked
+
+    def _keep(self, kept: Flags) -> None:
+        self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
+
+    def refuse(self, rows: Sequence[int], reason: str) -> None:
+        """Take results back: these rows are bad."""
+        for row in rows:
+            self._blame(row, "", reason)
+        self._keep(~np.isin(self.rows, rows))
+
+    def first_fault(self) -> int | None:
+        """Return the place of the first bad row, if the run stops there."""
+        if self.plan.on_error != STOP:
+            return None
+        bad = [int(self.block.places[row]) for row in self.reasons]
+        return min([*bad, *(each.place for each in self.block.broken)], default=None)
+
+    def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
+        """Return what is written before place `end`: results, rows without one, and what passes."""
+        odd = list(self.block.odd)
+        if end is not None:
+            self._keep(self.block.places[self.rows] < end)
+            odd = [(place, text) for place, text in odd if place < end]
+        if self.plan.on_error == NULL:
+            odd += [(each.place, each.null_row) for each in self.block.broken]
+        groups = [*self._written(), *self._null_rows()]
+        return [*groups, texts_as_rows(odd)] if odd else groups
+
+    def _written(self) -> list[tuple[Ints, list[Spans]]]:
+        plan, rows = self.plan, self.rows
+        if not len(rows) or plan.gathered:
+            return []
+        values = None
+        if self.results.shape[1]:
+            values = number_spans(
+                self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml
+            )
+        parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
+        return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked))]
+
+    def _null_rows(self) -> list[tuple[Ints, list[Spans]]]:
+        plan = self.plan
+        if plan.on_error != NULL or not self.reasons:
+            return []
+        rows = np.array(sorted(self.reasons), np.int64)
+        pieces = [_without_result(piece, plan.null) for piece in plan.pieces]
+        parts = [chosen(part, rows) for part in self.block.parts]
+        return [(self.block.places[rows], assemble(pieces, parts, None, np.zeros(len(rows), np.int64)))]
+
+    def faults(self) -> list[Fault]:
+        """Return what is wrong, line by line."""
+        found = [Fault.of(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
+        return sorted(found + [Fault(each.line, each.column, each.reason) for each in self.block.broken])
+
+
+def _without_result(piece: Piece, null: bytes) -> Piece:
+    """Return what stands in a row without a result: nulls for its numbers, the input for what was put in its place."""
+    if isinstance(piece, Out):
+        return Const(piece.between.join([null] * (piece.last - piece.first)))
+    return In(piece.part) if isinstance(piece, Instead) else piece
+
+
+def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]:
+    """Wonder about the first bare angle beyond a full turn."""
+    form = shape.notation
+    if form is None or shape.degrees or form.degrees is not None:
+        return []
+    for index in form.representation.angles:
+        beyond = np.flatnonzero(abs(given[index]) > TURN)
+        if beyond.size:
+            return [(int(beyond[0]), f"{form.spec} {given[index][beyond[0]]:g}")]
+    return []
+
+
+def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
+    """Return the good row before each row, and the row; the very first row's is itself."""
+    full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
+    if not good:
+        return [pose, pose]
+    kept = np.array(good)
+    before = kept[np.maximum(np.searchsorted(kept, np.arange(count)) - 1, 0)]
+    earlier = [part[before] for part in full]
+    if state.previous is not None:
+        for part, value in zip(earlier, state.previous, strict=True):
+            part[: kept[0] + 1] = value
+    state.previous = [float(part[kept[-1]]) for part in full]
+    return [tuple(earlier), tuple(full)]
+
+
+def _with_first(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
+    """Return the first good row of the stream for each row, and the row."""
+    full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
+    if state.previous is None and good:
+        state.previous = [float(part[good[0]]) for part in full]
+    if state.previous is None:
+        return [pose, pose]
+    first = [np.full(count, value) for value in state.previous]
+    return [tuple(first), tuple(full)]  # type: ignore[list-item]
+
+
+def _unwrap(results: Floats, angles: Sequence[tuple[int, float]], state: State) -> None:
+    """Add full turns to angles, in place, so that no step is larger than half a turn."""
+    for column, period in angles:
+        values = results[:, column].copy()
+        before = np.concatenate([[state.angles.get(column, values[0])], values[:-1]])
+        turns = state.turns.get(column, 0.0) - np.cumsum(np.rint((values - before) / period))
+        results[:, column] = values + period * turns
+        state.angles[column], state.turns[column] = float(values[-1]), float(turns[-1])

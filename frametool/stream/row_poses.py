@@ -1,0 +1,291 @@
+"""Blocks of poses to single results and back, and columns of texts to spans and back.
+
+The rows of a table as poses rather than text: for trees, and for results in another form than the table's.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from frametool.documents.json import JSON_NUMBER, Verbatim
+from frametool.errors import ValueInvalid
+from frametool.formats.rows.pose_rows import IMAGE
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+from frametool.stream.evaluate import Run, State
+from frametool.stream.faults import Fault
+from frametool.stream.header import listed
+from frametool.stream.layout import NAMED
+from frametool.stream.row_layout import POSE, Shape
+from frametool.stream.rows import chosen
+from frametool.stream.run import notes_of
+from frametool.stream.stamp_columns import parse_stamps
+from frametool.stream.table import UNCLOSED, Naming, coded, in_nanoseconds, rename_of, stamp_column, table_block
+from frametool.stream.table_plan import plan_table
+from frametool.text.cells import torn_record, without_quotes
+from frametool.text.spans import MARGIN, Spans, framed
+from frametool.text.write import rounded_to_single, shortest_spans
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from frametool.stream.layout import Layout
+    from frametool.stream.request import Request
+    from frametool.stream.run import RowNote
+    from frametool.stream.table_stream import Begun
+    from frametool.text.spans import Floats, Ints
+    Cells: TypeAlias = Spans | NDArray[Any]
+
+class RowPoses(NamedTuple):
+    """What became of the rows of a block: the good ones, in their order.
+
+    numbers: (n, k) the results, position first
+    stamps_ns: (n,) or None where rows have none
+    lines: (n,) from 0
+    parents, names: one a row, one for all, or none
+    extras: columns that are not ours, by name: cells of text, or numbers as they are
+    given: the frames that the rows of the input are given in
+    """
+
+    numbers: Floats
+    stamps_ns: Ints | None
+    lines: Ints
+    parents: Sequence[str | None]
+    names: Sequence[str | None]
+    extras: Mapping[str, Cells]
+    given: Sequence[str | None] = ()
+
+
+class TablePoses:
+    """Turn one block of a table after the other into poses; the rows that are bad are listed in `faults`.
+
+    faults, notes: of the last block, lines from 0
+    rows, mended: how many rows there were, and rotations that were normalised; off: how far the worst one was
+    """
+
+    def __init__(self, begun: Begun, form: str, request: Request, source: str) -> None:
+        """Plan the rows; the request's notations say which numbers come out.
+
+        Raises FormatError for a table without a pose, Misused for a request that does not fit.
+        """
+        self.table = begun.table
+        self.form = form
+        self.plan, layout = plan_table(self.table, request._replace(whole=True), source)
+        self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
+        named = request.for_kind(self.shape.kind)
+        self.naming = Naming(self.table, layout, named)
+        rename = rename_of(named)
+        self.unnamed = (None, None) if rename is None else rename(None, None)
+        self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
+        self.stamp_at = layout.time
+        if layout.time is None and (found := stamp_column(self.table.names)) not in layout.frames:
+            self.stamp_at = found
+        used = {self.stamp_at, *layout.places, *self.naming.places}
+        self.kept = [place for place in range(self.table.width) if place not in used]
+        self.layout = self._with_stretches(layout)
+        self.state = State()
+        self.faults: list[Fault] = []
+        self.notes: list[RowNote] = []
+        self.rows, self.mended, self.off = 0, 0, 0.0
+
+    def _with_stretches(self, layout: Layout) -> Layout:
+        """Ask for the stamps, the columns that are not ours, one by one, and the names of the results."""
+        stretches = [(place, place, "cell", "cell") for place in self.kept]
+        stretches += [(role, role, NAMED, NAMED) for role in self.roles]
+        return layout._replace(stretches=tuple(stretches), time=self.stamp_at, pieces=())
+
+    @property
+    def columns(self) -> str:
+        """List the columns there are."""
+        return listed(self.table.names or ("columns without names",))
+
+    def of_block(self, text: bytes) -> RowPoses:
+        """Return the poses of a block, and leave what is wrong with other rows in `faults`."""
+        torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
+        body = text if torn is None else text[:torn]
+        block = table_block(self.table, self.layout, body, self.naming, nulls=False)
+        stamps, late = self._stamps(block.stamps)
+        run = Run(self.plan, block._replace(bad={**late, **block.bad}), self.state)
+        self.faults = run.faults()
+        if torn is not None:
+            self.faults.append(Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True))
+        self.mended += len(run.mended)
+        self.off = max(self.off, run.off)
+        self.notes = notes_of(run, block)
+        parts = block.parts if len(run.rows) == run.count else [chosen(part, run.rows) for part in block.parts]
+        texts = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
+        names: list[Sequence[str | None]] = [[name] for name in self.unnamed]
+        for role, part in zip(self.roles, parts[len(self.kept) :], strict=True):
+            names[role] = _texts(part)
+        lines = block.places[run.rows]
+        if b'"' in body:
+            lines = np.array([block.line_of(row) for row in run.rows.tolist()], np.int64)
+        self.rows += len(block.places) + len(block.broken)
+        return RowPoses(
+            run.results, None if stamps is None else stamps[run.rows], lines, names[0], names[1], texts,
+            block.frames,
+        )
+
+    def _stamps(self, cells: Sequence[tuple[Spans, ...]]) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
+        """Read the stamps of a block; return them, and which rows have none that can be read."""
+        if self.stamp_at is None or not cells:
+            return None, {}
+        name = self.table.name(self.stamp_at)
+        times, reasons = parse_stamps(*cells[0], in_ns=in_nanoseconds(self.form, name))
+        return times, {row: (name, reason) for row, reason in reasons.items()}
+
+
+def _texts(part: Spans) -> Sequence[str | None]:
+    """Return names, one for all rows where all are the same."""
+    if not len(part.starts):
+        return [None]
+    texts, codes = coded(part)
+    return [texts[0] or None] if len(texts) == 1 else [texts[code] or None for code in codes.tolist()]
+
+
+def first_of(block: RowPoses) -> RowPoses:
+    """Return the first pose of a block."""
+    return kept(block, slice(0, 1))
+
+
+def kept(block: RowPoses, rows: slice) -> RowPoses:
+    """Return some poses of a block that follow one another."""
+    size = len(block.numbers)
+    return _with_cells(
+        block, rows, *(each[rows] if len(each) == size else each for each in (block.parents, block.names))
+    )
+
+
+def chosen_poses(block: RowPoses, rows: Ints) -> RowPoses:
+    """Return some poses of a block."""
+    size = len(block.numbers)
+    if len(rows) == size:
+        return block
+    names = [
+        [each[row] for row in rows.tolist()] if len(each) == size else each for each in (block.parents, block.names)
+    ]
+    return _with_cells(block, rows, *names)
+
+
+def _with_cells(
+    block: RowPoses, rows: slice | Ints, parents: Sequence[str | None], names: Sequence[str | None]
+) -> RowPoses:
+    """Return some poses of a block with these names."""
+    return block._replace(
+        numbers=block.numbers[rows],
+        stamps_ns=None if block.stamps_ns is None else block.stamps_ns[rows],
+        lines=block.lines[rows],
+        parents=parents,
+        names=names,
+        extras={name: cells_at(each, rows) for name, each in block.extras.items()},
+    )
+
+
+def cells_at(cells: Cells, rows: slice | Ints) -> Cells:
+    """Return some cells of a column."""
+    return Spans(cells.data, cells.starts[rows], cells.ends[rows]) if isinstance(cells, Spans) else cells[rows]
+
+
+def block_of(results: Sequence[Result]) -> RowPoses:
+    """Return results as a block of poses; raises ValueInvalid for one without a rotation."""
+    if any(result.pose.rotation is None for result in results):
+        raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+    stamps = [result.extras.get("stamp_ns") for result in results]
+    others = {name for result in results for name in result.extras} - {"stamp_ns"}
+    images = [str(result.extras.get(IMAGE, "")).encode() for result in results]
+    blank = [b""] * len(results)
+    names = {(result.pose.parent, result.pose.name) for result in results}
+    parent, name = next(iter(names))
+    return RowPoses(
+        np.array([result.pose.components for result in results]),
+        None if None in stamps else np.array(stamps, np.int64),
+        np.arange(len(results)),
+        [parent],
+        [name],
+        {each: spans_of(images if each == IMAGE else blank) for each in sorted(others)},
+    )
+
+
+def block_of_points(records: Sequence[dict[str, Any]]) -> RowPoses:
+    """Return mappings of points or vectors as a block; raises ValueInvalid for what is neither."""
+    kind = next((kind for kind in ("point", "vector") if records and kind in records[0]), "point")
+    rows = [_coordinates(record, kind) for record in records]
+    others = list(dict.fromkeys(key for record in records for key in record if key not in (kind, "frame", *"xyz")))
+    return RowPoses(
+        np.array(rows, np.float64).reshape(-1, 3),
+        None,
+        np.arange(len(rows)),
+        [record.get("frame") for record in records],
+        [None],
+        {each: spans_of([_cell(record.get(each)) for record in records]) for each in others},
+    )
+
+
+def _coordinates(record: dict[str, Any], kind: str) -> list[float]:
+    """Return the three numbers of a point, as a list, as a mapping, or under x, y, z."""
+    given = record.get(kind, record)
+    numbers = given if isinstance(given, list) else [given.get(name) for name in "xyz"] if given else []
+    if len(numbers) != 3 or not all(isinstance(number, float) for number in numbers):
+        raise ValueInvalid(f"columns hold points or poses, found {', '.join(record)}")
+    return numbers
+
+
+def _cell(value: Any) -> bytes:
+    return b"" if value is None else str(value).encode()
+
+
+def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
+    """Return a block as results, one a pose."""
+    size = len(block.numbers)
+    names, parents = (each if len(each) == size else list(each) * size for each in (block.names, block.parents))
+    others = {name: [plain_cell(text) for text in texts_of(spans)] for name, spans in block.extras.items()}
+    stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
+    made = []
+    for at, numbers in enumerate(block.numbers.tolist()):
+        own = 7 if placed else 4
+        pose = Pose.of(tuple(numbers[:7]) if placed else (0.0, 0.0, 0.0, *numbers[:4]), names[at], parents[at])
+        said: dict[str, Any] = dict(zip(extras, numbers[own:], strict=True))
+        if stamps is not None:
+            said["stamp_ns"] = stamps[at]
+        said |= {name: texts[at] for name, texts in others.items()}
+        made.append(Result(pose if placed else pose._replace(position=None), said))
+    return made
+
+
+def spans_of(texts: list[bytes]) -> Spans:
+    """Return texts, one a row, as spans."""
+    lengths = np.fromiter(map(len, texts), np.int64, len(texts))
+    ends = np.cumsum(lengths) + MARGIN
+    return Spans(framed(b"".join(texts)), ends - lengths, ends)
+
+
+def texts_of(cells: Cells) -> list[str]:
+    """Return the text of each cell, without its quotes; of numbers the shortest that reads back."""
+    if not isinstance(cells, Spans) and cells.dtype.kind != "f":
+        texts: list[str] = cells.astype(np.str_).tolist()
+        return [text.lower() for text in texts] if cells.dtype.kind == "b" else texts
+    if not isinstance(cells, Spans):
+        cells = float_spans(cells)
+    bare = without_quotes(cells)
+    data = bare.data.tobytes()
+    places = zip(bare.starts.tolist(), bare.ends.tolist(), strict=True)
+    return [data[start:end].decode("utf-8", "replace").strip().replace('""', '"') for start, end in places]
+
+
+def float_spans(values: NDArray[Any]) -> Spans:
+    """Write floats as the shortest text that reads back to the same float of their type."""
+    doubles = values.astype(np.float64) if values.dtype.itemsize > 4 else rounded_to_single(values.astype(np.float64))
+    spans = shortest_spans(doubles.reshape(-1, 1), b",")
+    return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
+
+
+def plain_cell(text: str) -> str | Verbatim | None:
+    """Return a cell as a plain value: numbers and truth values as they are written."""
+    if not text:
+        return None
+    return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text

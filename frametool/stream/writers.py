@@ -1,0 +1,467 @@
+"""Poses in blocks to the text of any form that writes poses: in bulk where the form's rows are all alike.
+
+What a row looks like is said by the form (`ROWS`), or learned from what it writes for one pose; where neither can be,
+its own `write_poses` writes row after row.
+
+Points and vectors in blocks to the text of a form that is not their table's.
+
+Poses and points in blocks to a file of columns of numbers; other columns go along where they have a place.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from frametool.documents.json import Verbatim, dump
+from frametool.errors import ValueInvalid, listing, warn
+from frametool.formats.rows.column_file import STAMP_NS, Made, OutColumn
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, Lost, Numbers, RowForm, field, image_name, is_turned, turned
+from frametool.formats.rows.structured import not_finite
+from frametool.formats.table import FORMATS
+from frametool.frames.stamps import BILLION
+from frametool.geometry import arrays, floats, quaternion
+from frametool.geometry.representations import notation
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+from frametool.stream.header import XYZ
+from frametool.stream.row_layout import POSE, Target
+from frametool.stream.row_poses import first_of, float_spans, kept, plain_cell, results_of, spans_of, texts_of
+from frametool.stream.rows import number_spans
+from frametool.text.csv_line import quoted
+from frametool.text.parse import parse_floats
+from frametool.text.spans import MARGIN, Spans, framed, join
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from frametool.formats.rows.column_file import ColumnWriter
+    from frametool.geometry.types import Components
+    from frametool.grammar.result import Style
+    from frametool.stream.row_poses import RowPoses
+    from frametool.text.spans import Flags, Floats
+
+LEARNED = ("csv", "json", "yaml")
+PROBE_NS = 1234567890987654321
+PROBE = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,
+         0.7416198487095663)  # fmt: skip
+MARK = "@@{}@@"
+
+
+class PoseWriter:
+    """Write blocks of poses one after the other; `end` says what comes behind the last."""
+
+    def __init__(self, style: Style, extras: Sequence[str] = (), *, placed: bool = True) -> None:
+        """Choose how the form of a style is written.
+
+        extras: the numbers beside each pose; placed: whether poses have a position
+        Raises ValueInvalid for notations that the form does not have.
+        """
+        self.style = style
+        self.module: Any = import_module(FORMATS[style.form].writer)
+        self.fixed: RowForm | None = getattr(self.module, "ROWS", None)
+        self.lost = None if self.fixed is None else Lost(self.fixed, style)
+        self.extras = tuple(extras)
+        self.placed = placed
+        forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
+        whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
+        self.target = Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
+        self.count = 0
+        self.dropped = False
+        self.rows: RowForm | None = None
+        self.order: list[int] = []
+        self.first: Result | None = None
+
+    def of_block(self, block: RowPoses) -> bytes:
+        """Return the text of a block of poses; numbers are metres and x y z w."""
+        if not len(block.numbers):
+            return b""
+        text = self._fixed(self.fixed, block) if self.fixed else self._free(block)
+        self.dropped |= self.style.form not in LEARNED and bool(self.extras or block.extras)
+        self.count += len(block.numbers)
+        return text
+
+    def end(self) -> bytes:
+        """Return what comes behind the last pose, and tell what was left out."""
+        if self.fixed is None or self.lost is None:
+            if self.dropped:
+                warn(f"{self.style.form}: other columns left out")
+            return b""
+        self.lost.tell()
+        return self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
+
+    # --- forms that say what a row is ---
+
+    def _fixed(self, form: RowForm, block: RowPoses) -> bytes:
+        lost = self.lost
+        if lost is not None:
+            there = [name for names in (block.parents, block.names) for name in names if name]
+            images = block.extras.get(IMAGE)
+            lost.add(
+                frames=bool(there),
+                stamps=block.stamps_ns is not None and NUMBER not in block.extras,
+                extras=bool(self.extras or block.extras.keys() - {IMAGE, NUMBER}),
+            )
+            lost.counted |= "stamps" in form.holds and block.stamps_ns is None
+            lost.by_stamp |= IMAGE in form.row and images is None
+            lost.turned = is_turned(form, self.style)
+        pose = self._canonical(block)
+        return self._joined(form, np.array(form.numbers(*turned(form, self.style, pose))).T, block)
+
+    def _canonical(self, block: RowPoses) -> Components:
+        """Return position and quaternion of a block, with the sign that is written."""
+        tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
+        unit = quaternion.unit(x, y, z, w, arrays)
+        return (tx, ty, tz, *(unit if self.style.keep_sign else quaternion.from_quaternion(*unit, arrays)))
+
+    def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
+        """Put the rows of a block together."""
+        after = bytearray()
+        for piece in form.row:
+            if isinstance(piece, Numbers):
+                after += (piece.between[:1] or b",") * piece.size
+        if not np.isfinite(values).all():
+            raise ValueInvalid("a result is too large for a double")
+        numbers = number_spans(
+            np.ascontiguousarray(values), self.style.precision, bytes(after), yaml=self.style.form == "yaml"
+        )
+        size, first = len(values), 0
+        parts = [_constant(form.between, size)] if form.between else []
+        for piece in form.row:
+            if isinstance(piece, bytes):
+                parts.append(_constant(piece, size))
+            elif isinstance(piece, Numbers):
+                parts += _numbers(numbers, first, piece)
+                first += piece.size
+            else:
+                parts.append(self._field(piece, block, form.first))
+        text = join(parts)
+        return text if self.count else form.head + text[len(form.between) :]
+
+    def _field(self, name: str, block: RowPoses, first: int) -> Spans:
+        """Return what is written in one field of each row."""
+        size = len(block.numbers)
+        if name.startswith("@@"):
+            return self._cells(name, block)
+        stamps = self._stamps(block)
+        if name == IMAGE:
+            images = texts_of(block.extras[IMAGE]) if IMAGE in block.extras else [None] * size
+            return spans_of([image_name(*each).encode() for each in zip(images, stamps, strict=True)])
+        if name == "seconds" and min(stamps) >= 0:
+            return spans_of([b"%d.%09d" % divmod(stamp, BILLION) for stamp in stamps])
+        numbers: Sequence[int] = range(self.count + first, self.count + first + size)
+        if NUMBER in block.extras and name in (NUMBER, "next"):
+            numbers = [int(text) for text in texts_of(block.extras[NUMBER])]
+        return spans_of([field(name, stamp, number).encode() for stamp, number in zip(stamps, numbers, strict=True)])
+
+    def _stamps(self, block: RowPoses) -> list[int]:
+        if block.stamps_ns is None:
+            return [at * BILLION for at in range(self.count, self.count + len(block.numbers))]
+        stamps: list[int] = block.stamps_ns.tolist()
+        return stamps
+
+    def _cells(self, mark: str, block: RowPoses) -> Spans:
+        """Return a column of names or of what is not ours, as the form writes texts."""
+        what = mark[2:-2]
+        if what in ("name", "parent"):
+            texts: Sequence[str | None] = block.names if what == "name" else block.parents
+            texts = list(texts) * (len(block.numbers) if len(texts) == 1 else 1)
+        else:
+            texts = texts_of(list(block.extras.values())[int(what)])
+        write: Callable[[str | None], bytes] = _csv_cell if self.style.form == "csv" else _json_cell
+        known = {text: write(text) for text in dict.fromkeys(texts)}
+        return spans_of([known[text] for text in texts])
+
+    # --- forms whose rows depend on what is written ---
+
+    def _free(self, block: RowPoses) -> bytes:
+        """Write a block as the form was seen to write poses; one by one where it was not, or angles are not unique."""
+        if self.rows is None and self.count == 0:
+            self._learn(block)
+            if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
+                self.rows = None
+        columns = self._own(tuple(block.numbers.T))
+        locked = self.target.locked(columns[:7])
+        if self.rows is None or (locked is not None and bool(np.any(locked))):
+            return self._one_by_one(block)
+        return self._filled(self.rows, block)
+
+    def _own(self, columns: Components) -> Components:
+        """Return seven components and what comes beside them; a pose without a position is at 0."""
+        own = tuple(np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part for part in columns)
+        return own if self.placed or len(own) == len(PROBE) else (*[own[0] * 0.0] * 3, *own)
+
+    def _filled(self, rows: RowForm, block: RowPoses) -> bytes:
+        """Fill the numbers of a block into the rows that were learned."""
+        written = self.target.written(self._own(tuple(block.numbers.T)), arrays)
+        values = np.empty((len(block.numbers), len(self.order)))
+        for at, place in enumerate(self.order):
+            values[:, at] = written[place]
+        return self._joined(rows, values, block)
+
+    def _learn(self, block: RowPoses) -> None:
+        """See how the form writes a pose whose numbers are all different, and take them for places to fill in."""
+        style = self.style.in_form(self.style.form)
+        style.precision = None
+        if style.form not in LEARNED or (style.form == "yaml" and (block.extras or _vary(block))):
+            return
+        probe = self._probe(block)
+        alone, twice = (self.module.write_poses([probe] * count, style) for count in (1, 2))
+        row = twice[len(alone) :]
+        head, between = (alone[: -len(row)], "") if alone.endswith(row) else ("", row[: -len(alone)])
+        row = row[len(between) :]
+        written = [*self.target.written(self._own(PROBE), floats), *probe.extras.values()]
+        marks = {repr(value): at for at, value in enumerate(written) if type(value) is float}
+        marks |= {MARK.format(what): -1 for what in ("name", "parent", *range(len(block.extras)))}
+        marks[str(PROBE_NS)] = -1
+        pieces: list[str | bytes | Numbers] = []
+        for text in re.split("(" + "|".join(map(re.escape, marks)) + ")", row):
+            if text not in marks:
+                pieces += [text.encode()] if text else []
+            elif marks[text] >= 0:
+                pieces.append(Numbers(1, b""))
+                self.order.append(marks[text])
+            else:
+                pieces.append("nanoseconds" if text == str(PROBE_NS) else text)
+        self.rows = RowForm(tuple(pieces), head=head.encode(), between=between.encode())
+
+    def _probe(self, block: RowPoses) -> Result:
+        """Make a pose with what this block's have; what differs from row to row is marked."""
+        names = [
+            each[0] if len(each) == 1 else Verbatim(MARK.format(what))
+            for what, each in (("name", block.names), ("parent", block.parents))
+        ]
+        pose = Pose.of(PROBE, *names)
+        extras: dict[str, Any] = {name: 0.7310585786300049 + at for at, name in enumerate(self.extras)}
+        if block.stamps_ns is not None:
+            extras["stamp_ns"] = PROBE_NS
+        extras |= {name: Verbatim(MARK.format(at)) for at, name in enumerate(block.extras)}
+        return Result(pose if self.placed else pose._replace(position=None), extras)
+
+    def _one_by_one(self, block: RowPoses) -> bytes:
+        """Write the rows as the form does for single results."""
+        results = list(results_of(block, self.extras, placed=self.placed))
+        first = self.first = self.first or results[0]
+        known = "" if not self.count else self.module.write_poses([first], self.style)
+        text: str = self.module.write_poses(results if not self.count else [first, *results], self.style)
+        return text[len(known) :].encode()
+
+
+def _vary(block: RowPoses) -> bool:
+    return len(block.names) != 1 or len(block.parents) != 1
+
+
+def _constant(text: bytes, size: int) -> Spans:
+    starts = np.full(size, MARGIN, np.int64)
+    return Spans(framed(text), starts, starts + len(text))
+
+
+def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
+    """Return the spans of neighbouring numbers, with what stands between them."""
+    last = first + piece.size
+    ends = numbers.ends[:, first:last].copy()
+    if len(piece.between) == 1:
+        ends[:, -1] -= 1
+        return [Spans(numbers.data, numbers.starts[:, first:last], ends)]
+    ends -= 1
+    each = [Spans(numbers.data, numbers.starts[:, at], ends[:, at - first]) for at in range(first, last)]
+    between = _constant(piece.between, len(ends))
+    return list(chain(*([part, between] for part in each)))[:-1]
+
+
+def _csv_cell(text: str | None) -> bytes:
+    return quoted(text or "").encode()
+
+
+def _json_cell(text: str | None) -> bytes:
+    return dump(plain_cell(text or "")).encode()
+
+
+BEGUN_WITH = 8  # rows that are written one by one, the header with them
+
+
+class PointWriter:
+    """Write blocks of points or vectors one after the other, as the form writes single ones."""
+
+    def __init__(self, style: Style, kind: str) -> None:
+        """Choose the form; kind: `point` or `vector`.  Raises ValueInvalid for a form that holds poses only."""
+        if "points" not in FORMATS[style.form].writes:
+            raise ValueInvalid(f"{style.form} holds poses; a {kind} has no rotation")
+        self.style = style
+        self.kind = kind
+        self.module: Any = import_module(FORMATS[style.form].writer)
+        self.first: dict[str, Any] | None = None
+
+    def of_block(self, block: RowPoses) -> bytes:
+        """Return the text of a block; numbers are metres."""
+        if self.first is not None and (rows := self._in_bulk(block)) is not None:
+            return rows
+        if self.first is None and len(block.numbers) > BEGUN_WITH:
+            count = len(block.numbers)
+            begun = self.of_block(kept(block, slice(0, BEGUN_WITH)))
+            return begun + self.of_block(kept(block, slice(BEGUN_WITH, count)))
+        records = self._records(block)
+        if not records:
+            return b""
+        text: str
+        if self.first is None:
+            self.first = records[0]
+            text = self.module.write_points(records, self.style)
+            return text.encode()
+        known = self.module.write_points([self.first], self.style)
+        text = self.module.write_points([self.first, *records], self.style)
+        return text[len(known) :].encode()
+
+    def end(self) -> bytes:
+        """Return what comes behind the last: nothing."""
+        return b""
+
+    def _in_bulk(self, block: RowPoses) -> bytes | None:
+        """Return the rows of CSV for a block whose cells are all numbers; None for what is written row by row."""
+        size, numbers = len(block.numbers), np.ascontiguousarray(block.numbers)
+        if self.style.form != "csv" or not size or len(block.parents) != 1 or not np.isfinite(numbers).all():
+            return None
+        columns = [] if block.parents[0] is None else [spans_of([quoted(block.parents[0]).encode()] * size)]
+        columns.append(number_spans(numbers, self.style.precision, b",,\0"))
+        columns[-1].ends[:, 2] -= 1
+        if block.stamps_ns is not None:
+            columns.append(spans_of([b"%d" % stamp for stamp in block.stamps_ns.tolist()]))
+        for cells in block.extras.values():
+            if isinstance(cells, Spans) or cells.dtype.kind not in "fiu" or cells.ndim != 1:
+                return None
+            is_float = cells.dtype.kind == "f"
+            if is_float and not np.isfinite(cells).all():
+                return None
+            columns.append(float_spans(cells) if is_float else spans_of([b"%d" % cell for cell in cells.tolist()]))
+        parts = [part for column in columns for part in (_constant_point(b",", size), column)]
+        return join([*parts[1:], _constant_point(b"\n", size)])
+
+    def _records(self, block: RowPoses) -> list[dict[str, Any]]:
+        size = len(block.numbers)
+        frames = block.parents if len(block.parents) == size else list(block.parents) * size
+        others = {name: [plain_cell(text) for text in texts_of(cells)] for name, cells in block.extras.items()}
+        stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
+        records = []
+        for at, numbers in enumerate(block.numbers.tolist()):
+            record: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
+            record[self.kind] = numbers
+            if stamps is not None:
+                record["stamp_ns"] = stamps[at]
+            records.append(record | {name: texts[at] for name, texts in others.items()})
+        return records
+
+
+def _constant_point(text: bytes, size: int) -> Spans:
+    starts = np.full(size, MARGIN, np.int64)
+    return Spans(framed(text), starts, starts + len(text))
+
+
+DOUBLE = np.dtype(np.float64)
+
+
+class ArrayWriter:
+    """Write blocks of poses, points or vectors one after the other; `end` yields what comes behind the last.
+
+    The columns are those of the first block: frames where it has names, stamps, numbers, and what is not ours.
+    """
+
+    def __init__(self, style: Style, kind: str, extras: Sequence[str] = (), *, placed: bool = True) -> None:
+        """Choose the form; kind: pose, point or vector; extras: the numbers beside each; placed: it has a position."""
+        self.style = style
+        self.kind = kind
+        self.extras = tuple(extras)
+        self.module: Any = import_module(FORMATS[style.form].writer)
+        self.has_texts = getattr(self.module, "HOLDS_TEXTS", False)
+        forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
+        whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
+        self.target = Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
+        if kind != POSE:
+            self.target = Target(1.0, ())
+        self.placed = placed
+        self.columns: list[OutColumn] = []
+        self.left_out: list[str] = []
+        self.writer: ColumnWriter | None = None
+
+    def of_block(self, block: RowPoses) -> bytes | memoryview:
+        """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
+        if not len(block.numbers):
+            return b""
+        made = self._made(block)
+        if self.writer is None:
+            self._begin(made)
+        assert self.writer is not None  # noqa: S101 - for the types
+        return self.writer.of_rows(None, None, [made[column.name] for column in self.columns])
+
+    def end(self) -> Iterator[bytes]:
+        """Yield what comes behind the last block."""
+        if self.writer is None:
+            self._begin({name: Made(np.empty(0)) for name in self._numbers()})
+        assert self.writer is not None  # noqa: S101 - for the types
+        ended = self.writer.end()
+        yield from (ended,) if isinstance(ended, bytes) else ended
+        if self.left_out:
+            warn(f"{self.style.form}: {listing(self.left_out)} left out: it holds numbers")
+
+    def _begin(self, made: dict[str, Made]) -> None:
+        """Choose the columns."""
+        for name, each in made.items():
+            kind = each.values.dtype if isinstance(each.values, np.ndarray) else None
+            if kind is not None or self.has_texts:
+                self.columns.append(OutColumn(name, kind))
+            else:
+                self.left_out.append(name)
+        self.writer = self.module.create(self.columns, None, self.style)
+
+    def _numbers(self) -> list[str]:
+        """Name the numbers of a result."""
+        position = list(XYZ) if self.target.unit is not None else []
+        return [*position, *self.target.names, *self.extras]
+
+    def _made(self, block: RowPoses) -> dict[str, Made]:
+        """Return the columns of a block by name."""
+        size = len(block.numbers)
+        made: dict[str, Made] = {}
+        names = (("name", block.names), ("parent", block.parents)) if self.kind == POSE else (("frame", block.parents),)
+        for name, given in names:
+            if any(given):
+                made[name] = Made([each or "" for each in given] * (1 if len(given) == size else size))
+        for name, column in zip(self._numbers(), self._written(block), strict=True):
+            made[name] = Made(column, not_finite(column))
+        if block.stamps_ns is not None:
+            made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS))
+        for name, cells in block.extras.items():
+            made.setdefault(name, self._extra(name, cells))
+        return made
+
+    def _written(self, block: RowPoses) -> list[Any]:
+        """Return the numbers of the results in the notations that are written."""
+        columns = [np.ascontiguousarray(column) for column in block.numbers.T]
+        if self.kind == POSE and not self.placed:
+            columns = [columns[0] * 0.0] * 3 + columns
+        own = 7 if self.kind == POSE else 3
+        with np.errstate(invalid="ignore"):
+            return [*self.target.numbers(tuple(columns[:own]), arrays), *columns[own:]]
+
+    def _extra(self, name: str, cells: Any) -> Made:
+        """Return a column that is not ours: as it is, or of cells as numbers if all of the first block are."""
+        if not isinstance(cells, Spans):
+            return Made(cells)
+        if self.has_texts:  # it types them by itself
+            return Made(texts_of(cells))
+        known = next((column.kind for column in self.columns if column.name == name), DOUBLE)
+        if name in self.left_out or known is None:
+            return Made(texts_of(cells))
+        numbers, bad = parse_floats(cells)
+        empty = cells.starts == cells.ends
+        absent: Flags | None = empty if empty.any() else None
+        if set(bad.tolist()) <= set(np.flatnonzero(empty).tolist()):
+            numbers[empty] = np.nan
+            return Made(numbers, absent)
+        if self.writer is not None:
+            text = texts_of(Spans(cells.data, cells.starts[bad[:1]], cells.ends[bad[:1]]))[0]
+            raise ValueInvalid(f"column {name}: {text!r} is no number as those before; write csv, or drop the column")
+        return Made(texts_of(cells))

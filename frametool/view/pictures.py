@@ -1,0 +1,331 @@
+"""What pictures are made of: lines, dots, boxes and words, in pixels with y down; `svg` writes them, `png` paints them.
+
+A colour is `#rrggbb`, or a name of PALETTE, which is another one where the reader's system is dark.
+
+A picture as SVG, without any library, light or dark as the reader's system is; and as an HTML page around that.
+
+A picture as PNG, painted by matplotlib, which only the extra `plot` brings; a pixel is a pixel of the picture.
+
+Frames as a still picture: ground, links, trails, axes, names and a scale.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from typing import TYPE_CHECKING, Any, NamedTuple
+from xml.sax.saxutils import escape, quoteattr
+
+from frametool.errors import ValueInvalid, printable
+from frametool.view.projection import SLANTED, Projection, Size, axis_tips, nice, place_labels
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.geometry.types import Rigid
+    from frametool.view.frame_scene import FrameScene
+    from frametool.view.projection import Label
+
+# name -> light, dark
+PALETTE = {
+    "paper": ("#ffffff", "#14171c"),
+    "ink": ("#1b1f24", "#e8eaed"),
+    "soft": ("#5b6470", "#9aa3ad"),
+    "zero": ("#c3c9d0", "#454d57"),
+    "faint": ("#e3e6ea", "#2c323a"),
+    "trail": ("#7c3aed", "#c4a7ff"),
+    "x": ("#d92d20", "#ff6b6b"),
+    "y": ("#12873d", "#51cf66"),
+    "z": ("#1a5fd0", "#5c9dff"),
+}
+
+
+class PictureLine(NamedTuple):
+    """A line through points; dashes: pixels drawn and left out; title: what it says when pointed at."""
+
+    points: Sequence[tuple[float, float]]
+    colour: str
+    width: float = 1.0
+    alpha: float = 1.0
+    dashes: tuple[float, ...] = ()
+    title: str = ""
+
+
+class PictureDot(NamedTuple):
+    """A disc."""
+
+    x: float
+    y: float
+    radius: float
+    colour: str
+    title: str = ""
+
+
+class PictureBox(NamedTuple):
+    """A filled rectangle by its left upper corner."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    colour: str
+    title: str = ""
+
+
+class PictureWords(NamedTuple):
+    """A text on one line, its middle at y; anchor: start, middle or end of it is at x; turn: degrees, clockwise."""
+
+    x: float
+    y: float
+    text: str
+    colour: str = "ink"
+    anchor: str = "start"
+    size: float = 12.0
+    bold: bool = False
+    turn: float = 0.0
+
+
+Shape = PictureLine | PictureDot | PictureBox | PictureWords
+
+
+class Picture(NamedTuple):
+    """Shapes from the back to the front, and the size of the whole."""
+
+    width: float
+    height: float
+    shapes: Sequence[Shape]
+    title: str = ""
+
+
+FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="12" dominant-baseline="central" role="img"'
+SHARED = """\
+path {fill: none; stroke-linecap: round; stroke-linejoin: round}
+text {paint-order: stroke; stroke-width: 3px; stroke-linejoin: round}
+"""
+
+
+def write_svg(picture: Picture) -> str:
+    """Return the picture as an SVG document."""
+    width, height = f"{picture.width:g}", f"{picture.height:g}"
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+    paper = '<rect class="paper" width="100%" height="100%"/>\n'
+    return f"{head} {FONT}>\n{_title(picture.title)}{_style()}{paper}{''.join(map(_element, picture.shapes))}</svg>\n"
+
+
+def write_html(picture: Picture, more: str = "") -> str:
+    """Return an HTML document of the picture, and of what else it is to hold."""
+    head = f'<head><meta charset="utf-8">{_title(picture.title)}</head>'
+    return f'<!DOCTYPE html>\n<html lang="en">\n{head}\n<body>\n{write_svg(picture)}{more}</body>\n</html>\n'
+
+
+def _style() -> str:
+    """Return the rules that give the palette's colours."""
+    light, dark = (
+        "".join(
+            f".{name} {{fill: {colours[scheme]}}} .{name}-line {{stroke: {colours[scheme]}}}\n"
+            for name, colours in PALETTE.items()
+        )
+        for scheme in (0, 1)
+    )
+    return f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
+
+
+def _element(shape: Shape) -> str:
+    match shape:
+        case PictureLine():
+            return _line(shape)
+        case PictureDot(x, y, radius, colour, title):
+            place = f'cx="{_number(x)}" cy="{_number(y)}" r="{radius:g}"'
+            return f"<circle {_fill(colour)} {place}>{_title(title)}</circle>\n"
+        case PictureBox(x, y, width, height, colour, title):
+            size = f'width="{_number(width)}" height="{_number(height)}"'
+            return f'<rect {_fill(colour)} x="{_number(x)}" y="{_number(y)}" {size}>{_title(title)}</rect>\n'
+        case PictureWords():
+            return _words(shape)
+
+
+def _line(line: PictureLine) -> str:
+    way = "L".join(f"{_number(x)} {_number(y)}" for x, y in line.points)
+    look = "" if line.width == 1.0 else f' stroke-width="{line.width:g}"'
+    look += "" if line.alpha == 1.0 else f' opacity="{line.alpha:g}"'
+    look += f' stroke-dasharray="{" ".join(map("{:g}".format, line.dashes))}"' if line.dashes else ""
+    stroke = f'class="{line.colour}-line"' if line.colour in PALETTE else f'stroke="{line.colour}"'
+    end = f">{_title(line.title)}</path>" if line.title else "/>"
+    return f'<path {stroke}{look} d="M{way}"{end}\n'
+
+
+def _words(words: PictureWords) -> str:
+    look = "" if words.anchor == "start" else f' text-anchor="{words.anchor}"'
+    look += "" if words.size == 12.0 else f' font-size="{words.size:g}"'
+    look += ' font-weight="bold"' if words.bold else ""
+    x, y = _number(words.x), _number(words.y)
+    look += f' transform="rotate({words.turn:g} {x} {y})"' if words.turn else ""
+    halo = "paper-line" if words.colour in PALETTE else ""
+    colour = f'class="{words.colour} {halo}"' if halo else f"fill={quoteattr(words.colour)}"
+    return f'<text {colour} x="{x}" y="{y}"{look}>{_text(words.text)}</text>\n'
+
+
+def _fill(colour: str) -> str:
+    return f'class="{colour}"' if colour in PALETTE else f'fill="{colour}"'
+
+
+def _title(text: str) -> str:
+    return f"<title>{_text(text)}</title>" if text else ""
+
+
+def _text(text: str) -> str:
+    """Return a text as XML may hold it."""
+    return escape(printable(text))
+
+
+def _number(value: float) -> str:
+    """Write pixels with a tenth's precision."""
+    return f"{round(value, 1) + 0.0:g}" if abs(value) < 1e4 else f"{value:.0f}"
+
+
+POINTS = 72 / 100  # of a pixel at 100 dots an inch
+ANCHORS = {"start": "left", "middle": "center", "end": "right"}
+
+
+def require_matplotlib() -> None:
+    """Say what to install if it is missing.
+
+    Raises ValueInvalid.
+    """
+    from importlib.util import find_spec
+
+    if find_spec("matplotlib") is None:
+        raise ValueInvalid("a PNG needs matplotlib: pip install 'frametool[plot]', or write .svg, which needs nothing")
+
+
+def write_png(picture: Picture) -> bytes:
+    """Return the picture as the bytes of a PNG, without a date in them.
+
+    Raises ValueInvalid where matplotlib is missing.
+    """
+    require_matplotlib()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(picture.width / 100.0, picture.height / 100.0), dpi=100)
+    FigureCanvasAgg(figure)
+    axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(0.0, picture.width), ylim=(picture.height, 0.0))
+    axes.axis("off")
+    for order, shape in enumerate(picture.shapes):
+        _paint(axes, shape, order)
+    stream = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of letters that matplotlib's font lacks: it draws boxes
+        figure.savefig(stream, format="png", metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _paint(axes: Any, shape: Shape, order: int) -> None:
+    """Paint one shape over those before it."""
+    look = {"color": PALETTE.get(shape.colour, (shape.colour,))[0], "zorder": order}
+    match shape:
+        case PictureLine(points, _, width, alpha, dashes):
+            xs, ys = zip(*points, strict=True)
+            style = (0, [each * POINTS for each in dashes]) if dashes else "solid"
+            axes.plot(xs, ys, linewidth=width * POINTS, alpha=alpha, linestyle=style, **look)
+        case PictureDot(x, y, radius):
+            axes.plot([x], [y], marker="o", markersize=2.0 * radius * POINTS, markeredgewidth=0.0, **look)
+        case PictureBox(x, y, width, height):
+            right, bottom = x + width, y + height
+            axes.fill([x, right, right, x], [y, y, bottom, bottom], linewidth=0.0, **look)
+        case PictureWords(x, y, text, _, anchor, size, bold, turn):
+            place = {"ha": ANCHORS[anchor], "va": "center", "rotation": -turn, "rotation_mode": "anchor"}
+            weight = "bold" if bold else "normal"
+            axes.text(x, y, printable(text).replace("$", r"\$"), fontsize=size * POINTS, weight=weight, **place, **look)
+
+
+WIDTH, HEIGHT = 1000.0, 700.0
+SIZE = Size(WIDTH, HEIGHT, margin=70.0, axes=(14.0, 46.0))
+CORNER = 46.0  # pixels from the corner to the little axes
+AXES = ("x", "y", "z")
+
+
+class StillPicture(NamedTuple):
+    """The picture; how many names found no place in it; how many frames lie in one small spot."""
+
+    picture: Picture
+    hidden: int
+    crowded: int
+
+
+def still_picture(
+    scene: FrameScene, eye: tuple[float, float] = SLANTED, title: str = "", other: FrameScene | None = None,
+) -> StillPicture:  # fmt: skip
+    """Draw a scene as it is seen from a direction: azimuth and elevation, radians.
+
+    other: another tree seen in the same frame, whose frames are laid faintly over those of the same names.
+    """
+    flat = Projection(scene, SIZE, eye)
+    blocked = [(0.0, HEIGHT - 92.0, 100.0, HEIGHT), (WIDTH - 330.0, HEIGHT - 58.0, WIDTH, HEIGHT)]
+    labels, hidden = place_labels(flat, blocked=blocked)
+    step, ground = flat.ground()
+    shapes: list[Shape] = [
+        PictureLine([flat.at(a)[:2], flat.at(b)[:2]], "zero" if zero else "faint") for a, b, zero in ground
+    ]
+    for link in flat.links:
+        points = [flat.origin(name)[:2] for name in link]
+        shapes.append(PictureLine(points, "soft", alpha=0.7, dashes=(4.0, 3.0)))
+    for frame, stretches in flat.trails:
+        for stretch in stretches:
+            points = [flat.at(point)[:2] for point in stretch]
+            shapes.append(PictureLine(points, "trail", 1.5, 0.5, title=frame))
+    for name, pose in other.poses().items() if other else ():
+        if name in flat.poses:
+            shapes += _other(flat, name, pose)
+    for name in flat.nearest_last():
+        shapes += _frame(flat, name)
+    for label in labels:
+        shapes += _label(label)
+    shapes += [*_corner(flat), *_scale(flat, step)]
+    return StillPicture(Picture(WIDTH, HEIGHT, shapes, title), hidden, flat.crowded())
+
+
+def _frame(flat: Projection, name: str) -> Iterator[Shape]:
+    """Draw the axes of a frame, the nearest last."""
+    x, y, _ = flat.origin(name)
+    tips = flat.tips(name)
+    yield from (PictureLine([(x, y), tips[axis][:2]], AXES[axis], 2.0, title=name) for axis in flat.axis_order(name))
+    yield PictureDot(x, y, 2.2, "ink", name)
+
+
+def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
+    """Draw where a frame stands in the other tree, and the way there."""
+    x, y, _ = flat.at(pose[:3])
+    for axis, tip in zip(AXES, axis_tips(pose, flat.axis), strict=True):
+        yield PictureLine([(x, y), flat.at(tip)[:2]], axis, 2.0, 0.4, title=name)
+    yield PictureLine([flat.origin(name)[:2], (x, y)], "trail", 1.5)
+
+
+def _label(label: Label) -> Iterator[Shape]:
+    """Write a name, with a line to its frame where it stands off."""
+    left, top, right, bottom = label.box
+    if label.away > 16.0:
+        end = min(max(label.point.x, left), right), top if top > label.point.y else bottom
+        yield PictureLine([label.point[:2], end], "soft", 0.7)
+    yield PictureWords(left + 2.0, (top + bottom) / 2.0, label.words)
+
+
+def _corner(flat: Projection) -> Iterator[Shape]:
+    """Draw which way the axes of the fixed frame point."""
+    x, y = CORNER, HEIGHT - CORNER
+    right, up, toward = flat.view
+    for axis in sorted(range(3), key=lambda axis: toward[axis]):
+        dx, dy = right[axis], -up[axis]
+        yield PictureLine([(x, y), (x + 28.0 * dx, y + 28.0 * dy)], AXES[axis], 2.0)
+        yield PictureWords(x + 38.0 * dx, y + 38.0 * dy, AXES[axis], AXES[axis], "middle", bold=True)
+
+
+def _scale(flat: Projection, step: float) -> Iterator[Shape]:
+    """Draw how long a metre is, and say what all is seen in."""
+    metres = nice(110.0 / flat.scale)
+    left, right, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0
+    yield PictureLine([(left, base - 6.0), (left, base), (right, base), (right, base - 6.0)], "soft")
+    yield PictureWords((left + right) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
+    said = f"in {flat.scene.fixed[:40]}, grid {step:g} m"
+    yield PictureWords(right, HEIGHT - 46.0, said, "soft", "end", 11.0)

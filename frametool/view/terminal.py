@@ -1,0 +1,225 @@
+"""A picture of dots in a terminal: braille characters, eight dots a cell, one colour a cell. Memory does not grow.
+
+Frames in a terminal: braille dots in the axes' colours, names beside them, a scale bar; plain text for a pipe.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import groupby, pairwise
+from operator import itemgetter
+from time import monotonic, sleep
+from typing import TYPE_CHECKING
+from unicodedata import east_asian_width
+
+from frametool.errors import printable
+from frametool.frames.stamps import BILLION, format_stamp
+from frametool.view.projection import SLANTED, Flat, Projection, Size, nice, words_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from rich.text import Text
+
+    from frametool.view.frame_scene import FrameScene
+
+    Run = tuple[str, str]  # text and its style
+    Spot = tuple[int, int]  # line and column
+
+BRAILLE = 0x2800
+DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # by row, then column of a cell
+
+
+class Canvas:
+    """Some lines of cells; a terminal's cell is about twice as high as wide, so that dots are about square."""
+
+    def __init__(self, lines: int, columns: int | None = None) -> None:
+        """Create an empty one, a square where the columns are not given."""
+        self.lines = lines
+        self.columns = 2 * lines if columns is None else columns
+        self._cells: dict[tuple[int, int], tuple[int, str, int]] = {}
+
+    def clear(self) -> None:
+        """Wipe all dots."""
+        self._cells.clear()
+
+    def dot(self, x: float, y: float, colour: str) -> None:
+        """Set the dot of a place, 0 to 1 with y up; the cell takes its colour."""
+        self.mark(*self._dots(x, y), colour)
+
+    def mark(self, across: int, down: int, colour: str, rank: int = 0) -> None:
+        """Set a dot by its number from the left and the top; of several in a cell the highest rank colours it."""
+        if not (0 <= across < 2 * self.columns and 0 <= down < 4 * self.lines):
+            return
+        cell = down // 4, across // 2
+        bits, before, before_rank = self._cells.get(cell, (0, colour, rank))
+        kept = (colour, rank) if rank >= before_rank else (before, before_rank)
+        self._cells[cell] = bits | DOTS[down % 4][across % 2], *kept
+
+    def cell(self, x: float, y: float) -> tuple[int, int]:
+        """Return line and column of a place."""
+        across, down = self._dots(x, y)
+        return down // 4, across // 2
+
+    def rank(self, line: int, column: int) -> int:
+        """Return the rank of a cell; -1 if it is empty."""
+        return self._cells.get((line, column), (0, "", -1))[2]
+
+    def row(self, line: int) -> Iterator[tuple[str, str]]:
+        """Yield the characters of a line, each with its colour."""
+        for column in range(self.columns):
+            bits, colour, _ = self._cells.get((line, column), (0, "", 0))
+            yield (chr(BRAILLE + bits) if bits else " "), colour
+
+    def runs(self, line: int, over: Mapping[tuple[int, int], tuple[str, str]]) -> list[tuple[str, str]]:
+        """Return a line as pieces of one colour; `over` holds what stands in cells instead of dots."""
+        cells = (over.get((line, column), cell) for column, cell in enumerate(self.row(line)))
+        return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(cells, key=itemgetter(1))]
+
+    def _dots(self, x: float, y: float) -> tuple[int, int]:
+        across = int(x * 2 * self.columns)
+        down = int((1.0 - y) * 4 * self.lines)
+        return min(max(across, 0), 2 * self.columns - 1), min(max(down, 0), 4 * self.lines - 1)
+
+
+LINK, TRAIL, AXIS = range(3)  # ranks of dots
+AXES = ("red", "green", "blue")
+LEAST_LINES, LEAST_COLUMNS = 4, 20
+FRAME = 0.1  # seconds between two pictures
+SAME = 3.0  # dots within which frames share a name
+
+
+class TerminalPicture:
+    """The picture of a scene in so many columns and lines, the last of which says how long a metre is."""
+
+    def __init__(self, scene: FrameScene, columns: int, lines: int, eye: tuple[float, float] = SLANTED) -> None:
+        """Draw it."""
+        self._canvas = Canvas(max(lines, LEAST_LINES) - 1, max(columns, LEAST_COLUMNS))
+        wide, high = 2.0 * self._canvas.columns, 4.0 * self._canvas.lines
+        self._flat = Projection(scene, Size(wide, high, min(14.0, wide / 8.0, high / 8.0), (6.0, 14.0)), eye)
+        self._names: dict[Spot, Run] = {}  # letter by letter
+        self._draw()
+        hidden = sum(not self._place(place, names) for place, names in self._flat.groups(SAME))
+        self._scale = self._scale_line(eye, hidden)
+
+    def lines(self) -> Iterator[list[Run]]:
+        """Yield the lines, each as pieces of one style."""
+        for line in range(self._canvas.lines):
+            yield self._canvas.runs(line, self._names)
+        yield self._scale
+
+    def text(self) -> str:
+        """Return the picture without colours."""
+        return "".join("".join(text for text, _ in line).rstrip() + "\n" for line in self.lines())
+
+    def _draw(self) -> None:
+        """Draw the links, the trails and the axes."""
+        flat = self._flat
+        for parent, name in flat.links:
+            self._line(flat.origin(parent), flat.origin(name), "bright_black", LINK, 3)
+        for trail in flat.trails:
+            for stretch in trail.stretches:
+                places = [flat.at(point) for point in stretch]
+                for begin, end in pairwise(places):
+                    self._line(begin, end, "magenta", TRAIL, 2)
+        for name in flat.nearest_last():
+            tips = flat.tips(name)
+            for axis in flat.axis_order(name):
+                self._line(flat.origin(name), tips[axis], AXES[axis], AXIS)
+
+    def _line(self, begin: Flat, end: Flat, colour: str, rank: int, gap: int = 1) -> None:
+        """Set every dot, or every second, third, .. between two places."""
+        count = max(1, math.ceil(max(abs(end.x - begin.x), abs(end.y - begin.y))))
+        for number in range(0, count + 1, gap):
+            part = number / count
+            across, down = (a + (b - a) * part for a, b in zip(begin[:2], end[:2], strict=True))
+            self._canvas.mark(math.floor(across), math.floor(down), colour, rank)
+
+    def _place(self, place: Flat, names: list[str]) -> bool:
+        """Write a name where it covers no other and, if that can be, no axis; False where there is no room."""
+        words = words_of(names, most=1)
+        cells = list(_cells(words))
+        line, column = math.floor(place.y) // 4, math.floor(place.x) // 2
+        spots = list(_around(line, column, len(cells)))
+        for crossing in (False, True):
+            for spot in spots:
+                if self._is_free(spot, len(cells), crossing=crossing):
+                    row, first = spot
+                    self._names |= {(row, first + offset): (letter, "bold") for offset, letter in enumerate(cells)}
+                    return True
+        return False
+
+    def _is_free(self, spot: Spot, wide: int, *, crossing: bool) -> bool:
+        line, column = spot
+        if not 0 <= line < self._canvas.lines or column < 0 or column + wide > self._canvas.columns:
+            return False
+        cells = [(line, column + offset) for offset in range(-1, wide + 1)]
+        if any(cell in self._names for cell in cells):
+            return False
+        return crossing or all(self._canvas.rank(*cell) < AXIS for cell in cells)
+
+    def _scale_line(self, eye: tuple[float, float], hidden: int) -> list[Run]:
+        """Say how long a metre is, from where all is seen, and how many names found no room."""
+        metres = nice(24.0 / self._flat.scale)
+        bar = "─" * max(round(metres * self._flat.scale / 2.0) - 2, 0)
+        azimuth, elevation = (round(math.degrees(angle)) + 0 for angle in eye)
+        more = f", {hidden} name{'s' * (hidden > 1)} hidden" if hidden else ""
+        fixed = printable(self._flat.scene.fixed)[:40]
+        stamp_ns = self._flat.scene.at_ns
+        time = "" if stamp_ns is None else f" at {format_stamp(stamp_ns)[:-6]} s"
+        said = f"├{bar}┤ {metres:g} m  in {fixed}{time}, from {azimuth}, {elevation} deg{more}  axes "
+        said = said[: self._canvas.columns - 6]
+        return [(said, ""), ("x", AXES[0]), (" ", ""), ("y", AXES[1]), (" ", ""), ("z", AXES[2])]
+
+
+def print_terminal(picture: TerminalPicture, color: str = "auto") -> None:
+    """Print a picture, in colour where the terminal has any, or as `color` says: always or never."""
+    from frametool.view.terminal_console import coloured_console
+
+    coloured_console(color).print(_rich_text(picture))
+
+
+def play(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
+    """Show a scene from its time on to the last stamp, a second a second, in the whole terminal."""
+    from rich.live import Live
+
+    from frametool.view.terminal_console import coloured_console
+
+    begin_ns, (_, last_ns) = scene.at_ns or 0, scene.span_ns
+    console, begin = coloured_console(color), monotonic()
+    with Live(console=console, auto_refresh=False) as live:
+        while True:
+            scene.at_ns = min(begin_ns + round((monotonic() - begin) * BILLION), last_ns)
+            picture = TerminalPicture(scene, console.width, console.height - 1, eye)
+            live.update(_rich_text(picture), refresh=True)
+            if scene.at_ns >= last_ns:
+                return
+            sleep(FRAME)
+
+
+def _rich_text(picture: TerminalPicture) -> Text:
+    from rich.text import Text
+
+    return Text("\n").join(Text.assemble(*line) for line in picture.lines())
+
+
+def _cells(words: str) -> Iterator[str]:
+    """Yield what each cell of a text holds: a wide letter takes two, the second of them empty."""
+    for letter in words:
+        yield letter
+        if east_asian_width(letter) in "WF":
+            yield ""
+
+
+def _around(line: int, column: int, wide: int) -> Iterator[Spot]:
+    """Yield where a name of so many cells might begin, the best first."""
+    yield line, column + 2
+    yield line, column - 1 - wide
+    for away in (1, -1):
+        yield line + away, column + 1
+        yield line + away, column - wide
+    for away in (2, -2):
+        yield line + away, column - wide // 2
+        yield line + away, column + 2
+    for away in (3, -3):
+        yield line + away, column - wide // 2

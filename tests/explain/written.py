@@ -1,0 +1,64 @@
+"""Poses and records as users write them: every notation, hostile and random numbers. Seeded."""
+
+from __future__ import annotations
+
+from random import Random
+from typing import Any
+
+from samples import LATTICE, quaternions, random_quaternions, turned
+
+from frametool.geometry import euler, floats
+from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.grammar.rotation_spelling import spelled
+
+ROTATIONS = random_quaternions(12, seed=12)
+HOSTILE = [
+    *LATTICE[::3], (0.5, -0.5, 0.5, -0.5), *(turned(*vector) for vector in ((1e-9, 0, 0), (0, 1e-300, 0), (0, 3.14159265, 0))),
+    *(turned(0.0, 0.5 * 3.141592653589793 - gap, 0.0) for gap in (0.0, 1e-9, 1e-5)),
+]  # fmt: skip
+ALL = quaternions(30)
+SPECS = [
+    f"{name}{unit}{axes}"
+    for name, row in REPRESENTATIONS.items()
+    for unit in (("", "_deg") if row.angles else ("",))
+    for axes in ([f":{each}" for each in euler.AXES] if name == "euler" else [""])
+]
+
+
+def seeded(seed: str) -> Random:
+    """Return a generator that draws the same for the same seed."""
+    return Random(seed)  # noqa: S311 - draws samples
+
+
+def rotation(spec: str, xyzw: tuple[float, float, float, float]) -> dict[str, Any]:
+    """Write a rotation in a notation, as a member of a pose."""
+    form = notation(spec)
+    numbers = list(form.from_quaternion(*xyzw, floats))
+    return {form.representation.name + ("_deg" if form.degrees else ""): spelled(form, numbers)}
+
+
+def position(random: Random) -> list[float]:
+    """Draw a position: zeros, exact and ragged numbers, tiny and large ones."""
+    return [random.choice((0.0, random.uniform(-3, 3), random.uniform(-1e4, 1e4), 1e-9, 12.5)) for _ in "xyz"]
+
+
+def pose(random: Random) -> dict[str, Any]:
+    """Draw a pose in some notation, at times as the inverse of what it is."""
+    made = {"xyz": position(random)} | rotation(random.choice(SPECS), random.choice([*ROTATIONS, *HOSTILE]))
+    return made | ({"inverse": "true"} if random.random() < 0.2 else {})
+
+
+def vectors(random: Random, *names: str) -> dict[str, dict[str, float]]:
+    """Draw vectors as maps, as messages have them."""
+    return {name: dict(zip("xyz", position(random), strict=True)) for name in names}
+
+
+def record(random: Random) -> dict[str, Any]:
+    """Draw a point, a vector, a pose, a twist or a wrench, with and without covariance."""
+    covariance = {"covariance": [random.uniform(-1.0, 1.0) for _ in range(36)]}
+    orientation = {"orientation": dict(zip("xyzw", random.choice(ROTATIONS), strict=True))}
+    return random.choice((
+        {"point": position(random)}, {"vector": position(random)}, pose(random), vectors(random, "linear", "angular"),
+        vectors(random, "force", "torque"), {"pose": {"pose": vectors(random, "position") | orientation} | covariance},
+        {"twist": {"twist": vectors(random, "linear", "angular")} | covariance},
+    ))  # fmt: skip
