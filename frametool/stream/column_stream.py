@@ -15,6 +15,7 @@ from frametool.formats.rows.column_file import FLOATS, Made, MovesAlong, OutColu
 from frametool.formats.rows.pcd import NORMALS, PcdWriter, viewpoint_words
 from frametool.formats.rows.structured import StructuredBatch, is_number, not_finite, rows_of_batch
 from frametool.formats.table import FORMATS
+from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused
 from frametool.stream.header import XYZ
@@ -24,8 +25,7 @@ from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
 from frametool.stream.row_poses import RowPoses, spans_of, texts_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, RowNote, notes_of
-from frametool.stream.stamp_source import in_nanoseconds
-from frametool.stream.table import Naming, Table, rename_of, stamp_column
+from frametool.stream.table import Naming, Table, rename_of
 from frametool.stream.table_plan import plan_table
 from frametool.stream.table_stream import moves_in_time, settle_stamps
 from frametool.text.cells import Cells

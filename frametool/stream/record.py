@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.grammar.names import NAME_KEYS, PARENT_KEYS
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position, unknown_keys
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "msg", "message")
 PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque")}
-PARENT_KEYS = ("parent", "frame", "frame_id", "parent_frame_id")  # the frame a record is given in
-NAME_KEYS = ("name", "child_frame_id")  # what a pose is the pose of
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")

@@ -17,6 +17,7 @@ from frametool.formats.table import is_trajectory
 from frametool.formats.trees.tree_reader import tell
 from frametool.frames.stamps import BILLION, parse_stamp
 from frametool.geometry import floats
+from frametool.grammar.names import in_nanoseconds
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, Reading
 from frametool.grammar.result import Result
@@ -24,7 +25,7 @@ from frametool.stream.record import PARTS, STALE, XYZ, find_records, lost_name, 
 from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import COVARIANCE, POINT, POSE, SIX, VECTOR
 from frametool.stream.scalar import checked_rotation, moved
-from frametool.stream.stamp_source import in_nanoseconds, key_path, read_header_stamp, read_stamp, stamp_keys
+from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,6 +13,7 @@ import numpy as np
 from frametool.documents.json import JSON_NUMBER, Verbatim
 from frametool.errors import ValueInvalid
 from frametool.formats.rows.pose_rows import IMAGE
+from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.evaluate import Run, State
@@ -23,7 +24,7 @@ from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import parse_stamps
-from frametool.stream.table import UNCLOSED, Naming, coded, in_nanoseconds, rename_of, stamp_column, table_block
+from frametool.stream.table import UNCLOSED, Naming, coded, rename_of, table_block
 from frametool.stream.table_plan import plan_table
 from frametool.text.cells import torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -136,7 +137,7 @@ class TablePoses:
         if self.stamp_at is None or not cells:
             return None, {}
         name = self.table.name(self.stamp_at)
-        times, reasons = parse_stamps(*cells[0], in_ns=in_nanoseconds(self.form, name))
+        times, reasons = parse_stamps(*cells[0], in_ns=in_nanoseconds(name))
         return times, {row: (name, reason) for row, reason in reasons.items()}
 
 

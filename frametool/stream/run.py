@@ -38,7 +38,9 @@ class RowNote(NamedTuple):
     @classmethod
     def of_latest(cls, line: int, column: str) -> RowNote:
         """Tell that a column of stamps is not looked at."""
-        remedy = f"give --time-column {column}, or --at TIME"
+        from shlex import quote
+
+        remedy = f"give --time-column {quote(column)}, or --at TIME"
         return cls(line, "latest", f"column {column!r} is not looked at, rows move at the latest time; {remedy}")
 
     @classmethod

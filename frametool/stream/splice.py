@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.yaml_writer import quoted
 from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.grammar.names import PARENT_KEYS
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
-from frametool.stream.record import PARENT_KEYS, POINT_KEYS, QUATERNION, STALE, XYZ
+from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, Target
 from frametool.stream.text_parts import Const, IfLocked, Out
 

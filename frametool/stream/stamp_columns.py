@@ -13,9 +13,10 @@ import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION
+from frametool.grammar.names import in_nanoseconds
 from frametool.stream.request import no_step
 from frametool.stream.row_layout import IDENTITY
-from frametool.stream.stamp_source import in_nanoseconds, read_header_stamp, read_stamp
+from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
 from frametool.text.numbers import parse_number
 from frametool.text.parse import LOWEST, parse_floats, trimmed

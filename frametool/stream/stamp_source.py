@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.frames.stamps import BILLION, parse_stamp
+from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, kind
 
 if TYPE_CHECKING:
@@ -14,12 +15,8 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path
 
-NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
 LARGEST = (1 << 63) - 1
-
-
 HEADER = "header.stamp"
-STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 
 
 class Timed(NamedTuple):
@@ -60,11 +57,6 @@ class Timed(NamedTuple):
 def _by_expression(_frame: str | None, _at: Any) -> Any:
     """Move nothing: what an expression looks up it looks up itself."""
     raise ValueInvalid("an expression does its own look-ups")
-
-
-def in_nanoseconds(name: str) -> bool:
-    """Tell whether the name of stamps says that they are integer nanoseconds."""
-    return name.endswith("_ns") or name in NANOSECONDS
 
 
 def read_header_stamp(seconds: str, nanoseconds: str) -> int:

@@ -10,7 +10,6 @@ The columns of trajectories whose form says what stands where: TUM, EuRoC and KI
 
 from __future__ import annotations
 
-import re
 from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,6 +19,7 @@ import numpy as np
 from frametool.errors import FormatError, FrametoolError, shown, warn
 from frametool.formats.rows.euroc import COLUMNS as EUROC
 from frametool.geometry.representations import UPPER_ROWS, notation
+from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.stream.header import Columns, PoseColumns, has_names_of_ours
 from frametool.stream.layout import NAME, NAMED, PARENT, quoted
 from frametool.stream.rows import Block, Broken
@@ -206,7 +206,6 @@ def _is_constant(column: Spans) -> bool:
 
 TUM = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 KITTI = ("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz")
-STAMPS = re.compile(r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
 WIDTHS = {"tum": (len(TUM),), "kitti": (len(KITTI),), "euroc": (8, len(EUROC))}
 
 
@@ -233,6 +232,8 @@ def as_trajectory(table: Table, form: str, request: Request, source: str) -> Tab
         return table._replace(names=KITTI, pose=PoseColumns(None, pose))
     if form == "euroc":
         names = table.names or EUROC[: table.width]
+        if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
+            names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
         return table._replace(names=names, pose=_euroc(names, source))
     if table.names or not (form == "tum" or table.width == len(TUM)):
         return table
@@ -249,19 +250,6 @@ def _euroc(names: Sequence[str], source: str) -> PoseColumns:
     position = Columns(tuple(places[:3]), tuple(names[at] for at in places[:3]), unit=1.0)
     turn = tuple(names[at] for at in places[3:])
     return PoseColumns(position, Columns(tuple(places[3:]), turn, notation=notation("wxyz"), degrees=(None,) * 4))
-
-
-def stamp_column(names: Sequence[str] | None) -> int | None:
-    """Find the column of the stamps by its name."""
-    return next((at for at, name in enumerate(names or ()) if STAMPS.fullmatch(name)), None)
-
-
-def in_nanoseconds(form: str, name: str) -> bool:
-    """Tell whether the stamps of a column are whole nanoseconds."""
-    from frametool.stream.stamp_source import NANOSECONDS
-
-    bare = name.lower().replace(" ", "")
-    return form == "euroc" or bare.endswith(("_ns", "[ns]", "(ns)")) or name in NANOSECONDS
 
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, alternatives, shown
+from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.geometry.representations import REPRESENTATIONS
 from frametool.geometry.representations import notation as parse_notation
+from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, without_mark
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
 from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     from frametool.stream.layout import Column, Layout
     from frametool.stream.request import Request
     from frametool.stream.table import Table
-
-PARENTS = ("header.frame_id", "parent", "frame_id", "frame")  # what is in the message's header is said best
-NAMES = ("child_frame_id", "name")
 
 
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
@@ -43,7 +41,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *asked)
     frames = _frame_columns(table, request, source)
     stays = not request.poses or (request.operation.moves and request.rename is None)
-    name = None if stays else _first_called(NAMES, table)
+    name = None if stays else _first_called(NAME_KEYS, table)
     edge_of = request.edge_of
     if frames and edge_of is None and request.operation.moves:
         edge_of = request.way
@@ -188,7 +186,7 @@ def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ..
         return ()
     if request.frames and request.frames != ("",):
         return tuple(_place(name, names, source) for name in request.frames)
-    found = _first_called(PARENTS, table)
+    found = _first_called(PARENT_COLUMNS, table)
     if found is None and request.frames:
         raise FormatError(
             f"rows do not say their frame; name SOURCE, or give --frame-column; columns: {', '.join(names)}",
@@ -209,6 +207,8 @@ def _first_called(names: Sequence[str], table: Table) -> int | None:
 
 def _place(name: str, names: Sequence[str], source: str) -> int:
     """Return the place of a column; raises Misused for one that is not there, or twice."""
+    if name not in names and names.count(bare := without_mark(name)) == 1:
+        name = bare
     if name not in names:
         raise Misused(f"no column {shown(name)}{alternatives(name, names, 'columns')}", source=source, line=1)
     if names.count(name) > 1:
@@ -221,7 +221,13 @@ def _time_column(table: Table, request: Request, source: str) -> int | None:
     name = request.timed.name if request.timed else request.beside
     if name is None:
         return None
-    return _place(name, _names_or_numbers(table), source)
+    place = _place(name, _names_or_numbers(table), source)
+    if request.gathered is None:  # else it is a weight
+        try:
+            in_nanoseconds(table.name(place))
+        except ValueInvalid as error:
+            raise Misused(str(error), source=source, line=1) from None
+    return place
 
 
 def _names_or_numbers(table: Table) -> Sequence[str]:

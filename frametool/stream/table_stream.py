@@ -8,6 +8,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, FrametoolError, listing
+from frametool.grammar.names import stamp_column
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault, Misused
 from frametool.stream.rows import written
@@ -15,7 +16,6 @@ from frametool.stream.run import Outcome, RowNote, mapped, notes_of
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
     COMMENT,
-    STAMPS,
     UNCLOSED,
     Naming,
     as_trajectory,
@@ -127,17 +127,17 @@ def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request,
         return request._replace(timed=timed._replace(name=name)), None
     if timed.name:
         return request, None
-    name = next(filter(STAMPS.fullmatch, table.names or ()), "")  # rows have no header
-    return request._replace(timed=None), timed._replace(name=name) if name else None
+    found = stamp_column(table.names)  # rows have no header
+    return request._replace(timed=None), None if found is None else timed._replace(name=table.name(found))
 
 
 def _stamp_column(table: Table, source: str, who: str) -> str:
     """Name the column of stamps that somebody asks for; raises Misused where none looks so."""
-    name = next(filter(STAMPS.fullmatch, table.names or ()), None)
-    if name is None:
+    found = stamp_column(table.names)
+    if found is None:
         known = f"; columns: {listing(table.names)}" if table.names else ""
         raise Misused(f"{who}: no column looks like stamps; name it with --time-column{known}", source=source, line=1)
-    return name
+    return table.name(found)
 
 
 class TableWork:

@@ -15,14 +15,15 @@ from frametool.documents.document import Document, Node, parse_documents, parse_
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
+from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, STAMP_KEYS
 from frametool.grammar.pose import POSE_KEYS
 from frametool.grammar.readers import Misfit, Reading, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
-from frametool.stream.record import NAME_KEYS, PARENT_KEYS, POINT_KEYS, find_records, lost_name, placed
+from frametool.stream.record import POINT_KEYS, find_records, lost_name, placed
 from frametool.stream.row_layout import COVARIANCE
 from frametool.stream.run import RowNote
 from frametool.stream.splice import OURS, Splicer, target_of
-from frametool.stream.stamp_source import STAMP_KEYS, key_path, stamp_keys
+from frametool.stream.stamp_source import key_path, stamp_keys
 from frametool.stream.text_parts import In, Out
 
 if TYPE_CHECKING:

@@ -1,0 +1,56 @@
+"""What keys and columns are called: the frames that rows and records name, their stamps, and the unit of these.
+
+One table for mappings, messages and headers of tables: a name means the same wherever it stands.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from frametool.errors import ValueInvalid, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+HEADER_FRAME = "header.frame_id"
+PARENT_KEYS = ("parent", "parent_frame_id", "frame_id", "frame")  # the frame that something is given in
+PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # what a message's header says is said best
+NAME_KEYS = ("child_frame_id", "name")  # what a pose is the pose of
+STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
+NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
+_STAMP = re.compile(r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
+_UNIT = re.compile(r"_([nmuµ]?s)$|[\[(]\s*([^\])]*?)\s*[\])]$")
+_SECONDS = ("s", "sec", "seconds", "")
+
+
+def in_nanoseconds(name: str) -> bool:
+    """Tell whether the name of stamps says that they are integer nanoseconds: `stamp_ns`, `stamp [ns]`, `t(ns)`.
+
+    Raises ValueInvalid for another unit than seconds and nanoseconds.
+    """
+    if name in NANOSECONDS:
+        return True
+    found = _UNIT.search(name.lower())
+    unit = (found[1] or found[2] or "") if found else ""
+    if unit in ("ns", *_SECONDS):
+        return unit == "ns"
+    raise ValueInvalid(f"{shown(name)}: unknown unit {shown(unit)} of a time; known are s, ns")
+
+
+def stamp_column(names: Iterable[str] | None) -> int | None:
+    """Return the place of the first column that is called as stamps are, in a unit that is known."""
+    return next((at for at, name in enumerate(names or ()) if _STAMP.fullmatch(name) and _is_known(name)), None)
+
+
+def _is_known(name: str) -> bool:
+    try:
+        in_nanoseconds(name)
+    except ValueInvalid:
+        return False
+    return True
+
+
+def without_mark(name: str) -> str:
+    """Return a column's name without the mark of a comment: `#timestamp [ns]` is the first of EuRoC's."""
+    return name.lstrip("#% ") or name
