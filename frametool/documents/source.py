@@ -93,10 +93,11 @@ _WIDEST_SNIPPET = 74  # and three dots on either side
 
 
 class Source(NamedTuple):
-    """A text under the name that messages use for it."""
+    """A text under the name that messages use for it; first_line: where it begins in what has that name."""
 
     name: str
     text: str
+    first_line: int = 1
 
 
 class FileState(NamedTuple):

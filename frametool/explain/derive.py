@@ -38,7 +38,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import looked_up, looked_up_across
 from frametool.grammar.result import Result, Style, carries_position, pose_numbers
 from frametool.stream.record import PARTS
-from frametool.stream.record_values import documents, stamp_of
+from frametool.stream.record_values import documents
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POSE
 
@@ -408,7 +408,7 @@ def derive_apply(
         raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")
     record = records[0]
     names = way.names(record.parent.text)
-    stamp_ns = stamp_of(record, source) if record.stamp and not timeless else None
+    stamp_ns = None if timeless else record.stamp_ns
     if isinstance(way, ByTree) and way.frames.latest(*names) is None:
         stamp_ns = None
     mover = way.components(names, stamp_ns)

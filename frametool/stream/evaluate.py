@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
-from frametool.geometry import arrays, floats, rigid
+from frametool.geometry import arrays, floats
 from frametool.geometry.batch_validation import read_rotations
 from frametool.stream.faults import NULL, STOP, Fault
-from frametool.stream.request import START
-from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, POSE, TURN, pose_of
+from frametool.stream.request import PAIR, START, thing_pose
+from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, TURN, checked_rotation, doubt, wrong_tail
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
+from frametool.stream.run import DEGREES, RowNote
 from frametool.stream.stamp_columns import (
     NOWHERE,
     by_frame,
@@ -28,11 +30,11 @@ from frametool.text.numbers import read_number_or_angle
 from frametool.text.parse import parse_floats
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.gathering import Gathered
-    from frametool.stream.request import Formula, Operation
+    from frametool.stream.request import Operation
     from frametool.stream.row_layout import Shape, Target
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
     from frametool.text.spans import Flags, Floats, Ints, Spans
 
 
+
+
+COLUMNS_REMEDY = "give --deg, or name the columns _deg"
 
 
 class Plan(NamedTuple):
@@ -50,6 +55,7 @@ class Plan(NamedTuple):
     edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
     beside: the name of what is read beside the numbers, a stamp or a weight; gathered: takes the poses
     timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
+    remedies: for each shape, what to do where its angles are degrees
     yaml: numbers need a point before the exponent; frame_column: the name of the column that names frames
     """
 
@@ -71,6 +77,7 @@ class Plan(NamedTuple):
     frame_column: str = ""
     beside: str = ""
     gathered: Gathered | None = None
+    remedies: tuple[str, ...] = ()
 
 
 class State:
@@ -90,7 +97,7 @@ class Run:
     """The steps of one block; rows are numbered as in the block.
 
     reasons: row -> column and why it is bad; mended: rows whose rotation was off and normalised
-    doubted: rows with angles that look like degrees, and which
+    doubted: rows with an angle that looks like degrees, which of the numbers it is, and what is said of it
     """
 
     def __init__(self, plan: Plan, block: Block, state: State) -> None:
@@ -99,15 +106,15 @@ class Run:
         self.block = block
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
         self.mended: list[int] = []
-        self.doubted: list[tuple[int, str]] = []
+        self.doubted: list[tuple[int, int, str]] = []
         self.off = 0.0  # how far the worst rotation was from one, of those that are none too far
-        self.evaluated: list[tuple[str, Components, list[Floats], Ints | None]] = []
         self.count = len(block.places)
         numbers = self._read()
         movers = self._movers()
         self.lone: int | None = None
+        self.columns = list(np.ascontiguousarray(numbers.T))
         with np.errstate(all="ignore"):
-            moved = self._compute(list(np.ascontiguousarray(numbers.T)), movers, state)
+            moved = self._compute(self.columns, movers, state)
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
         weights = weights_of(self.block, plan.beside, self._blame) if plan.gathered and plan.beside else None
@@ -170,48 +177,33 @@ class Run:
     def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
         shapes, operation = self.plan.shapes, self.plan.operation
-        moved: list[Components] = []
-        poses: list[Rigid] = []
-        first = 0
-        for shape, mover in zip(shapes, movers, strict=False):
-            numbers = columns[first : first + shape.size]
-            if operation.formula is not None:
-                moved.append(self._evaluated(operation.formula, shape, numbers, first, len(moved)))
-                first += shape.size
-                continue
-            own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
-            if shape.kind != POSE:
-                start = shape.position(own) if shape.unit is not None else tuple(own)
-                moved.append(operation.move(shape, (*start, *beside), mover))
-            else:
-                pose = pose_of(shape.position(own), self._rotation(shape, own, first))
-                poses.append(rigid.inverse(*pose) if shape.inverse else pose)
-                if len(self.plan.targets) > 1 or operation.of != "pair":
-                    done = operation.pose(self._with_before(poses.pop(), state), mover, arrays)
-                    if operation.velocity:
-                        done = operation.with_velocity(done, self._seconds(state), arrays)
-                    moved.append((*done, *operation.covariance(shape, beside, mover)))
-            first += shape.size
-        if poses or not shapes:
-            moved.append(operation.pose(poses or [NOWHERE], movers[0], arrays))
-        return moved
+        if operation.of == PAIR or not shapes:
+            things = self._things(columns)
+            poses = [thing_pose(shape, own[: shape.own_size], rotation) for shape, own, rotation in things]
+            return [operation.pose(poses or [NOWHERE], movers[0], arrays)]
+        needs_time = operation.formula is not None and operation.formula.needs_time
+        times = [self._times(at) for at in range(len(shapes))] if needs_time else []
+        return [
+            self._constant_too(
+                operation.result(
+                    shape, numbers, mover, arrays, rotation=rotation,
+                    compared=lambda pose: self._with_before(pose, state), seconds=lambda: self._seconds(state),
+                    times_ns=times[at] if times else None,
+                )
+            )
+            for at, (mover, (shape, numbers, rotation)) in enumerate(zip(movers, self._things(columns), strict=False))
+        ]  # fmt: skip
 
-    def _evaluated(
-        self, formula: Formula, shape: Shape, numbers: list[Floats], first: int, at: int
-    ) -> Components:
-        """Return what an expression makes of the rows, a constant as often as there are rows."""
-        own = numbers[: shape.own_size]
-        parts: Components = ()
-        if shape.kind == POSE:
-            pose = pose_of(shape.position(own), self._rotation(shape, own, first))
-            parts = rigid.inverse(*pose) if shape.inverse else pose
-        elif shape.kind:
-            parts = shape.position(own)
-        cells = numbers[shape.size - shape.beside :]
-        times = self._times(at) if formula.needs_time else None
-        self.evaluated.append((shape.kind, parts, cells, times))
-        found = formula.result(shape.kind, parts, cells, times, arrays)
-        return tuple(np.full(self.count, part) if type(part) is float else part for part in found)
+    def _things(self, columns: list[Floats]) -> Iterator[tuple[Shape, Components, Callable[[Components], Components]]]:
+        """Yield each shape of the rows with its columns, and what reads and checks its rotation."""
+        first = 0
+        for shape in self.plan.shapes:
+            yield shape, tuple(columns[first : first + shape.size]), partial(self._rotation, shape, first)
+            first += shape.size
+
+    def _constant_too(self, parts: Components) -> Components:
+        """Repeat what an expression makes of no row as often as there are rows."""
+        return tuple(np.full(self.count, part) if type(part) is float else part for part in parts)
 
     def _times(self, at: int) -> Ints:
         """Read the stamps of the rows."""
@@ -224,13 +216,18 @@ class Run:
             self._blame(row, column, reason)
         return times
 
-    def _why_no_value(self, formula: Formula, row: int) -> str | FrametoolError:
+    def _why_no_value(self, row: int) -> str | FrametoolError:
         """Evaluate an expression for one row alone, which says why it has no value there."""
-        for kind, parts, cells, times in self.evaluated:
-            given = tuple(part if type(part) is float else float(part[row]) for part in parts)
-            own = [float(cell[row]) for cell in cells]
+        operation = self.plan.operation
+        for at, (shape, columns, _) in enumerate(self._things(self.columns)):
+            own = tuple(float(column[row]) for column in columns)
+            rotation = partial(_checked, shape)
+            times = int(self._times(at)[row]) if operation.formula and operation.formula.needs_time else None
             try:
-                formula.result(kind, given, own, None if times is None else int(times[row]), floats)
+                operation.result(
+                    shape, own, None, floats, times_ns=times, compared=lambda pose: [pose], seconds=float,
+                    rotation=rotation,
+                )  # fmt: skip
             except FrametoolError as error:
                 return error
         return "the result is not finite: the numbers are too large"
@@ -255,7 +252,8 @@ class Run:
             state.stamp_ns = int(stamps[good[-1]])
         return seconds
 
-    def _rotation(self, shape: Shape, numbers: list[Floats], first: int) -> Components:
+    def _rotation(self, shape: Shape, first: int, numbers: Components) -> Components:
+        """Return the checked quaternions of a shape whose numbers begin at the column `first`."""
         if shape.notation is None:
             return IDENTITY
         given = list(shape.rotation(numbers))
@@ -267,17 +265,33 @@ class Run:
             self._blame(row, names[shape.rotation_at[0]], reason)
         self.mended += found.mended.tolist()
         self.off = max(self.off, found.off)
-        self.doubted += _doubtful_angles(shape, given)
+        self._doubt(shape, given, first)
         return found.quaternions
 
-    def _check_tail(self, numbers: list[Floats], names: Sequence[str], tail: Sequence[float]) -> None:
+    def _doubt(self, shape: Shape, given: Sequence[Floats], first: int) -> None:
+        """Wonder about the first row with a bare angle beyond a full turn."""
+        angles = shape.bare_angles
+        if not angles:
+            return
+        beyond = np.flatnonzero(np.max([abs(given[at]) for at in angles], axis=0) > TURN)
+        if beyond.size:
+            row = int(beyond[0])
+            at = max(angles, key=lambda at: abs(given[at][row]))
+            remedy = self.plan.remedies[self.plan.shapes.index(shape)] if self.plan.remedies else COLUMNS_REMEDY
+            self.doubted.append((row, first + shape.number_at(at), doubt(shape, given[at][row], remedy)))
+
+    def note_of_degrees(self, row: int, number: int, sentence: str) -> RowNote:
+        """Return what is worth telling about an angle, with its place."""
+        place_of = self.block.place_of
+        line, column = (self.block.line_of(row), self.plan.names[number]) if place_of is None else place_of(row, number)
+        return RowNote(line, DEGREES, sentence, column)
+
+    def _check_tail(self, numbers: Components, names: Sequence[str], tail: Sequence[float]) -> None:
         """Refuse rows whose last numbers are not what they always are: 0 0 0 1 of a 4x4 matrix."""
         first = len(numbers) - len(tail)
         wrong = {row for at, each in enumerate(tail) for row in np.flatnonzero(numbers[first + at] != each).tolist()}
-        wanted = " ".join(f"{each:g}" for each in tail)
         for row in wrong:
-            found = " ".join(f"{number[row]:g}" for number in numbers[first:])
-            self._blame(row, names[first], f"the last row of a 4x4 pose is {wanted}, found {found}")
+            self._blame(row, names[first], wrong_tail(tail, [number[row] for number in numbers[first:]]))
 
     def _results(self, moved: list[Components]) -> tuple[Floats, Ints]:
         """Return the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
@@ -297,9 +311,8 @@ class Run:
         if not np.isfinite(results.sum()):
             for row in np.flatnonzero(~np.isfinite(results).all(axis=1)).tolist():
                 if row not in self.reasons:
-                    formula = self.plan.operation.formula
                     too_large = "the result is not finite: the numbers are too large"
-                    self._blame(row, "", self._why_no_value(formula, row) if formula else too_large)
+                    self._blame(row, "", self._why_no_value(row) if self.plan.operation.formula else too_large)
         return results, locked
 
     def _keep(self, kept: Flags) -> None:
@@ -356,23 +369,16 @@ class Run:
         return sorted(found + [Fault(each.line, each.column, each.reason) for each in self.block.broken])
 
 
+def _checked(shape: Shape, own: Components) -> Components:
+    """Return the quaternion of one row's numbers, which was checked before."""
+    return checked_rotation(shape, own, normalize=True)[0]
+
+
 def _without_result(piece: Piece, null: bytes) -> Piece:
     """Return what stands in a row without a result: nulls for its numbers, the input for what was put in its place."""
     if isinstance(piece, Out):
         return Const(piece.between.join([null] * (piece.last - piece.first)))
     return In(piece.part) if isinstance(piece, Instead) else piece
-
-
-def _doubtful_angles(shape: Shape, given: list[Floats]) -> list[tuple[int, str]]:
-    """Wonder about the first bare angle beyond a full turn."""
-    form = shape.notation
-    if form is None or shape.degrees or form.degrees is not None:
-        return []
-    for index in form.representation.angles:
-        beyond = np.flatnonzero(abs(given[index]) > TURN)
-        if beyond.size:
-            return [(int(beyond[0]), f"{form.spec} {given[index][beyond[0]]:g}")]
-    return []
 
 
 def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:

@@ -123,9 +123,11 @@ class BadRows:
                     BadRow(fault, self._reason(fault), source=self.source, fate=self._fate, counted=self.counted)
                 )
 
-    def place(self, number: int) -> str:
-        """Name a line or a row."""
-        return f"{self.source}:{number}" if self.counted == "line" else f"{self.source}: {self.counted} {number}"
+    def place(self, number: int, column: str = "") -> str:
+        """Name a line or a row, and a column in it."""
+        if self.counted == "line":
+            return f"{self.source}:{number}" + f":{column}" * bool(column)
+        return f"{self.source}: {self.counted} {number}" + f", column {column}" * bool(column)
 
     def finish(self, rows: int) -> int:
         """Report the final count of a run of so many rows; return its exit status."""

@@ -19,7 +19,18 @@ from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, re
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
 from frametool.ros.message_parts import read_stamp, whole_list
-from frametool.stream.row_layout import COVARIANCE, POINT, POSE, TWIST, VECTOR, WRENCH, Shape
+from frametool.stream.row_layout import (
+    COVARIANCE,
+    POINT,
+    POSE,
+    TURN,
+    TWIST,
+    VECTOR,
+    WRENCH,
+    Shape,
+    checked_rotation,
+    doubt,
+)
 from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import NotFinite, parse_number, read_number_or_angle
 
@@ -40,6 +51,7 @@ KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
 QUATERNION = (*XYZ, "w")
+KEYS_REMEDY = "name the keys _deg"
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 
 
@@ -59,7 +71,7 @@ class Record(NamedTuple):
     key: the key of the position; "" where each of its numbers is a member of the record, whose keys are `members`
     rotation: the key of the rotation; others: further keys that say the same rotation
     flat: keys that hold one number of the rotation each; `rotation` is then the first of them
-    stamp: the paths of seconds and nanoseconds in its header
+    stamp: the paths of seconds and nanoseconds in its header; stamp_ns: the time that they say
     """
 
     path: Path
@@ -73,8 +85,13 @@ class Record(NamedTuple):
     flat: tuple[str, ...] = ()
     name: Name = Name()
     parent: Name = Name()
-    inverse: bool = False
     stamp: tuple[Path, ...] = ()
+    stamp_ns: int | None = None
+
+    @property
+    def inverse(self) -> bool:
+        """Tell whether what is written is the inverse of the pose."""
+        return self.shape.inverse
 
 
 def find_records(document: Any, request: Request, reading: Reading, path: Path = ()) -> Iterator[Record]:
@@ -251,11 +268,11 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
     if joint_state.is_joint_state(value):
         members = tuple(key for key in joint_state.LISTS if key in value)
         header, parent = value.get("header"), Name()
-        stamp: tuple[Path, ...] = ()
+        record = Record(path, Shape("", None), members=members)
         if type(header) is dict:
             parent = _named(header, ("frame_id",), (*path, "header"), parent, request)
-            stamp = _stamp_paths(header["stamp"], ("header", "stamp"), path) if "stamp" in header else ()
-        return Record(path, Shape("", None), members=members, parent=parent, stamp=stamp)
+            record = _with_stamp(record, header, ("header", "stamp"), path)
+        return record._replace(parent=parent)
     if there := next((key for key in value if key in (*POSITION_KEYS, *ROTATION_KEYS)), None):
         raise Misfit(f"key {shown(there)} is there already, where the result would stand", (there,), key=True)
     return Record(path, Shape("", None))
@@ -333,7 +350,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
         record = record._replace(others=tuple(rotations[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
-    return record._replace(inverse=True) if _is_inverse(value) else record
+    return record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
 
 
 def _is_pose(positions: Sequence[str], rotation: object) -> bool:
@@ -444,7 +461,7 @@ def _with_flat_rotation(
     for at, name in enumerate(names):
         numbers.append(_number(value, name, shape.in_degrees(own + at)))
     values = (*(() if shape.whole else record.values), *numbers)
-    _check(shape, values, names[0], reading)
+    _check(shape, values, names, reading)
     paths = (*(() if shape.whole else record.numbers), *((*record.path, name) for name in names))
     return record._replace(
         shape=shape, numbers=paths, values=values, rotation=next(key for key in value if key in names), flat=names
@@ -461,18 +478,19 @@ def _number(value: dict[str, Any], key: str, degrees: bool | None) -> float:  # 
         raise (NotARotation if isinstance(error, NotFinite) else Misfit)(str(error), (key,)) from None
 
 
-def _check(shape: Shape, values: Sequence[float], key: str, reading: Reading) -> None:
+def _check(shape: Shape, values: Sequence[float], names: Sequence[str], reading: Reading) -> None:
     """Refuse numbers that are no rotation; note what is odd about them."""
-    from frametool.stream.scalar import checked_rotation, doubtful_angle
-
     try:
         _, odd = checked_rotation(shape, values, normalize=reading.normalize)
     except ValueInvalid as error:
-        raise NotARotation(str(error), (key,)) from None
+        raise NotARotation(str(error), (names[0],)) from None
     for rule, message in odd:
-        reading.note(message, key, rule=rule)
-    if doubt := doubtful_angle(shape, values):
-        reading.note(f"{doubt} is more than a full turn in radians; degrees? name the keys _deg", key, rule="degrees")
+        reading.note(message, names[0], rule=rule)
+    given = shape.rotation(values)
+    largest = max(shape.bare_angles, key=lambda at: abs(given[at]), default=None)
+    if largest is not None and abs(given[largest]) > TURN:
+        name = names[shape.number_at(largest) - shape.position_size]
+        reading.note(doubt(shape, given[largest], KEYS_REMEDY), name, rule="degrees")
 
 
 def _kind(key: str, rotations: object, request: Request) -> str:
@@ -545,7 +563,7 @@ def _with_names(
     record: Record, document: Any, path: Path, outer: tuple[Path, ...], above: Path, request: Request
 ) -> Record:
     """Add the frames that the record and the message around it name, and the stamp of its header."""
-    parent, name, stamp = Name(), Name(), record.stamp
+    parent, name = Name(), Name()
     for around in (path, *reversed(outer)):
         value = value_at(document, around)
         if type(value) is not dict:
@@ -557,9 +575,8 @@ def _with_names(
         if type(header) is dict:
             inside = (*around, "header")
             parent = _named(header, ("frame_id",), (*above, *inside), parent, request)
-            if not stamp and "stamp" in header:
-                stamp = _stamp_paths(header["stamp"], (*inside, "stamp"), above)
-    return record._replace(parent=parent, name=name, stamp=stamp) if parent.paths or name.paths or stamp else record
+            record = _with_stamp(record, header, (*inside, "stamp"), above)
+    return record._replace(parent=parent, name=name) if parent.paths or name.paths else record
 
 
 def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, request: Request) -> Name:
@@ -578,12 +595,13 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
     return found
 
 
-def _stamp_paths(value: Any, path: Path, above: Path) -> tuple[Path, ...]:
-    """Check a header's stamp and return the paths of its seconds and nanoseconds."""
-    within(path, read_stamp, value)
-    seconds = next(key for key in value if key.startswith("s"))
-    below = next(key for key in value if key.startswith("n"))
-    return (*above, *path, seconds), (*above, *path, below)
+def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path) -> Record:
+    """Add the stamp of a header, and where its seconds and nanoseconds stand, unless one further in said it."""
+    if record.stamp or "stamp" not in header:
+        return record
+    stamp_ns = within(path, read_stamp, header["stamp"])
+    parts = [next(key for key in header["stamp"] if key.startswith(letter)) for letter in "sn"]
+    return record._replace(stamp=tuple((*above, *path, part) for part in parts), stamp_ns=stamp_ns)
 
 
 def value_at(value: Any, path: Path) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault
+from frametool.stream.record import KEYS_REMEDY
 from frametool.stream.record_stream import attempt, null_of
 from frametool.stream.rows import Block, texts_as_rows, written
 from frametool.stream.run import Outcome, RowNote
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import TypeAlias
 
+    from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part, Splitter
     from frametool.stream.template import Template
@@ -193,7 +195,7 @@ class RecordBlocks:
             bad = [(int(run.block.places[row]), row) for row in run.reasons]
             faults += [(place, Fault.of(run.block.line_of(row), *run.reasons[row])) for place, row in bad]
             odd += [] if skips else [(place, _null_row(cut, row, text)) for place, row in bad]
-            notes += [RowNote.of_degrees(run.block.line_of(row), angle) for row, angle in run.doubted[:1]]
+            notes += [run.note_of_degrees(*each) for each in run.doubted[:1]]
             notes += [RowNote.of_rounding(run.block.line_of(row)) for row in sorted(run.mended)[:1]]
             notes += [each._replace(line=run.block.line_of(0)) for each in cut.template.notes if len(cut.starts)]
         end = min((place for place, _ in faults), default=None) if stops else None
@@ -224,9 +226,16 @@ class RecordBlocks:
         def line_of(row: int) -> int:
             return text.count(b"\n", 0, int(cut.starts[row, 0])) + template.line
 
+        def place_of(row: int, number: int) -> tuple[int, str]:
+            if not template.regular:
+                return line_of(row), ""
+            start = int(starts[row, template.numbers[number]]) - MARGIN
+            begin = text.rfind(b"\n", 0, start) + 1
+            return text.count(b"\n", 0, start), str(len(text[begin:start].decode()) + 1)
+
         stamps = [tuple(without_quotes(parts[index]) for index in each) for each in template.stamps]
         numbers = _numbers(template, data, starts, ends)
-        return Block(numbers, parts, cut.starts[:, -1], line_of, stamps=stamps)
+        return Block(numbers, parts, cut.starts[:, -1], line_of, stamps=stamps, place_of=place_of)
 
     def _plan(self, template: Template) -> Plan:
         """Say what is done to the records of one template."""
@@ -250,8 +259,14 @@ class RecordBlocks:
             timed=template.timed(request),
             beside=template.beside if request.beside is not None else "",
             gathered=request.gathered,
+            remedies=tuple(_remedy(entry.record) for entry in template.entries),
             sources=tuple(entry.record.parent.text for entry in template.entries),
         )
+
+
+def _remedy(record: Record) -> str:
+    """Say how a record names an angle in degrees."""
+    return KEYS_REMEDY if record.flat else f"write {record.rotation}_deg"
 
 
 def _is_text(block: bytes) -> bool:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from frametool.documents.document import locate_many
 from frametool.errors import FormatError, FrametoolError
 from frametool.ros.message_stream import NOISE
+from frametool.stream.answers import number_writer, written
 from frametool.stream.faults import SKIP, STOP, Fault
-from frametool.stream.run import Outcome, RowNote, mapped
-from frametool.stream.scalar import result_of
+from frametool.stream.run import DEGREES, Outcome, RowNote, mapped
 from frametool.stream.splitter import ARRAY, Splitter
 from frametool.stream.template import learn, nulled
 from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks
@@ -116,11 +117,10 @@ def _singly(text: bytes, parts: list[Part], form: str, request: Request, source:
         line = text.count(b"\n", 0, part.start)
         template = attempt(text, part, form, request, source)
         rendered = template if isinstance(template, (Fault, bytes)) else _rendered(template, request, line)
-        if not isinstance(rendered, (Fault, bytes)):
-            result, odd, told = rendered
-            mended += odd
-            notes += told
-            rendered = result
+        if isinstance(rendered, Rendered):
+            mended += rendered.mended
+            notes += rendered.notes
+            rendered = rendered.text
         if isinstance(rendered, Fault):
             faults.append(rendered)
             if request.on_error == STOP:
@@ -135,17 +135,36 @@ def _singly(text: bytes, parts: list[Part], form: str, request: Request, source:
     return Outcome(b"".join(out), faults, len(parts), text.count(b"\n"), mended, notes, len(text), kept)
 
 
-def _rendered(template: Template, request: Request, line: int) -> tuple[bytes, bool, list[RowNote]] | Fault:
-    """Return the text of a result with what is odd about it, or why there is none; lines count from 0."""
-    line += template.line
+class Rendered(NamedTuple):
+    """The text of a result, how many rotations were normalised for it, and what is worth telling."""
+
+    text: bytes
+    mended: int
+    notes: list[RowNote]
+
+
+def _rendered(template: Template, request: Request, line: int) -> Rendered | Fault:
+    """Return the text of a record's result, or why there is none; lines count from 0."""
     try:
-        text, mended, doubt = result_of(template, request)
+        answers = template.answers(request)
+        numbers = [number for each in answers for number in written(each)]
     except FrametoolError as error:
-        return Fault.of(line, getattr(error, "column_name", ""), error)
-    notes = [RowNote.of_degrees(line, doubt)] if doubt else []
-    notes += [RowNote.of_rounding(line)] * mended
-    notes += [each._replace(line=line) for each in template.notes]
-    return text.encode(), mended, notes
+        return Fault.of(line + template.line, getattr(error, "column_name", ""), error)
+    locked = any(each.entry.target.locked(each.parts) for each in answers)
+    write = number_writer(request.precision, yaml=not template.json)
+    text = template.with_numbers([write(number) for number in numbers], locked=locked)
+    mended = sum(each.mended for each in answers)
+    return Rendered(text.encode(), mended, _notes(template, line, mended=bool(mended)))
+
+
+def _notes(template: Template, line: int, *, mended: bool) -> list[RowNote]:
+    """Return what is worth telling about a record and its numbers, each with its place."""
+    notes = [each._replace(line=line + template.line) for each in template.notes]
+    notes += [RowNote.of_rounding(line + template.line)] * mended
+    doubted = [note for note in template.own_notes if note.rule == DEGREES]
+    for note, place in zip(doubted, locate_many(template.text, [note.path for note in doubted]), strict=True):
+        notes.append(RowNote(line + place[0] - 1, DEGREES, note.message, str(place[1])))
+    return sorted(notes)
 
 
 def null_of(record: bytes, *, json: bool) -> bytes:

@@ -15,7 +15,7 @@ from frametool.geometry import quaternion, rigid, rotvec, spatial
 from frametool.geometry.trig import RADIAN
 from frametool.grammar.pose import VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH
+from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH, pose_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
+PAIR = "pair"  # the two poses of a row
 
 
 def _turn(_x: Number, _y: Number, _z: Number, *numbers: Number) -> Components:
@@ -169,6 +170,37 @@ class Operation(NamedTuple):
             return tuple(spatial.rotate_covariance(*mover[3:], numbers))
         return tuple(spatial.move_twist_covariance(*mover, numbers))
 
+    def result(
+        self,
+        shape: Shape,
+        numbers: Components,
+        edge: Rigid | None,
+        xp: Namespace,
+        *,
+        rotation: Callable[[Components], Components],
+        compared: Callable[[Rigid], Sequence[Rigid]],
+        seconds: Callable[[], Number],
+        times_ns: Number = None,
+    ) -> Components:
+        """Return what becomes of one thing of a shape, or of a column of them, and then what comes beside it.
+
+        rotation: makes the checked quaternion of a thing's own numbers
+        compared: adds to a pose what it is compared with
+        seconds: the time since the row before, of which velocities are made; times_ns: its own time
+        """
+        own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
+        if shape.kind == POSE:
+            pose = thing_pose(shape, own, rotation)
+        if self.formula is not None:
+            parts = pose if shape.kind == POSE else shape.position(own) if shape.kind else ()
+            return self.formula.result(shape.kind, parts, beside, times_ns, xp)
+        if shape.kind != POSE:
+            return self.move(shape, (*(shape.position(own) if shape.unit is not None else own), *beside), edge)
+        found = self.pose(compared(pose), edge, xp)
+        if self.velocity:
+            found = self.with_velocity(found, seconds(), xp)
+        return (*found, *self.covariance(shape, beside, edge))
+
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
         """Return the resulting pose, and what else is known about it."""
         if self.before is not None:
@@ -204,6 +236,12 @@ class Operation(NamedTuple):
         if self.of == "second" and self.fixed is not None:
             return poses[0], self.fixed
         return poses[0], poses[1]
+
+
+def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
+    """Return the pose that numbers say, which may be the inverse of what is written."""
+    pose = pose_of(shape.position(own), rotation(own))
+    return rigid.inverse(*pose) if shape.inverse else pose
 
 
 class Request(NamedTuple):

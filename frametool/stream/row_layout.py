@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from frametool.geometry import euler, quaternion
+from frametool.errors import ValueInvalid, overheard
+from frametool.geometry import euler, floats, quaternion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
     from frametool.geometry.representations import Notation, Whole
-    from frametool.geometry.types import Components, Namespace, Rigid
+    from frametool.geometry.types import Components, Namespace, Quaternion, Rigid
 
 POINT, VECTOR, POSE, TWIST, WRENCH = "point", "vector", "pose", "twist", "wrench"
 SIX = (TWIST, WRENCH)  # two vectors, linear part first
@@ -86,6 +87,13 @@ class Shape(NamedTuple):
             return tuple(self.joined.split(range(self.own_size))[1])
         return tuple(range(self.position_size, self.own_size))
 
+    def number_at(self, index: int) -> int:
+        """Return where in a row a number of the rotation stands that has a column."""
+        if self.joined:
+            return self.rotation_at[index]
+        full = index + 3 * (self.unit is not None)
+        return full - sum(each < full for each in self.absent)
+
     def in_degrees(self, place: int) -> bool | None:
         """Tell whether a row's number is an angle in degrees; None if it is no angle."""
         if place >= self.own_size:
@@ -118,6 +126,12 @@ class Shape(NamedTuple):
         for index in self.radians_at:
             given[index] = given[index] * TO_DEGREES
         return tuple(given)
+
+    @property
+    def bare_angles(self) -> tuple[int, ...]:
+        """Return which of the rotation's numbers are angles in radians whose unit nobody said."""
+        form = self.notation
+        return () if form is None or self.degrees or form.degrees is not None else tuple(form.representation.angles)
 
     def _with_absent(self, numbers: Sequence[Any]) -> Sequence[Any]:
         """Put zeros where a row has no number."""
@@ -231,3 +245,31 @@ def pose_of(position: Components, rotation: Components) -> Rigid:
     x, y, z = position
     qx, qy, qz, qw = rotation
     return x, y, z, qx, qy, qz, qw
+
+
+def checked_rotation(
+    shape: Shape, values: Sequence[float], *, normalize: bool
+) -> tuple[Quaternion, list[tuple[str, str]]]:
+    """Return the quaternion of a record's numbers, and what its check warned of as (rule, sentence).
+
+    Raises ValueInvalid for what is no rotation.
+    """
+    if shape.notation is None:
+        return IDENTITY, []
+    tail = shape.joined.tail if shape.joined else ()
+    if tail and tuple(values[-len(tail) :]) != tail:
+        raise ValueInvalid(wrong_tail(tail, values[-len(tail) :]))
+    check = shape.notation.checked_quaternion
+    return overheard(check, shape.rotation(values), floats, degrees=shape.degrees, normalize=normalize)
+
+
+def wrong_tail(wanted: Sequence[float], found: Sequence[float]) -> str:
+    """Say that the last row of a 4x4 matrix is not what it always is."""
+    expected, given = (" ".join(f"{value:g}" for value in row) for row in (wanted, found))
+    return f"the last row of a 4x4 pose is {expected}, found {given}"
+
+
+def doubt(shape: Shape, angle: float, remedy: str) -> str:
+    """Wonder whether an angle beyond a full turn is meant in degrees."""
+    name = shape.notation.representation.name if shape.notation else ""
+    return f"{name} {angle:g} is more than a full turn in radians; degrees? {remedy}"

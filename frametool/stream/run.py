@@ -17,18 +17,16 @@ if TYPE_CHECKING:
     from frametool.stream.rows import Block
 
 
+DEGREES = "degrees"
+
+
 class RowNote(NamedTuple):
-    """Something worth telling about a row: its line from 0, what it is about, and the sentence."""
+    """Something worth telling about a row: its line from 0, what it is about, the sentence, and the column."""
 
     line: int
     about: str
     sentence: str
-
-    @classmethod
-    def of_degrees(cls, line: int, angle: str) -> RowNote:
-        """Wonder about an angle beyond a full turn."""
-        remedy = "degrees? give --deg, or name the columns _deg"
-        return cls(line, "degrees", f"{angle} is more than a full turn in radians; {remedy}")
+    column: str = ""
 
     @classmethod
     def of_lost_name(cls, line: int, name: str) -> RowNote:
@@ -51,7 +49,7 @@ class RowNote(NamedTuple):
 
 def notes_of(run: Run, block: Block) -> list[RowNote]:
     """Return what is worth telling about the rows of a block, by line."""
-    notes = [RowNote.of_degrees(block.line_of(row), angle) for row, angle in run.doubted[:1]]
+    notes = [run.note_of_degrees(*each) for each in run.doubted[:1]]
     notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.lost]
     notes += [RowNote.of_rounding(block.line_of(row)) for row in sorted(run.mended)[:1]]
     if run.plan.shapes and run.plan.shapes[0].notation is UPPER_ROWS and run.off > PROJECTED_IN_SILENCE:
@@ -105,7 +103,7 @@ def run(
             told.add(note.about)
             bad.take(fault for fault in faults if fault.line < line + note.line)
             faults = [fault for fault in faults if fault.line >= line + note.line]
-            warn(f"{bad.place(line + note.line)}: {note.sentence}")
+            warn(f"{bad.place(line + note.line, note.column)}: {note.sentence}")
         bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
     if mended > 1:

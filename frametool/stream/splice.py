@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.document import Node
+    from frametool.stream.answers import Entry
     from frametool.stream.record import Name, Record
     from frametool.stream.request import Request
     from frametool.stream.text_parts import Piece
@@ -88,14 +89,15 @@ class Splicer:
     """The edits of one record; `first` is the index of its first number among all results of the text."""
 
     def __init__(
-        self, text: str, root: Node, record: Record, target: Target, request: Request, *, json: bool, first: int
+        self, text: str, root: Node, entry: Entry, request: Request, *, json: bool, first: int
     ) -> None:
         """Find the record's mapping and its numbers among the nodes of the text."""
         self.text = text
         self.root = root
+        self.record = record = entry.record
         self.node = root.at(record.path)
-        self.record = record
-        self.target = target
+        self.entry = entry
+        self.target = entry.target
         self.request = request.for_kind(record.shape.kind)
         self.json = json
         self.first = first
@@ -241,7 +243,7 @@ class Splicer:
         record = self.record
         if not self.request.poses and {"name", "parent"} & self.node.value.keys() - {*record.members}:
             return  # in a row that was no pose they say something else
-        parent, name = self.request.rename(record.parent.text, record.name.text)
+        parent, name = self.entry.parent, self.entry.name
         if self._has_swapped(name, parent):
             return
         self._name(record.name, name, "name")

@@ -9,31 +9,29 @@ from __future__ import annotations
 import re
 from functools import cached_property
 from itertools import accumulate, islice
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from frametool.documents.document import Document, Node, parse_documents, parse_nodes
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
-from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, STAMP_KEYS
+from frametool.grammar.names import NAME_KEYS, PARENT_KEYS
 from frametool.grammar.pose import POSE_KEYS
-from frametool.grammar.readers import Misfit, Reading, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
-from frametool.stream.record import POINT_KEYS, find_records, lost_name, placed
+from frametool.stream.answers import answer, read_entries
+from frametool.stream.record import POINT_KEYS
 from frametool.stream.row_layout import COVARIANCE
 from frametool.stream.run import RowNote
-from frametool.stream.splice import OURS, Splicer, target_of
-from frametool.stream.stamp_source import key_path, stamp_keys
-from frametool.stream.text_parts import In, Out
+from frametool.stream.splice import OURS, Splicer
+from frametool.stream.text_parts import Const, IfLocked, In, Out
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Path
-    from frametool.stream.record import Record
+    from frametool.grammar.readers import Note, Path
+    from frametool.stream.answers import Answer, Entry
     from frametool.stream.request import Request
-    from frametool.stream.row_layout import Shape, Target
+    from frametool.stream.row_layout import Shape
     from frametool.stream.splice import Edit
     from frametool.stream.stamp_source import Timed
     from frametool.stream.text_parts import Piece
@@ -60,15 +58,6 @@ MOST_LEAVES = 2000
 """Scalars of a record that is learned for others: an expression for more takes longer than they are worth."""
 
 
-class Entry(NamedTuple):
-    """One record of a text: what it is, how its result is written, the pose that moves it or its stamp."""
-
-    record: Record
-    target: Target
-    edge: Rigid | None
-    stamp: tuple[Path, ...] = ()
-
-
 class Template:
     """The text of records, and what holds for all that are written alike.
 
@@ -76,17 +65,26 @@ class Template:
     numbers: the stretches that hold our numbers, in order
     stamps: the stretches of each entry's stamp
     pieces: what the result is made of
-    notes: what is worth telling about it
+    notes: what is worth telling about all of them; own_notes: about the record that was learned alone
     """
 
     def __init__(
-        self, text: str, entries: Sequence[Entry], root: Node, edits: Sequence[Edit], request: Request, *, json: bool
+        self,
+        text: str,
+        entries: Sequence[Entry],
+        root: Node,
+        edits: Sequence[Edit],
+        request: Request,
+        notes: Sequence[Note] = (),
+        *,
+        json: bool,
     ) -> None:
         """Cut the text where numbers, stamps and edits are."""
         self.text = text
         self.entries = tuple(entries)
         self.json = json
-        self.notes = list(_notes(entries, request))
+        self.notes = list(_notes(entries))
+        self.own_notes = notes
         self._root = root
         self._request = request
         slots = [_inside(root, path) for entry in entries for path in entry.record.numbers]
@@ -95,7 +93,7 @@ class Template:
         self.regular = all(slot is not None and number.fullmatch(text, *slot) for slot in slots)
         self.values = tuple(value for entry in entries for value in entry.record.values)
         cuts = sorted({*(slot for slot in slots if slot is not None), *(span for spans in stamps for span in spans)})
-        self.stretches, self.pieces = _cut(len(text), cuts, edits)
+        self.stretches, self.pieces = cut(len(text), cuts, edits)
         at = {stretch: index for index, stretch in enumerate(self.stretches)}
         self.numbers = tuple(at[slot] for slot in slots if slot is not None)
         self.stamps = tuple(tuple(at[span] for span in spans) for spans in stamps)
@@ -105,7 +103,7 @@ class Template:
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """Return what the numbers mean."""
-        return tuple(entry.record.shape._replace(inverse=entry.record.inverse) for entry in self.entries)
+        return tuple(entry.record.shape for entry in self.entries)
 
     @cached_property
     def pattern(self) -> re.Pattern[bytes]:
@@ -154,6 +152,20 @@ class Template:
         """Return the text of each stretch."""
         return [self.text[start:end] for start, end in self.stretches]
 
+    def answers(self, request: Request) -> list[Answer]:
+        """Return what becomes of the records of the text that was learned from."""
+        texts, values = self.segments(), iter(self.values)
+        found = []
+        for entry, stamp in zip(self.entries, self.stamps, strict=True):
+            own = list(islice(values, entry.record.shape.size))
+            each = answer(entry, own, [texts[index] for index in stamp], request)
+            found += [] if each is None else [each]
+        return found
+
+    def with_numbers(self, numbers: Sequence[str], *, locked: bool) -> str:
+        """Return the text of the result."""
+        return filled(self.pieces, self.segments(), numbers, locked=locked)
+
     @cached_property
     def expression(self) -> bytes:
         """Return the regular expression, one group a stretch, that all records match that are alike."""
@@ -192,11 +204,11 @@ class Template:
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
 
 
-def _notes(entries: Sequence[Entry], request: Request) -> Iterator[RowNote]:
+def _notes(entries: Sequence[Entry]) -> Iterator[RowNote]:
     """Yield what is worth telling about the records of a text."""
     for entry in entries:
-        if lost := lost_name(entry.record, request):
-            yield RowNote.of_lost_name(0, lost)
+        if entry.lost:
+            yield RowNote.of_lost_name(0, entry.lost)
         if not entry.record.values and entry.record.shape.kind:
             yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
 
@@ -232,7 +244,7 @@ def _span(root: Node, path: Path) -> tuple[int, int]:
     return node.start, node.end
 
 
-def _cut(
+def cut(
     length: int, cuts: Sequence[tuple[int, int]], edits: Iterable[Edit]
 ) -> tuple[list[tuple[int, int]], list[Piece]]:
     """Cut a text into stretches, each number one of its own; return them with the pieces of the result."""
@@ -261,22 +273,36 @@ def _cut(
     return stretches, [piece for piece in pieces if not isinstance(piece, Out) or piece.last > piece.first]
 
 
+def filled(pieces: Sequence[Piece], texts: Sequence[str], numbers: Sequence[str], *, locked: bool = False) -> str:
+    """Put pieces together with the stretches of one text and the numbers of its result."""
+    shown = []
+    for piece in pieces:
+        if isinstance(piece, In):
+            shown.append(texts[piece.part])
+        elif isinstance(piece, Out):
+            shown.append(numbers[piece.first])
+        elif isinstance(piece, Const) or (locked and isinstance(piece, IfLocked)):
+            shown.append(piece.text.decode())
+    return "".join(shown)
+
+
 def learn(text: str, request: Request, *, json: bool, source: str, line: int) -> Template | None:
     """Learn from the text of one record; None if there is nothing in it.
 
     line: of the record's first character, from 1.  Raises FormatError with the place.
     """
     here = Source(source, text)
+    notes: list[Note] = []
     try:
         documents = _json_documents(here) if json else parse_documents(text, source)
-        entries = [entry for document in documents for entry in _entries(document, request, here)]
+        entries = [entry for document in documents for entry in read_entries(document, request, here, notes.extend)]
     except FormatError as error:
         error.line += line - 1
         raise
     if not entries:
         return None
     root = Node(0, len(text), parse_nodes(text))
-    return Template(text, entries, root, _edits(text, entries, root, request, json=json), request, json=json)
+    return Template(text, entries, root, edits_of(text, entries, root, request, json=json), request, notes, json=json)
 
 
 def nulled(text: str, *, json: bool) -> str | None:
@@ -290,7 +316,7 @@ def nulled(text: str, *, json: bool) -> str | None:
         return None
     if not edits:
         return None
-    segments, pieces = _cut(len(text), (), edits)
+    segments, pieces = cut(len(text), (), edits)
     shown = (text[slice(*segments[each.part])] if isinstance(each, In) else "null" for each in pieces)
     return "".join(shown)
 
@@ -302,64 +328,13 @@ def _json_documents(source: Source) -> list[Document]:
     return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
 
 
-def _entries(document: Document, request: Request, source: Source) -> list[Entry]:
-    """Read the records of a document, and say how each is moved."""
-    reading = Reading(source, degrees=request.degrees, normalize=request.normalize)
-    try:
-        records = list(find_records(document.value, request, reading, (document.index,)))
-        made = [_entry(document, record, request) for record in records]
-    except Misfit as misfit:
-        error = placed(misfit, source)
-        error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
-        raise error from misfit
-    return made
-
-
-def _entry(document: Document, record: Record, request: Request) -> Entry:
-    """Find the pose that moves a record, or the stamp at which it is looked up; check the frames it names."""
-    stamp: tuple[Path, ...] = ()
-    edge = None
-    timed = request.timed
-    if timed is not None and timed.name:
-        found = within((document.index,), key_path, document.value, record.path[1:], timed.name)
-        stamp = ((document.index, *found),)
-    elif timed is not None and record.stamp and timed.moves(record.parent.text):
-        stamp = record.stamp
-    elif timed is not None and request.operation.formula is not None:
-        stamp = ((document.index, *within((document.index,), stamp_keys, document.value, record.path[1:])),)
-    elif request.beside is not None:
-        stamp = beside_path(document, record, request.beside)
-    elif request.way is not None:
-        edge = request.way(record.parent.text)
-    request = request.for_kind(record.shape.kind)
-    if request.rename is not None:
-        request.rename(record.parent.text, record.name.text)
-    return Entry(record, target_of(record, request), edge, stamp)
-
-
-def beside_path(document: Document, record: Record, name: str) -> tuple[Path, ...]:
-    """Find what stands beside a record under a key; "" is the stamp of its header, or else under a usual key.
-
-    Raises Misfit.
-    """
-    if not name and record.stamp:
-        return record.stamp
-    holder = record.path[1:]
-    if name:
-        return ((document.index, *within((document.index,), key_path, document.value, holder, name)),)
-    try:
-        return ((document.index, *stamp_keys(document.value, holder)),)
-    except Misfit:
-        usual = ", ".join(STAMP_KEYS)
-        raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path) from None
-
-
-def _edits(text: str, entries: Sequence[Entry], root: Node, request: Request, *, json: bool) -> list[Edit]:
+def edits_of(text: str, entries: Sequence[Entry], root: Node, request: Request, *, json: bool) -> list[Edit]:
+    """Return what changes in a text; a name that several records share changes once."""
     edits: list[Edit] = []
     first = 0
     for entry in entries:
         shape = entry.record.shape
-        edits += Splicer(text, root, entry.record, entry.target, request, json=json, first=first).run()
+        edits += Splicer(text, root, entry, request, json=json, first=first).run()
         first += entry.target.size + len(request.operation.extras(shape.kind))
         first += COVARIANCE * (shape.covariance and request.operation.formula is None)
-    return edits
+    return list(dict.fromkeys(edits))

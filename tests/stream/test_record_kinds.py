@@ -13,9 +13,10 @@ from frametool.documents.source import Source
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.readers import Reading
+from frametool.stream.answers import Entry, answer
 from frametool.stream.record import find_records
 from frametool.stream.request import Operation, Request
-from frametool.stream.scalar import moved
+from frametool.stream.splice import target_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,7 +45,9 @@ class Moved:
         self.own = self.record.values[: self.record.shape.own_size]
 
     def by(self, edge: Any) -> Sequence[float]:
-        return moved(self.record, edge, self.record.values, REQUEST)[0]
+        made = answer(Entry(self.record, target_of(self.record, REQUEST), edge), self.record.values, (), REQUEST)
+        assert made is not None
+        return made.parts
 
 
 def read(**fields: Any) -> Moved:

@@ -75,7 +75,7 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     told = list(firsts.values())[:most]
     places = locate_many(source.text, [note.path for note in told])
     for (line, column), note in zip(places, told, strict=True):
-        place = source.name if isinstance(source, Pasted) else f"{source.name}:{line}:{column}"
+        place = source.name if isinstance(source, Pasted) else f"{source.name}:{source.first_line + line - 1}:{column}"
         again = counts.pop(_alike(note)) - 1
         warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}", rule=note.rule)
     if counts:

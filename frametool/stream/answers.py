@@ -1,0 +1,186 @@
+"""Records one by one, with plain floats: what each is asked, and the numbers and names of its result.
+
+For the few records of a typed line, of an argument or of a document, without numpy; `evaluate` does the same for
+blocks of rows.  Knows no text but that of stamps.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import FrametoolError, ValueInvalid
+from frametool.geometry import floats
+from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
+from frametool.grammar.readers import Misfit, Reading, within
+from frametool.stream.record import find_records, lost_name, placed, value_at
+from frametool.stream.row_layout import FLAT, LEAVES_PLANE, checked_rotation
+from frametool.stream.splice import target_of
+from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.documents.document import Document
+    from frametool.documents.source import Source
+    from frametool.geometry.types import Components, Rigid
+    from frametool.grammar.readers import Note, Path
+    from frametool.stream.record import Record
+    from frametool.stream.request import Memory, Request
+    from frametool.stream.row_layout import Target
+
+
+class Entry(NamedTuple):
+    """One record of a text and what is asked of it.
+
+    target: how its result is written
+    edge: the pose that moves it; None where there is none, or where its own time decides
+    stamp: the paths of that time, or of what else stands beside it: one, or seconds and nanoseconds
+    parent, name: the frames of its result
+    lost: a frame that the record names and the result cannot
+    """
+
+    record: Record
+    target: Target
+    edge: Rigid | None
+    stamp: tuple[Path, ...] = ()
+    parent: str | None = None
+    name: str | None = None
+    lost: str = ""
+
+
+class Answer(NamedTuple):
+    """What became of a record: the components of its result; whether its rotation had to be normalised."""
+
+    entry: Entry
+    parts: Components
+    mended: bool
+
+
+def read_entries(
+    document: Document, request: Request, source: Source, note: Callable[[list[Note]], object]
+) -> list[Entry]:
+    """Read the records of a document, and what each is asked; what is odd about them goes to `note`.
+
+    Raises FormatError with the place of a record that cannot be read.
+    """
+    reading = Reading(source, degrees=request.degrees, normalize=request.normalize)
+    try:
+        records = list(find_records(document.value, request, reading, (document.index,)))
+        note(reading.notes)
+        return [_entry(document, record, request) for record in records]
+    except Misfit as misfit:
+        error = placed(misfit, source)
+        error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
+        raise error from misfit
+
+
+def _entry(document: Document, record: Record, request: Request) -> Entry:
+    """Find the pose that moves a record, or the stamp at which it is looked up; check the frames it names."""
+    stamp: tuple[Path, ...] = ()
+    edge = None
+    timed = request.timed
+    if timed is not None and timed.name:
+        stamp = (_beside(key_path, document, record, timed.name),)
+    elif timed is not None and record.stamp and timed.moves(record.parent.text):
+        stamp = record.stamp
+    elif timed is not None and request.operation.formula is not None:
+        stamp = (_beside(stamp_keys, document, record),)
+    elif request.beside is not None:
+        stamp = _path_beside(document, record, request.beside)
+    elif request.way is not None:
+        edge = request.way(record.parent.text)
+    request = request.for_kind(record.shape.kind)
+    parent, name = record.parent.text, record.name.text
+    if request.rename is not None:
+        parent, name = request.rename(parent, name)
+    return Entry(record, target_of(record, request), edge, stamp, parent, name, lost_name(record, request))
+
+
+def _path_beside(document: Document, record: Record, name: str) -> tuple[Path, ...]:
+    """Find what stands beside a record under a key; "" is the stamp of its header, or else under a usual key."""
+    if name:
+        return (_beside(key_path, document, record, name),)
+    try:
+        return record.stamp or (_beside(stamp_keys, document, record),)
+    except Misfit:
+        usual = ", ".join(STAMP_KEYS)
+        raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path) from None
+
+
+def _beside(find: Callable[..., Path], document: Document, record: Record, *name: str) -> Path:
+    """Find a scalar around a record; raises Misfit."""
+    return (document.index, *within((document.index,), find, document.value, record.path[1:], *name))
+
+
+def texts_of_stamp(document: Document, entry: Entry) -> list[str]:
+    """Return the texts of an entry's stamp."""
+    return [str(value_at(document.value, path[1:])) for path in entry.stamp]
+
+
+def answer(
+    entry: Entry, values: Sequence[float], stamp: Sequence[str], request: Request, memory: Memory | None = None
+) -> Answer | None:
+    """Return what becomes of a record; None for the first of all where a velocity needs the one before.
+
+    values: its numbers; stamp: the texts of its own time; memory: of the records before
+    Raises ValueInvalid for what is no rotation, FrametoolError where there is no pose at its time.
+    """
+    operation, shape, timed = request.operation, entry.record.shape, request.timed
+    edge, at_ns = entry.edge, None
+    if stamp and (timed is not None or operation.velocity):
+        try:
+            at_ns = _stamp_ns(entry, stamp)
+            if timed is not None and operation.formula is None:
+                edge = timed.pose(entry.record.parent.text, at_ns)
+        except FrametoolError as error:
+            error.column_name = timed.column if timed else str(entry.stamp[0][-1])  # type: ignore[attr-defined]
+            raise
+    seconds = memory.step(at_ns) if operation.velocity and memory and at_ns is not None else None
+    warned: list[tuple[str, str]] = []
+
+    def rotation(own: Components) -> Components:
+        quaternion, warnings = checked_rotation(shape, own, normalize=request.normalize)
+        warned.extend(warnings)
+        return quaternion
+
+    def compared(pose: Rigid) -> list[Rigid]:
+        return memory.pair(operation.of, pose) if memory and operation.looks_back else [pose]
+
+    parts = operation.result(
+        shape, tuple(values), edge, floats, rotation=rotation, compared=compared, seconds=lambda: seconds or 1.0,
+        times_ns=at_ns,
+    )  # fmt: skip
+    return None if operation.velocity and seconds is None else Answer(entry, parts, bool(warned))
+
+
+def _stamp_ns(entry: Entry, texts: Sequence[str]) -> int:
+    if len(texts) > 1:
+        return read_header_stamp(*texts)
+    return read_stamp(texts[0], in_ns=in_nanoseconds(str(entry.stamp[0][-1])))
+
+
+def written(each: Answer) -> list[float]:
+    """Return the numbers of a result as they are written; raises ValueInvalid for one that leaves the plane."""
+    target = each.entry.target
+    for name, number in target.left_out(each.parts, floats):
+        if abs(number) > FLAT:
+            raise ValueInvalid(LEAVES_PLANE.format(name, number))
+    numbers = target.written(each.parts, floats)
+    if not all(map(isfinite, numbers)):
+        raise ValueInvalid("the result is not finite: the numbers are too large")
+    return numbers
+
+
+def number_writer(precision: int | None, *, yaml: bool) -> Callable[[float], str]:
+    """Return what writes a number as the bulk of a stream does."""
+    if precision is not None:
+        return lambda value: f"{value:.{precision}f}"
+    if not yaml:
+        return repr
+
+    def write(value: float) -> str:
+        text = repr(value)
+        return text if "e" not in text or "." in text else text.replace("e", ".0e")
+
+    return write
