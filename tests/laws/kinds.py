@@ -40,7 +40,7 @@ class Kind(NamedTuple):
     parent: str | None = "base"
     name: str | None = "tool"
     stamp_ns: int | None = None
-    count: int = 1
+    poses: int = 1
 
 
 def pose(rotation: dict[str, Any], cells: dict[str, Any], *, at: bool = True) -> Kind:
@@ -49,9 +49,9 @@ def pose(rotation: dict[str, Any], cells: dict[str, Any], *, at: bool = True) ->
     return Kind(record, NAMES | (XYZ_CELLS if at else {}) | cells)
 
 
-def message(record: dict[str, Any], cells: dict[str, Any] | None = None, name: str | None = None, count: int = 1) -> Kind:
+def message(record: dict[str, Any], cells: dict[str, Any] | None = None, name: str | None = None, poses: int = 1) -> Kind:
     """Make a message with a header."""
-    return Kind({"header": HEADER} | record, cells, name=name, stamp_ns=STAMP_NS, count=count)
+    return Kind({"header": HEADER} | record, cells, name=name, stamp_ns=STAMP_NS, poses=poses)
 
 
 POSES = {
@@ -104,8 +104,8 @@ WITH_COVARIANCE = {
     ),
 }
 LISTS = {
-    "PoseArray": message({"poses": [POSE, POSE]}, count=2),
-    "Path": message({"poses": [{"header": HEADER, "pose": POSE}] * 2}, count=2),
+    "PoseArray": message({"poses": [POSE, POSE]}, poses=2),
+    "Path": message({"poses": [{"header": HEADER, "pose": POSE}] * 2}, poses=2),
 }
 POINTS = {
     "point": Kind({"frame": "base", "point": LIST}, {"frame": "base"} | XYZ_CELLS, name=None),

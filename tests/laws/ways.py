@@ -26,7 +26,7 @@ class Way(NamedTuple):
     argument: str
     stdin: str = ""
     files: Mapping[str, str] = {}
-    count: int = 1
+    rows: int = 1
     source: str = "stdin"
 
 
@@ -79,9 +79,9 @@ def ways(form: str, record: Any, cells: Mapping[str, Any] | None = None, *, by_n
         suffix = TEXTS[form][0] if form in TEXTS else "csv"
         for count in (1, TWENTY):
             text = TEXTS[form][1](record, count) if form in TEXTS else table(cells or {}, count)
-            yield Way("-", stdin=text, count=count)
+            yield Way("-", stdin=text, rows=count)
         if by_name:
-            yield Way("-", files={f"rows.{suffix}": text}, count=TWENTY, source=f"rows.{suffix}")
+            yield Way("-", files={f"rows.{suffix}": text}, rows=TWENTY, source=f"rows.{suffix}")
 
 
 def given(run: Run, arguments: Sequence[str], way: Way) -> Outcome:
@@ -182,7 +182,7 @@ def _first(record: Any, keys: Sequence[str]) -> str | None:
 def _stamp_ns(record: Any) -> int | None:
     stamp = record.get("header", record).get("stamp")
     if isinstance(stamp, dict):
-        return int(stamp.get("sec", stamp.get("secs"))) * BILLION + int(stamp.get("nanosec", stamp.get("nsecs")))
+        return int(stamp["sec"]) * BILLION + int(stamp["nanosec"])
     if "stamp_ns" in record:
         return int(record["stamp_ns"])
     if stamp is None:
