@@ -182,7 +182,8 @@ def _first(record: Any, keys: Sequence[str]) -> str | None:
 def _stamp_ns(record: Any) -> int | None:
     stamp = record.get("header", record).get("stamp")
     if isinstance(stamp, dict):
-        return int(stamp["sec"]) * BILLION + int(stamp["nanosec"])
+        whole, below = stamp.values()
+        return int(whole) * BILLION + int(below)
     if "stamp_ns" in record:
         return int(record["stamp_ns"])
     if stamp is None:
