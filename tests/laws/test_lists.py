@@ -78,14 +78,16 @@ QUADRATIC = {("PoseArray", "json", ""), ("PoseArray", "yaml", ""), ("list", "yam
 AT_FAULT = "seam: writing: each pose of a document is cut out of the whole of it once more"
 
 
-def took(run: Run, arguments: tuple[str, ...], text: str) -> float:
-    """Take the processor time of a command, the least of three."""
-    times = []
+def took(run: Run, arguments: tuple[str, ...], text: str, enough: float) -> float:
+    """Take the processor time of a command, the least of three; stop where it is enough."""
+    least = float("inf")
     for _ in range(3):
         begun = time.process_time()
         assert run(*arguments, stdin=text).status == 0
-        times.append(time.process_time() - begun)
-    return min(times)
+        least = min(least, time.process_time() - begun)
+        if least < enough:
+            break
+    return least
 
 
 @pytest.mark.parametrize(
@@ -102,8 +104,9 @@ def took(run: Run, arguments: tuple[str, ...], text: str) -> float:
 )  # fmt: skip
 def test_the_poses_of_one_document_cost_time_in_proportion(run: Run, kind: str, form: str, into: str) -> None:
     arguments = (*MOVE, *(("-f", into) if into else ()))
-    times = []
+    times = [0.0]
     for count in (100, 400):
         text = TEXTS[form.replace("argument", "json")][0](MANY[kind](count))
-        times.append(took(run, (*arguments, text), "") if form == "argument" else took(run, arguments, text))
-    assert times[1] < 8 * times[0]
+        given = ((*arguments, text), "") if form == "argument" else (arguments, text)
+        times.append(took(run, *given, 8 * times[-1]))
+    assert times[2] < 8 * times[1]
