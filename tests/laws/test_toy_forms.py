@@ -77,8 +77,8 @@ class Done(NamedTuple):
     err: str
 
 
-def run(folder: Path, row: str, *arguments: str, stdin: bytes = b"", **environment: str) -> Done:
-    """Run the command line in a new interpreter that has the row."""
+def run(folder: Path, row: str, *arguments: str, stdin: bytes = b"", words: str = "") -> Done:
+    """Run the command line in a new interpreter that has the row; words: ask what completes them."""
     (folder / "toy_bars.py").write_text(BARS)
     (folder / "toy_doubles.py").write_text(DOUBLES)
     (folder / "tree.yaml").write_text(TREE)
@@ -88,9 +88,10 @@ def run(folder: Path, row: str, *arguments: str, stdin: bytes = b"", **environme
         f"import sys; sys.path[:0] = [{str(folder)!r}, {str(ROOT)!r}]\nfrom frametool.formats import FORMATS\n{row}\n"
         f"from frametool.cli import run; sys.exit(run({list(arguments)!r}))"
     )
+    completion = {"COMP_WORDS": words, "COMP_CWORD": "3", "_FRAMETOOL_COMPLETE": "bash_complete"} if words else {}
     done = subprocess.run(
         [sys.executable, "-c", code], input=stdin, capture_output=True, check=False, cwd=folder,
-        env={"PATH": "", "COLUMNS": "100", "NO_COLOR": "1", **environment},
+        env={"PATH": "", "COLUMNS": "100", "NO_COLOR": "1", **completion},
     )  # fmt: skip
     return Done(done.returncode, done.stdout, done.stderr.decode())
 
@@ -160,8 +161,7 @@ def test_what_is_wrong_in_a_made_up_row_names_its_line(tmp_path: Path) -> None:
 def test_help_lists_and_completes_a_made_up_form(tmp_path: Path) -> None:
     assert b"bars" in run(tmp_path, ROWS, "convert", "--help").out
     assert b"a toy trajectory" in run(tmp_path, ROWS, "formats").out
-    words = {"COMP_WORDS": "frametool convert --in ba", "COMP_CWORD": "3", "_FRAMETOOL_COMPLETE": "bash_complete"}
-    assert b"bars" in run(tmp_path, ROWS, **words).out
+    assert b"bars" in run(tmp_path, ROWS, words="frametool convert --in ba").out
 
 
 def doubles(rows: list[list[float]]) -> bytes:
@@ -182,7 +182,7 @@ def test_columns_of_a_made_up_form_are_moved(tmp_path: Path) -> None:
     assert done.status == 0, done.err
     assert (tmp_path / "moved.doubles").read_bytes() == doubles([[x + 1.0, y, z] for x, y, z in POINTS])
     done = run(tmp_path, ARRAYS, "apply", "tree.yaml", "map", "world", "-i", "points.doubles", "-f", "csv")
-    assert done.out.decode() == "x,y,z\n-1.0,3.0,6.0\n-4.0,6.0,9.0\n"
+    assert done.out.decode() == "frame,x,y,z\nmap,-1.0,3.0,6.0\nmap,-4.0,6.0,9.0\n"
     done = run(tmp_path, ARRAYS, "apply", "--transform", "{xyz: [1, 0, 0]}", "--in", "doubles", "-f", "csv", stdin=doubles(POINTS))
     assert done.out.decode() == "x,y,z\n2.0,2.0,3.0\n5.0,5.0,6.0\n"
 
