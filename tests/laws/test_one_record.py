@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 TREE = {"tree.yaml": "frames:\n  map:\n    base: {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}\n"}
 MAP_FROM_BASE = "{name: base, parent: map, xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
-BLOCKS = tuple(form for form in STREAMS if form != "flow documents")
+BLOCKS = ("lines", "documents", "table")
 BASE_FROM_OTHER = "{name: other, parent: base, xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
 
 
@@ -26,7 +26,7 @@ class Operation(NamedTuple):
     kinds: dict[str, Kind]
     parent: str
     name: str = "tool"
-    forms: tuple[str, ...] = (*ARGUMENTS, *BLOCKS)
+    forms: tuple[str, ...] = ("argument", *BLOCKS)
 
 
 IN_QUATERNIONS = ("--to", "quaternion", "-f", "json")
@@ -38,11 +38,14 @@ OPERATIONS = {
         forms=(*ARGUMENTS, *STREAMS),
     ),
     "invert": Operation(("invert", *IN_QUATERNIONS), POSES_AND_POINTS | WITH_COVARIANCE, "tool", "base"),
-    "compose": Operation(("compose", *IN_QUATERNIONS, MAP_FROM_BASE), POSES_AND_POINTS | WITH_COVARIANCE, "map"),
+    "compose": Operation(
+        ("compose", *IN_QUATERNIONS, MAP_FROM_BASE), POSES_AND_POINTS | WITH_COVARIANCE, "map",
+        forms=(*ARGUMENTS, *BLOCKS),
+    ),
     "relative": Operation(("relative", *IN_QUATERNIONS, BASE_FROM_OTHER), POSES_AND_POINTS, "other"),
     "move": Operation(
         ("apply", "--transform", MAP_FROM_BASE, *IN_QUATERNIONS), without(KINDS, *NOTATIONS), "map",
-        forms=("argument", *BLOCKS),
+        forms=("argument", "array", *BLOCKS),
     ),
     "move by a tree": Operation(
         ("apply", "tree.yaml", "map", *IN_QUATERNIONS), {name: KINDS[name] for name in FEW}, "map",
