@@ -183,7 +183,7 @@ def _stamp_ns(record: Any) -> int | None:
     stamp = record.get("header", record).get("stamp")
     if isinstance(stamp, dict):
         whole, below = stamp.values()
-        return int(whole) * BILLION + int(below)
+        return whole * BILLION + below if (type(whole), type(below)) == (int, int) else None
     if "stamp_ns" in record:
         return int(record["stamp_ns"])
     if stamp is None:
