@@ -1,0 +1,160 @@
+"""What a result is made of: the same names, members and numbers for a record as for a row."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+from ways import PARENTS, TWENTY, document, readings, table, values
+
+if TYPE_CHECKING:
+    from ways import Run
+
+MAP_FROM_BASE = "{name: base, parent: map, xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
+TREE = {"tree.yaml": "frames:\n  map:\n    base: {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}\n"}
+NUMBERS = {"x": 1.0, "y": 2.0, "z": 3.0, "qx": 0.5, "qy": -0.5, "qz": 0.5, "qw": 0.5}
+COMMANDS = {
+    "convert": (("convert",), ("base", "tool")),
+    "invert": (("invert",), ("tool", "base")),
+    "compose": (("compose", MAP_FROM_BASE, "-"), ("map", "tool")),
+    "relative": (("relative", "{name: other, parent: base, xyz: [1, 0, 0]}", "-"), ("other", "tool")),
+    "apply --transform": (("apply", "--transform", MAP_FROM_BASE), ("map", "tool")),
+    "apply TREE": (("apply", "tree.yaml", "map"), ("map", "tool")),
+}
+UNKNOWN = pytest.mark.xfail(strict=True, reason="seam: names: parent_frame_id is no name of a frame in a table")
+
+
+@pytest.mark.parametrize(
+    ("command", "form"),
+    [
+        pytest.param(command, form, marks=UNKNOWN if form == "csv" and command != "convert" else [])
+        for command in COMMANDS
+        for form in ("csv", "json", "yaml")
+    ],
+)
+@pytest.mark.parametrize("into", ["json", "yaml"])
+def test_parent_frame_id_names_the_frame_as_column_and_as_key(run: Run, command: str, form: str, into: str) -> None:
+    arguments, names = COMMANDS[command]
+    record = {"parent_frame_id": "base", "child_frame_id": "tool", **NUMBERS}
+    texts = {"csv": table(record, TWENTY), "json": (json.dumps(record) + "\n") * TWENTY, "yaml": "---\n".join([document(record)] * TWENTY)}
+    out = run(*arguments, "-f", into, stdin=texts[form], files=TREE).out
+    assert [(each.parent, each.name) for each in readings(out, into)] == [names] * TWENTY
+    assert all(sum(key in each for key in PARENTS) == 1 for each in values(out, into))
+
+
+@pytest.mark.parametrize("rows", [1, TWENTY])
+@pytest.mark.xfail(strict=True, reason="seam: names: parent_frame_id is no name of a frame in a table")
+def test_a_table_with_parent_frame_id_stays_one(run: Run, rows: int) -> None:
+    record = {"parent_frame_id": "base", "child_frame_id": "tool", **NUMBERS}
+    found = run("invert", stdin=table(record, rows)).out.splitlines()
+    assert [row.split(",")[:2] for row in found] == [["parent_frame_id", "child_frame_id"]] + [["tool", "base"]] * rows
+
+
+TURN = "{rpy: [0.1, 0.2, 0.3]}"
+ON_A_TURN = {"apply": ("apply", "--transform", TURN), "compose": ("compose", TURN), "relative": ("relative", TURN)}
+ROTVEC = {"rotvec": [0.1, 0.2, 0.3]}
+POSE_OUT = "seam: result members: a rotation of a rotation gains a position of zeros where it is not a row"
+CRASHES = "seam: writing: a row without a position and with a distance ends in a traceback as a record"
+
+
+def of_a_turn(command: str, way: str) -> list[pytest.MarkDecorator]:
+    """Mark what does not hold yet."""
+    if way.startswith("row"):
+        return [pytest.mark.xfail(strict=True, reason=CRASHES)] if command == "relative" else []
+    return [pytest.mark.xfail(strict=True, reason=POSE_OUT)]
+
+
+@pytest.mark.parametrize(
+    ("command", "way"),
+    [
+        pytest.param(command, way, marks=of_a_turn(command, way))
+        for command in ON_A_TURN
+        for way in ("argument", "line", "lines", "row", "rows")
+    ],
+)
+def test_a_rotation_of_a_rotation_is_a_rotation(run: Run, command: str, way: str) -> None:
+    rows = TWENTY if way in ("lines", "rows") else 1
+    line = json.dumps(ROTVEC)
+    if way == "argument":
+        done = run(*ON_A_TURN[command], "-f", "json", line)
+    elif way.startswith("line"):
+        done = run(*ON_A_TURN[command], "-", "-f", "json", stdin=f"{line}\n" * rows)
+    else:
+        done = run(*ON_A_TURN[command], "-", "-f", "json", stdin="rotvec_x,rotvec_y,rotvec_z\n" + "0.1,0.2,0.3\n" * rows)
+    assert [each.kind for each in readings(done.out)] == ["rotation"] * rows
+
+
+SIGNED = {
+    "rotvec": ("0 0 0.5", "0 0 3.5"),
+    "rpy": ("0 0 0.5", "0.5 0 0"),
+    "axis_angle": ("0 0 1 0.5", "1 0 0 0"),
+    "matrix": ("1 0 0 0 1 0 0 0 1", "0 -1 0 1 0 0 0 0 1"),
+    "mrp": ("0 0 0.1", "0.1 0 0"),
+    "xyzw": ("0 0 0.6 0.8", "0 0 0 1"),
+}
+SIGN = pytest.mark.xfail(strict=True, reason="seam: evaluating: an inverse has the zeros of its input with a minus")
+
+
+@pytest.mark.parametrize("form", ["json", "yaml", "csv"])
+@pytest.mark.parametrize("rows", [1, TWENTY])
+@pytest.mark.parametrize("notation", [pytest.param(name, marks=SIGN if name in ("rotvec", "matrix") else []) for name in SIGNED])
+def test_nothing_computed_is_a_negative_zero(run: Run, notation: str, rows: int, form: str) -> None:
+    for numbers in SIGNED[notation]:
+        done = run("invert", "--from", notation, "--to", notation, "-f", form, stdin=f"{numbers}\n" * rows)
+        assert done.status == 0
+        assert not re.search(r"-0\.0\b", done.out)
+
+
+NO_POSE = {
+    "argument": "reading: an argument that parses and is no pose ends with 2",
+    "file": "reading: a record with a frame and a twist or wrench is taken for a calibration of Autoware",
+    "line": "reading: a record with a frame and a twist or wrench is taken for a calibration of Autoware",
+    "array": "",
+    "document": "reading: a record with a frame and a twist or wrench is taken for a calibration of Autoware",
+}
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        pytest.param(way, marks=[pytest.mark.xfail(strict=True, reason=f"seam: {reason}")] if reason else [])
+        for way, reason in NO_POSE.items()
+    ],
+)
+@pytest.mark.parametrize("kind", ["twist", "wrench"])
+@pytest.mark.parametrize("command", ["convert", "invert"])
+def test_what_is_no_pose_is_refused_for_that_reason_on_every_way(run: Run, command: str, kind: str, way: str) -> None:
+    parts = ("linear", "angular") if kind == "twist" else ("force", "torque")
+    record = {"frame": "base", kind: {part: {"x": 1.0, "y": 2.0, "z": 3.0} for part in parts}}
+    line = json.dumps(record)
+    texts = {"line": f"{line}\n", "array": f"[{line}]\n", "document": document(record)}
+    if way in texts:
+        done = run(command, stdin=texts[way])
+    else:
+        done = run(command, line if way == "argument" else "one.json", files={"one.json": f"{line}\n"})
+    assert f"a {kind} cannot be taken for a pose" in done.err
+    assert (done.status, done.out) == (1, "")
+
+
+IMU = {
+    "header": {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "base"},
+    "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+    "angular_velocity": {"x": 1.0, "y": 0.0, "z": 0.0},
+    "linear_acceleration": {"x": 0.0, "y": 0.0, "z": 9.5},
+}
+
+
+@pytest.mark.parametrize("way", ["argument", "line", "lines", "document"])
+@pytest.mark.xfail(strict=True, reason="seam: result members: an Imu names the new frame with the vectors of the old one")
+def test_what_names_another_frame_has_moved_whole_or_is_refused(run: Run, way: str) -> None:
+    line = json.dumps(IMU)
+    texts = {"line": f"{line}\n", "lines": f"{line}\n" * TWENTY, "document": document(IMU)}
+    done = run("apply", "--transform", MAP_FROM_BASE, "-f", "json", *([line] if way == "argument" else ["-"]), stdin=texts.get(way, ""))
+    if done.status in (1, 2):
+        assert done.out == ""
+        return
+    for found in values(done.out):
+        assert found["header"]["frame_id"] == "map"
+        assert found["angular_velocity"] == {"x": 0.0, "y": 1.0, "z": 0.0}
