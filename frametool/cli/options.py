@@ -354,15 +354,14 @@ def _names_in(path: str) -> list[str]:
     from frametool.errors import FrametoolError
     from frametool.formats.detect import Beginning, detect
     from frametool.stream.table import open_table
-    from frametool.stream.table_stream import DELIMITERS
 
     try:
         with open(path, "rb") as file:
             head = file.read(HEAD)
         form, _ = detect(head, "rows", "records", name=path)
-        if form not in DELIMITERS:
+        if not FORMATS[form].is_table:
             return sorted(".".join(each) for each in Beginning(head).json_paths)
-        return list(open_table(head, DELIMITERS[form], header=True, source=path)[0].names or ())
+        return list(open_table(head, form, header=True, source=path)[0].names or ())
     except (OSError, FrametoolError):
         return []  # nothing to offer, and a completion must not print
 

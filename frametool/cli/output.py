@@ -110,9 +110,9 @@ class Output:
         """Yield the poses of a trajectory, or columns of numbers, block after block."""
         from frametool.stream.row_layout import POSE
         from frametool.stream.row_poses import block_of
-        from frametool.stream.writers import ArrayWriter, PoseWriter
+        from frametool.stream.writers import ArrayWriter, TextWriter
 
-        writer = ArrayWriter(self.style, POSE) if self._holds_arrays else PoseWriter(self.style)
+        writer = (ArrayWriter if self._holds_arrays else TextWriter)(self.style, POSE)
         while batch := list(islice(results, BLOCK)):
             yield bytes(writer.of_block(block_of(batch)))
         ended = writer.end()

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 MOST_JOBS = 256
 _STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
-TABLES = ("tum", "euroc", "kitti")  # trajectories whose lines are rows
 OPTIONS = {
     "input_path": click.option(
         "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
@@ -188,7 +187,7 @@ class Stream:
             if holds_arrays(form) and (stays or request.gathered is not None):
                 return self._run_columns(stream, form, request, output)
             kindred = output.told == "csv" and form in ("tsv", "semicolon")
-            listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and form not in TABLES
+            listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and not FORMATS[form].is_table
             listed |= holds_arrays(form)
             if request.gathered is not None and not listed:
                 return self._gather(stream, form, request._replace(notations=()), name)

@@ -5,6 +5,23 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
+class Poses(NamedTuple):
+    """How a form writes its poses.
+
+    rotation: the notation of the numbers behind the position
+    inverse: what is written is the pose of the world in the thing, not of the thing in the world
+    axes: those of a camera, `optical` or `opengl`
+    frames: how the two are called where nothing says so
+    counted: what the numbers are that stand in for stamps; "" where rows have stamps
+    """
+
+    rotation: str
+    inverse: bool = False
+    axes: str = ""
+    frames: tuple[str, str] = ("world", "body")
+    counted: str = "numbers of poses"
+
+
 class Format(NamedTuple):
     """A form of text: what it holds, how it is recognised, and the modules that read and write it.
 
@@ -20,6 +37,9 @@ class Format(NamedTuple):
     asks: the options that say what it leaves open
     loses: what a tree written in it may have had and it does not hold, told then
     instead: of a form that is known and not read: what to do
+    delimiter: what stands between the cells of its rows, "" for blanks; None where it has no such rows
+    columns: what its rows hold, in order, where no header says so; widths: how many of them, where others are refused
+    poses: what its rows mean, of a trajectory
     """
 
     summary: str
@@ -34,6 +54,15 @@ class Format(NamedTuple):
     loses: str = ""
     instead: str = ""
     names: tuple[str, ...] = ()
+    delimiter: str | None = None
+    columns: tuple[str, ...] = ()
+    widths: tuple[int, ...] = ()
+    poses: Poses | None = None
+
+    @property
+    def is_table(self) -> bool:
+        """Tell whether its lines are rows of cells."""
+        return self.delimiter is not None
 
 
 # what options say about files whose form leaves it open
@@ -70,6 +99,13 @@ _KITTI = (
     r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
 )
 
+_EUROC = (
+    "#timestamp [ns]", "p_RS_R_x [m]", "p_RS_R_y [m]", "p_RS_R_z [m]", "q_RS_w []", "q_RS_x []", "q_RS_y []",
+    "q_RS_z []", "v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]", "b_w_RS_S_x [rad s^-1]",
+    "b_w_RS_S_y [rad s^-1]", "b_w_RS_S_z [rad s^-1]", "b_a_RS_S_x [m s^-2]", "b_a_RS_S_y [m s^-2]",
+    "b_a_RS_S_z [m s^-2]",
+)  # fmt: skip
+
 FORMATS = {
     "yaml": Format(
         "YAML: trees, poses, documents parted by ---",
@@ -102,6 +138,7 @@ FORMATS = {
         writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.rows.csv",
         signs=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
+        delimiter=",",
     ),
     "tsv": Format(
         "tab-separated values with a header",
@@ -109,14 +146,21 @@ FORMATS = {
         reads=("tree", "rows"),
         reader=_TABLE,
         signs=(("header", r".*\t"),),
+        delimiter="\t",
     ),
     "semicolon": Format(
         "CSV with semicolons and a header",
         reads=("tree", "rows"),
         reader=_TABLE,
         signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),),
+        delimiter=";",
     ),
-    "columns": Format("columns between blanks, # comments", reads=("rows",), signs=(("header", r"#|\s*\S+\s+\S"),)),
+    "columns": Format(
+        "columns between blanks, # comments",
+        reads=("rows",),
+        signs=(("header", r"#|\s*\S+\s+\S"),),
+        delimiter="",
+    ),
     "tum": Format(
         "trajectory: t x y z qx qy qz qw",
         suffixes=(".tum",),
@@ -127,6 +171,9 @@ FORMATS = {
         signs=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
         states="world<-body, seconds, metres, quaternion x y z w",
         asks=("frames",),
+        delimiter="",
+        columns=("t", "x", "y", "z", "qx", "qy", "qz", "qw"),
+        poses=Poses("xyzw", counted=""),
     ),
     "echo": Format(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
@@ -198,6 +245,10 @@ FORMATS = {
         ),
         states="world<-body (R<-S), nanoseconds, metres, quaternion w x y z",
         asks=("frames",),
+        delimiter=",",
+        columns=_EUROC,
+        widths=(8, 17),
+        poses=Poses("wxyz", counted=""),
     ),
     "colmap": Format(
         "COLMAP images.txt",
@@ -233,6 +284,10 @@ FORMATS = {
         signs=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),),
         states="world<-cam0, metres",
         asks=("frames", "stamps", "camera_axes"),
+        delimiter="",
+        columns=("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"),
+        widths=(12,),
+        poses=Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),
     ),
     "g2o": Format(
         "g2o pose graph",

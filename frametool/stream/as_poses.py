@@ -27,16 +27,17 @@ from frametool.stream.row_poses import RowPoses, TablePoses, chosen_poses, kept,
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, RowNote, notes_of
 from frametool.stream.table import rename_of
-from frametool.stream.table_samples import FORMS, TABLE
-from frametool.stream.table_stream import DELIMITERS, begin_table, moves_in_time, settle_stamps
-from frametool.stream.writers import ArrayWriter, PointWriter, PoseWriter
+from frametool.stream.table_samples import TABLE
+from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
+from frametool.stream.writers import ArrayWriter, TextWriter
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
     from io import BufferedReader
 
-    from frametool.formats.rows.trajectory import PoseBlock, Poses
+    from frametool.formats.rows.trajectory import PoseBlock
+    from frametool.formats.table import Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
     from frametool.stream.request import Request
@@ -62,7 +63,7 @@ class OtherForm:
         self.source = source
         self.answers = answers
         self.tally = Tally()
-        self.is_table = form in DELIMITERS
+        self.is_table = FORMATS[form].is_table
         self.module: Any = None if self.is_table else import_module(FORMATS[form].reader)
         self.style = style.in_form(style.form)
         self.request = request._replace(whole=True, notations=(QUATERNION,), keep_sign=True)
@@ -72,7 +73,7 @@ class OtherForm:
 
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
-        writer: PoseWriter | PointWriter | ArrayWriter | None = None
+        writer: TextWriter | ArrayWriter | None = None
         if self.is_table:
             steps = self._rows(stream, header=header)
         else:
@@ -97,16 +98,15 @@ class OtherForm:
         for told in self.tally.told():
             warn(f"{self.source}:{told.line}: {told.message}")
 
-    def _writer(self) -> PoseWriter | PointWriter | ArrayWriter:
+    def _writer(self) -> TextWriter | ArrayWriter:
         """Choose what writes the results, by what they are."""
         operation = self.request.operation
         kind = operation.result_kind(self.shape.kind)
         extras = [self.request.prefix + name for name in operation.extras(self.shape.kind)]
         if operation.only_adds or kind not in (POSE, POINT, VECTOR) or (extras and kind != POSE):
             raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
-        if self.to_arrays:
-            return ArrayWriter(self.style, kind, extras, placed=self.placed)
-        return PointWriter(self.style, kind) if kind != POSE else PoseWriter(self.style, extras, placed=self.placed)
+        writer = ArrayWriter if self.to_arrays else TextWriter
+        return writer(self.style, kind, extras, placed=self.placed)
 
     def _turned(self, form: Poses) -> Request:
         """Return the request with the axes of cameras turned if that was asked for; keep what they then are."""
@@ -122,7 +122,7 @@ class OtherForm:
 
     def _rows(self, stream: BufferedReader, *, header: bool) -> Iterator[Step]:
         """Yield the rows of a table."""
-        form = FORMS.get(self.form, TABLE)
+        form = FORMATS[self.form].poses or TABLE
         request = self._turned(form)
         begun = begin_table(stream, self.form, request, source=self.source, header=header)
         request, unasked = settle_stamps(begun.table, request, self.source)
@@ -152,7 +152,7 @@ class OtherForm:
             )
         if self.stamps:
             self.stamps.finish(count, self.source)
-        if self.form in FORMS:
+        if FORMATS[self.form].poses:
             describe(Options(self.tally, Topics(), answers=self.answers), form, count, named=False)
 
     def _stamps(self, poses: RowPoses, form: Poses, before: int) -> Any:

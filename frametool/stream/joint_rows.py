@@ -139,9 +139,8 @@ def names_in(begin: bytes, form: str, source: str, *, header: bool = True) -> li
     if echoed(begin):
         return _echoed_names(begin, source)
     from frametool.stream.table import open_table
-    from frametool.stream.table_stream import DELIMITERS
 
-    table, _ = open_table(begin, DELIMITERS[form], header=header, source=source)
+    table, _ = open_table(begin, form, header=header, source=source)
     if table.names is None:
         raise FormatError("the columns have no names, so that none is a joint", source=source, line=1)
     return list(table.names)

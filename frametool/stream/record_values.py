@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
     Value = Result | dict[str, Any]
 
-TABLES = ("csv", "text")  # in which a thing is one line
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
@@ -201,13 +200,14 @@ def _values(
     if inside and style.form in MESSAGES and keeps and request.operation.moves:
         yield spliced.at(unit)
         return
+    is_list = type(node.value) is list
     for each in answers:
         kind = each.entry.record.shape.kind
         if request.operation.formula is not None:
             yield _formula_result(node, unit, each, request)
         elif kind == POSE:
             yield _pose_result(node, unit, each, request, style)
-        elif style.form in TABLES or holds_arrays(style.form) or type(node.value) is list:
+        elif style.form == "csv" or holds_arrays(style.form) or is_list or (style.form == "text" and kind not in PARTS):
             yield _flat(node, unit, each)
         else:
             yield spliced.at(unit)

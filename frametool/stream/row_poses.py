@@ -258,6 +258,20 @@ def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -
     return made
 
 
+def points_of(block: RowPoses, kind: str) -> list[dict[str, Any]]:
+    """Return a block of points or vectors as mappings, one each."""
+    size = len(block.numbers)
+    frames = block.parents if len(block.parents) == size else list(block.parents) * size
+    others = {name: [plain_cell(text) for text in texts_of(cells)] for name, cells in block.extras.items()}
+    stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
+    made = []
+    for at, numbers in enumerate(block.numbers.tolist()):
+        named: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
+        stamp = {} if stamps is None else {"stamp_ns": stamps[at]}
+        made.append(named | {kind: numbers} | stamp | {name: texts[at] for name, texts in others.items()})
+    return made
+
+
 def spans_of(texts: list[bytes]) -> Spans:
     """Return texts, one a row, as spans."""
     lengths = np.fromiter(map(len, texts), np.int64, len(texts))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, shown, warn
-from frametool.formats.rows.euroc import COLUMNS as EUROC
+from frametool.formats.table import FORMATS
 from frametool.geometry.representations import UPPER_ROWS, notation
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.stream.header import Columns, PoseColumns, has_names_of_ours
@@ -204,46 +204,40 @@ def _is_constant(column: Spans) -> bool:
     return all(bool((column.data[column.starts + offset] == byte).all()) for offset, byte in enumerate(first))
 
 
-TUM = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
-KITTI = ("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz")
-WIDTHS = {"tum": (len(TUM),), "kitti": (len(KITTI),), "euroc": (8, len(EUROC))}
-
-
-def has_header(form: str, begin: bytes) -> bool:
-    """Tell whether a table in a form may name its columns; EuRoC's comes with its header or without."""
-    if form == "euroc":
-        return begin.removeprefix(b"\xef\xbb\xbf").startswith(b"#")
-    return form != "kitti"
-
-
 def as_trajectory(table: Table, form: str, request: Request, source: str) -> Table:
     """Say the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
 
     Raises FormatError for a count of columns that the form does not have.
     """
+    row = FORMATS[form]
     if request.given or request.columns:
         return table
-    if form in ("kitti", "euroc") and not table.names and table.width not in WIDTHS[form]:
-        wanted = " or ".join(map(str, WIDTHS[form]))
+    if row.widths and not table.names and table.width not in row.widths:
+        wanted = " or ".join(map(str, row.widths))
         line = table.head.count(b"\n") + 1
         raise FormatError(f"expected {wanted} numbers a line, found {table.width}", source=source, line=line)
     if form == "kitti":
-        pose = Columns(tuple(range(len(KITTI))), KITTI, unit=1.0, notation=UPPER_ROWS, degrees=(None,) * 9, whole=True)
-        return table._replace(names=KITTI, pose=PoseColumns(None, pose))
+        return table._replace(names=row.columns, pose=_rows_of_matrix(row.columns))
     if form == "euroc":
-        names = table.names or EUROC[: table.width]
+        names = table.names or row.columns[: table.width]
         if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
             names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
-        return table._replace(names=names, pose=_euroc(names, source))
-    if table.names or not (form == "tum" or table.width == len(TUM)):
-        return table
-    return table._replace(names=TUM, width=len(TUM))
+        return table._replace(names=names, pose=_euroc(names, row.columns, source))
+    tum = FORMATS["tum"].columns
+    columns = row.columns or (tum if table.width == len(tum) else ())
+    return table if table.names or not columns else table._replace(names=columns, width=len(columns))
 
 
-def _euroc(names: Sequence[str], source: str) -> PoseColumns:
+def _rows_of_matrix(names: tuple[str, ...]) -> PoseColumns:
+    """Take all columns for the first three rows of a 4x4 matrix."""
+    places = tuple(range(len(names)))
+    return PoseColumns(None, Columns(places, names, unit=1.0, notation=UPPER_ROWS, degrees=(None,) * 9, whole=True))
+
+
+def _euroc(names: Sequence[str], known: Sequence[str], source: str) -> PoseColumns:
     """Find EuRoC's columns by the words their names begin with."""
     bare = [name.split("[")[0].strip() for name in names]
-    wanted = [name.split("[")[0].strip() for name in EUROC[1:8]]
+    wanted = [name.split("[")[0].strip() for name in known[1:8]]
     if missing := [name for name in wanted if name not in bare]:
         raise FormatError(f"no column {', '.join(missing)}", source=source, line=1)
     places = [bare.index(name) for name in wanted]
@@ -296,8 +290,10 @@ class Table(NamedTuple):
         return self.head + title + self.line_end
 
 
-def open_table(block: bytes, delimiter: bytes, *, header: bool, source: str) -> tuple[Table, bytes]:
+def open_table(block: bytes, form: str, *, header: bool, source: str) -> tuple[Table, bytes]:
     """Look at the first block; return the table and the block without what stands before the first row."""
+    row = FORMATS[form]
+    delimiter = (row.delimiter or "").encode()
     mark = BYTE_ORDER_MARK if block.startswith(BYTE_ORDER_MARK) else b""
     comments, rest = _comments(block[len(mark) :])
     line = _first_record(rest, delimiter)
@@ -313,7 +309,7 @@ def open_table(block: bytes, delimiter: bytes, *, header: bool, source: str) -> 
         head, titles, title, end = named
         return Table(delimiter, _names(titles, source), len(titles), mark + head, titles, title, end), rest
     if not own:
-        if header and delimiter and len(cells) != len(TUM):
+        if header and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].columns):
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
         return Table(delimiter, None, len(cells), mark + comments), rest
     title = line.rstrip(b"\r\n")

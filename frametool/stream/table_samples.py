@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, cast
 from frametool.documents.source import not_text
 from frametool.errors import FormatError
 from frametool.formats.rows.pose_rows import with_axes_turned
-from frametool.formats.rows.trajectory import Poses, StampFile, describe
+from frametool.formats.rows.trajectory import StampFile, describe
+from frametool.formats.table import FORMATS, Poses
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
@@ -31,11 +32,6 @@ if TYPE_CHECKING:
     from frametool.stream.row_poses import RowPoses
     from frametool.text.lines import ByteStream
 
-FORMS = {
-    "tum": Poses("xyzw", counted=""),
-    "euroc": Poses("wxyz", counted=""),
-    "kitti": Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),
-}
 TABLE = Poses("quaternion", counted="")
 
 
@@ -44,7 +40,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
 
     Raises or reports FormatError with the line of a row that is no pose.
     """
-    form = FORMS.get(file.form, TABLE)
+    form = FORMATS[file.form].poses or TABLE
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
     request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)

@@ -8,6 +8,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, FrametoolError, listing
+from frametool.formats.table import FORMATS
 from frametool.grammar.names import stamp_column
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault, Misused
@@ -19,7 +20,6 @@ from frametool.stream.table import (
     UNCLOSED,
     Naming,
     as_trajectory,
-    has_header,
     open_table,
     table_block,
 )
@@ -36,9 +36,6 @@ if TYPE_CHECKING:
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
     from frametool.text.lines import ByteRange, ByteStream
-
-
-DELIMITERS = {"csv": b",", "tsv": b"\t", "semicolon": b";", "columns": b"", "tum": b"", "kitti": b"", "euroc": b","}
 
 
 def run_table(
@@ -62,7 +59,7 @@ def run_table(
     work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
     following: Iterator[bytes | ByteRange] = blocks
     if extent is not None:
-        whole = _record_ends(DELIMITERS[form])
+        whole = _record_ends(table.delimiter)
         following = blocks_behind(
             stream, extent, taken + len(rest), name=source, size=size or BLOCK_BYTES, whole=whole
         )
@@ -83,12 +80,11 @@ def begin_table(
     stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True, size: int = 0
 ) -> Begun:
     """Read the head of a table in a form; raises FormatError."""
-    delimiter = DELIMITERS[form]
-    blocks = _blocks(stream, delimiter, size)
+    blocks = _blocks(stream, (FORMATS[form].delimiter or "").encode(), size)
     first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
-    table, rest = open_table(first, delimiter, header=header and has_header(form, first), source=source)
+    table, rest = open_table(first, form, header=header, source=source)
     table = as_trajectory(table, form, request, source)
     taken = len(first) - len(rest)
     return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))

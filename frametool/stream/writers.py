@@ -1,11 +1,7 @@
-"""Poses in blocks to the text of any form that writes poses: in bulk where the form's rows are all alike.
+"""Poses, points and vectors in blocks to any form that writes them: as text, or as columns of numbers.
 
-What a row looks like is said by the form (`ROWS`), or learned from what it writes for one pose; where neither can be,
-its own `write_poses` writes row after row.
-
-Points and vectors in blocks to the text of a form that is not their table's.
-
-Poses and points in blocks to a file of columns of numbers; other columns go along where they have a place.
+What a row of text looks like is said by the form (`ROWS`), or learned from what it writes for one; where neither can
+be, the form writes row after row as it writes single results.  Other columns go along where they have a place.
 """
 
 from __future__ import annotations
@@ -30,7 +26,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.header import XYZ
 from frametool.stream.row_layout import POSE, Target
-from frametool.stream.row_poses import first_of, float_spans, kept, plain_cell, results_of, spans_of, texts_of
+from frametool.stream.row_poses import first_of, plain_cell, points_of, results_of, spans_of, texts_of
 from frametool.stream.rows import number_spans
 from frametool.text.csv_line import quoted
 from frametool.text.parse import parse_floats
@@ -52,29 +48,40 @@ PROBE = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.374
 MARK = "@@{}@@"
 
 
-class PoseWriter:
-    """Write blocks of poses one after the other; `end` says what comes behind the last."""
+def target_in(style: Style, kind: str, *, placed: bool) -> Target:
+    """Say which numbers of a result of some kind are written in a style; placed: whether poses have a position."""
+    if kind != POSE:
+        return Target(1.0, ())
+    forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
+    whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
+    return Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
 
-    def __init__(self, style: Style, extras: Sequence[str] = (), *, placed: bool = True) -> None:
+
+class TextWriter:
+    """Write blocks of poses, points or vectors as text; `end` says what comes behind the last."""
+
+    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
         """Choose how the form of a style is written.
 
-        extras: the numbers beside each pose; placed: whether poses have a position
-        Raises ValueInvalid for notations that the form does not have.
+        kind: pose, point or vector; extras: the numbers beside each; placed: whether poses have a position
+        Raises ValueInvalid for what the form does not hold, and for notations that it does not have.
         """
+        if kind != POSE and "points" not in FORMATS[style.form].writes:
+            raise ValueInvalid(f"{style.form} holds poses; a {kind} has no rotation")
         self.style = style
-        self.module: Any = import_module(FORMATS[style.form].writer)
-        self.fixed: RowForm | None = getattr(self.module, "ROWS", None)
+        self.kind = kind
+        module: Any = import_module(FORMATS[style.form].writer)
+        self.write: Callable[[Sequence[Any], Style], str] = module.write_poses if kind == POSE else module.write_points
+        self.fixed: RowForm | None = getattr(module, "ROWS", None)
         self.lost = None if self.fixed is None else Lost(self.fixed, style)
         self.extras = tuple(extras)
         self.placed = placed
-        forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
-        whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
-        self.target = Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
+        self.target = target_in(style, kind, placed=placed)
         self.count = 0
         self.dropped = False
         self.rows: RowForm | None = None
         self.order: list[int] = []
-        self.first: Result | None = None
+        self.first: Any = None
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return the text of a block of poses; numbers are metres and x y z w."""
@@ -193,7 +200,7 @@ class PoseWriter:
     def _own(self, columns: Components) -> Components:
         """Return seven components and what comes beside them; a pose without a position is at 0."""
         own = tuple(np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part for part in columns)
-        return own if self.placed or len(own) == len(PROBE) else (*[own[0] * 0.0] * 3, *own)
+        return own if self.placed or self.kind != POSE else (*[own[0] * 0.0] * 3, *own)
 
     def _filled(self, rows: RowForm, block: RowPoses) -> bytes:
         """Fill the numbers of a block into the rows that were learned."""
@@ -210,11 +217,12 @@ class PoseWriter:
         if style.form not in LEARNED or (style.form == "yaml" and (block.extras or _vary(block))):
             return
         probe = self._probe(block)
-        alone, twice = (self.module.write_poses([probe] * count, style) for count in (1, 2))
+        alone, twice = (self.write([probe] * count, style) for count in (1, 2))
         row = twice[len(alone) :]
         head, between = (alone[: -len(row)], "") if alone.endswith(row) else ("", row[: -len(alone)])
         row = row[len(between) :]
-        written = [*self.target.written(self._own(PROBE), floats), *probe.extras.values()]
+        own = PROBE[: self._size] if self.placed or self.kind != POSE else PROBE
+        written = [*self.target.written(own, floats), *self._probe_extras(block).values()]
         marks = {repr(value): at for at, value in enumerate(written) if type(value) is float}
         marks |= {MARK.format(what): -1 for what in ("name", "parent", *range(len(block.extras)))}
         marks[str(PROBE_NS)] = -1
@@ -229,25 +237,38 @@ class PoseWriter:
                 pieces.append("nanoseconds" if text == str(PROBE_NS) else text)
         self.rows = RowForm(tuple(pieces), head=head.encode(), between=between.encode())
 
-    def _probe(self, block: RowPoses) -> Result:
-        """Make a pose with what this block's have; what differs from row to row is marked."""
-        names = [
+    @property
+    def _size(self) -> int:
+        return len(PROBE) if self.kind == POSE else len(XYZ)
+
+    def _probe(self, block: RowPoses) -> Any:
+        """Make a result with what this block's have; what differs from row to row is marked."""
+        name, parent = (
             each[0] if len(each) == 1 else Verbatim(MARK.format(what))
             for what, each in (("name", block.names), ("parent", block.parents))
-        ]
-        pose = Pose.of(PROBE, *names)
+        )
+        if self.kind != POSE:
+            named = {} if parent is None else {"frame": parent}
+            return named | {self.kind: list(PROBE[: len(XYZ)])} | self._probe_extras(block)
+        pose = Pose.of(PROBE, name, parent)
+        return Result(pose if self.placed else pose._replace(position=None), self._probe_extras(block))
+
+    def _probe_extras(self, block: RowPoses) -> dict[str, Any]:
         extras: dict[str, Any] = {name: 0.7310585786300049 + at for at, name in enumerate(self.extras)}
         if block.stamps_ns is not None:
             extras["stamp_ns"] = PROBE_NS
-        extras |= {name: Verbatim(MARK.format(at)) for at, name in enumerate(block.extras)}
-        return Result(pose if self.placed else pose._replace(position=None), extras)
+        return extras | {name: Verbatim(MARK.format(at)) for at, name in enumerate(block.extras)}
 
     def _one_by_one(self, block: RowPoses) -> bytes:
         """Write the rows as the form does for single results."""
-        results = list(results_of(block, self.extras, placed=self.placed))
+        results: list[Any]
+        if self.kind == POSE:
+            results = list(results_of(block, self.extras, placed=self.placed))
+        else:
+            results = points_of(block, self.kind)
         first = self.first = self.first or results[0]
-        known = "" if not self.count else self.module.write_poses([first], self.style)
-        text: str = self.module.write_poses(results if not self.count else [first, *results], self.style)
+        known = "" if not self.count else self.write([first], self.style)
+        text = self.write(results if not self.count else [first, *results], self.style)
         return text[len(known) :].encode()
 
 
@@ -281,85 +302,6 @@ def _json_cell(text: str | None) -> bytes:
     return dump(plain_cell(text or "")).encode()
 
 
-BEGUN_WITH = 8  # rows that are written one by one, the header with them
-
-
-class PointWriter:
-    """Write blocks of points or vectors one after the other, as the form writes single ones."""
-
-    def __init__(self, style: Style, kind: str) -> None:
-        """Choose the form; kind: `point` or `vector`.  Raises ValueInvalid for a form that holds poses only."""
-        if "points" not in FORMATS[style.form].writes:
-            raise ValueInvalid(f"{style.form} holds poses; a {kind} has no rotation")
-        self.style = style
-        self.kind = kind
-        self.module: Any = import_module(FORMATS[style.form].writer)
-        self.first: dict[str, Any] | None = None
-
-    def of_block(self, block: RowPoses) -> bytes:
-        """Return the text of a block; numbers are metres."""
-        if self.first is not None and (rows := self._in_bulk(block)) is not None:
-            return rows
-        if self.first is None and len(block.numbers) > BEGUN_WITH:
-            count = len(block.numbers)
-            begun = self.of_block(kept(block, slice(0, BEGUN_WITH)))
-            return begun + self.of_block(kept(block, slice(BEGUN_WITH, count)))
-        records = self._records(block)
-        if not records:
-            return b""
-        text: str
-        if self.first is None:
-            self.first = records[0]
-            text = self.module.write_points(records, self.style)
-            return text.encode()
-        known = self.module.write_points([self.first], self.style)
-        text = self.module.write_points([self.first, *records], self.style)
-        return text[len(known) :].encode()
-
-    def end(self) -> bytes:
-        """Return what comes behind the last: nothing."""
-        return b""
-
-    def _in_bulk(self, block: RowPoses) -> bytes | None:
-        """Return the rows of CSV for a block whose cells are all numbers; None for what is written row by row."""
-        size, numbers = len(block.numbers), np.ascontiguousarray(block.numbers)
-        if self.style.form != "csv" or not size or len(block.parents) != 1 or not np.isfinite(numbers).all():
-            return None
-        columns = [] if block.parents[0] is None else [spans_of([quoted(block.parents[0]).encode()] * size)]
-        columns.append(number_spans(numbers, self.style.precision, b",,\0"))
-        columns[-1].ends[:, 2] -= 1
-        if block.stamps_ns is not None:
-            columns.append(spans_of([b"%d" % stamp for stamp in block.stamps_ns.tolist()]))
-        for cells in block.extras.values():
-            if isinstance(cells, Spans) or cells.dtype.kind not in "fiu" or cells.ndim != 1:
-                return None
-            is_float = cells.dtype.kind == "f"
-            if is_float and not np.isfinite(cells).all():
-                return None
-            columns.append(float_spans(cells) if is_float else spans_of([b"%d" % cell for cell in cells.tolist()]))
-        parts = [part for column in columns for part in (_constant_point(b",", size), column)]
-        return join([*parts[1:], _constant_point(b"\n", size)])
-
-    def _records(self, block: RowPoses) -> list[dict[str, Any]]:
-        size = len(block.numbers)
-        frames = block.parents if len(block.parents) == size else list(block.parents) * size
-        others = {name: [plain_cell(text) for text in texts_of(cells)] for name, cells in block.extras.items()}
-        stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
-        records = []
-        for at, numbers in enumerate(block.numbers.tolist()):
-            record: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
-            record[self.kind] = numbers
-            if stamps is not None:
-                record["stamp_ns"] = stamps[at]
-            records.append(record | {name: texts[at] for name, texts in others.items()})
-        return records
-
-
-def _constant_point(text: bytes, size: int) -> Spans:
-    starts = np.full(size, MARGIN, np.int64)
-    return Spans(framed(text), starts, starts + len(text))
-
-
 DOUBLE = np.dtype(np.float64)
 
 
@@ -376,11 +318,7 @@ class ArrayWriter:
         self.extras = tuple(extras)
         self.module: Any = import_module(FORMATS[style.form].writer)
         self.has_texts = getattr(self.module, "HOLDS_TEXTS", False)
-        forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
-        whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
-        self.target = Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
-        if kind != POSE:
-            self.target = Target(1.0, ())
+        self.target = target_in(style, kind, placed=placed)
         self.placed = placed
         self.columns: list[OutColumn] = []
         self.left_out: list[str] = []

@@ -14,7 +14,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
-from frametool.formats.rows.trajectory import Poses, Written, numbers_in, samples, text_lines
+from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
+from frametool.formats.table import Poses
 from frametool.grammar.readers import Note
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
 from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, write_rows
-from frametool.formats.rows.trajectory import Poses, Written, numbers_in, samples, text_lines
+from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
+from frametool.formats.table import Poses
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.formats.rows.pose_rows import Numbers, RowForm, write_rows
+from frametool.formats.table import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,14 +22,10 @@ def _w_first(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> tuple[N, ...]:
     return tx, ty, tz, w, x, y, z
 
 
-COLUMNS = (
-    "#timestamp [ns]", "p_RS_R_x [m]", "p_RS_R_y [m]", "p_RS_R_z [m]", "q_RS_w []", "q_RS_x []", "q_RS_y []",
-    "q_RS_z []", "v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]", "b_w_RS_S_x [rad s^-1]",
-    "b_w_RS_S_y [rad s^-1]", "b_w_RS_S_z [rad s^-1]", "b_a_RS_S_x [m s^-2]", "b_a_RS_S_y [m s^-2]",
-    "b_a_RS_S_z [m s^-2]",
-)  # fmt: skip
 ROWS = RowForm(
-    ("nanoseconds", b",", Numbers(7, b","), b"\n"), _w_first, head=",".join(COLUMNS[:8]).encode() + b"\n"
+    ("nanoseconds", b",", Numbers(7, b","), b"\n"),
+    _w_first,
+    head=",".join(FORMATS["euroc"].columns[:8]).encode() + b"\n",
 )
 
 

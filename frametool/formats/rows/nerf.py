@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
 from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, rows_of_matrix, write_rows
-from frametool.formats.rows.trajectory import Poses, Written, samples
+from frametool.formats.rows.trajectory import Written, samples
+from frametool.formats.table import Poses
 from frametool.grammar.readers import Misfit, Note, as_mapping, kind, read_numbers, within
 
 if TYPE_CHECKING:

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 from frametool.documents.document import parse_documents
 from frametool.errors import FormatError
 from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix, write_rows
-from frametool.formats.rows.trajectory import Poses, Written, numbers_in, samples, text_lines
+from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
+from frametool.formats.table import Poses
 from frametool.grammar.readers import Misfit, as_mapping, read_numbers, within
 
 if TYPE_CHECKING:

@@ -21,29 +21,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
+    from frametool.formats.table import Poses
     from frametool.geometry.types import Components
     from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path
 
 BLOCK = 1 << 12  # poses
 NUMBERED = 1 << 33  # above this, a number times a second is beyond what a stamp holds
-
-
-class Poses(NamedTuple):
-    """How a form writes its poses.
-
-    rotation: the notation of the numbers behind the position
-    inverse: what is written is the pose of the world in the thing, not of the thing in the world
-    axes: those of a camera, `optical` or `opengl`
-    frames: how the two are called where nothing says so
-    counted: what the numbers are that stand in for stamps
-    """
-
-    rotation: str
-    inverse: bool = False
-    axes: str = ""
-    frames: tuple[str, str] = ("world", "body")
-    counted: str = "numbers of poses"
 
 
 class Written(NamedTuple):
