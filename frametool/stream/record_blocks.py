@@ -13,10 +13,11 @@ import numpy as np
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault
 from frametool.stream.record import KEYS_REMEDY
-from frametool.stream.record_stream import attempt, null_of
+from frametool.stream.record_stream import Rendered, attempt, null_of, rendered
 from frametool.stream.rows import Block, texts_as_rows, written
 from frametool.stream.run import Outcome, RowNote
 from frametool.stream.splitter import ARRAY, DOCUMENTS, LINES
+from frametool.stream.template import Template
 from frametool.stream.text_parts import In
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part, Splitter
-    from frametool.stream.template import Template
     from frametool.text.spans import Bytes, Ints
 
     Places: TypeAlias = Sequence[tuple[int, int]]
@@ -60,6 +60,14 @@ class Found:
         self.odd: list[tuple[int, bytes]] = []
         self.faults: list[tuple[int, Fault]] = []
         self.closed = False
+        self.notes: list[RowNote] = []
+        self.alone = self.mended = 0  # records that were rendered one by one, and rotations in them
+
+    def add(self, rendered: Rendered, line: int) -> None:
+        """Count a record that was rendered alone; lines are counted from `line`."""
+        self.notes += [note._replace(line=note.line + line) for note in rendered.notes]
+        self.alone += 1
+        self.mended += rendered.mended
 
 
 class RecordBlocks:
@@ -73,6 +81,7 @@ class RecordBlocks:
         self.source = source
         self.state = State()
         self.templates: list[Template] = []
+        self.long: tuple[bytes, Template] | None = None  # the last record that was too long to be looked for again
 
     def __call__(self, text: bytes) -> Outcome:
         """Process one block."""
@@ -142,9 +151,16 @@ class RecordBlocks:
             at = part.after
             hit = None if part.problem else matches.get(part.start) or self._match(chunk, part.start, part.end)
             if hit is None:
-                learned = self._learn(chunk, part)
+                learned: Template | bytes | Fault | Rendered = self._learn(chunk, part)
+                line = text.count(b"\n", 0, start)
+                if isinstance(learned, Template) and learned.is_long and not self.request.in_order:
+                    learned = rendered(learned, self.request, chunk.count(b"\n", 0, part.start))
+                if isinstance(learned, Rendered):
+                    row = chunk[part.begin : part.start] + learned.text + chunk[part.end : part.after]
+                    found.odd.append((start + part.begin, row))
+                    found.add(learned, line)
+                    continue
                 if isinstance(learned, Fault):
-                    line = text.count(b"\n", 0, start)
                     found.faults.append((start + part.begin, learned._replace(line=learned.line + line)))
                     if self.request.on_error == NULL and not part.outside:
                         nulled = null_of(chunk[part.start : part.end], json=self.form == "json")
@@ -163,7 +179,7 @@ class RecordBlocks:
 
     def _own_places(self, learned: Template, chunk: bytes, part: Part) -> tuple[Template, Places] | None:
         """Return where the stretches of the record stand from which a template was learned."""
-        if not learned.is_long or learned.text.encode() != chunk[part.start : part.end]:
+        if not learned.is_long:
             return self._match(chunk, part.start, part.end)
         return learned, [(begin + part.start, end + part.start) for begin, end in learned.places()]
 
@@ -179,15 +195,22 @@ class RecordBlocks:
 
     def _learn(self, chunk: bytes, part: Part) -> Fault | bytes | Template:
         """Return the template of a record, or why it has none; keep it in mind unless it is long, not too many."""
+        record = chunk[part.start : part.end]
+        if self.long is not None and self.long[0] == record:
+            return self.long[1]
         learned = attempt(chunk, part, self.form, self.request, self.source)
-        if not isinstance(learned, (Fault, bytes)) and not learned.is_long:
+        if isinstance(learned, (Fault, bytes)):
+            return learned
+        if learned.is_long:
+            self.long = record, learned
+        else:
             self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], learned]
         return learned
 
     def _outcome(self, text: bytes, data: Bytes, found: Found) -> Outcome:
         """Run every template's records, and put all of it in order."""
         stops, skips = self.request.on_error == STOP, self.request.on_error != NULL
-        faults, odd, notes = list(found.faults), found.odd, []
+        faults, odd, notes = list(found.faults), found.odd, found.notes
         runs = []
         for cut in found.cuts:
             run = Run(self._plan(cut.template), self._block(cut, data, text), self.state)
@@ -200,17 +223,17 @@ class RecordBlocks:
             notes += [each._replace(line=run.block.line_of(0)) for each in cut.template.notes if len(cut.starts)]
         end = min((place for place, _ in faults), default=None) if stops else None
         groups = [group for run in runs for group in run.groups(end)]
-        kept = sum(len(run.rows) for run in runs) + (0 if skips else len(faults))
+        kept = sum(len(run.rows) for run in runs) + found.alone + (0 if skips else len(faults))
         odd = [(place, piece) for place, piece in odd if end is None or place < end]
         if odd:
             groups.append(texts_as_rows(odd))
-        rows = sum(len(cut.starts) for cut in found.cuts) + len(found.faults)
+        rows = sum(len(cut.starts) for cut in found.cuts) + len(found.faults) + found.alone
         return Outcome(
             written(groups),
             [fault for _, fault in sorted(faults)],
             rows,
             text.count(b"\n"),
-            sum(len(run.mended) for run in runs),
+            sum(len(run.mended) for run in runs) + found.mended,
             sorted(notes),
             len(text),
             kept,

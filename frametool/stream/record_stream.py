@@ -116,21 +116,21 @@ def _singly(text: bytes, parts: list[Part], form: str, request: Request, source:
         at = part.after
         line = text.count(b"\n", 0, part.start)
         template = attempt(text, part, form, request, source)
-        rendered = template if isinstance(template, (Fault, bytes)) else _rendered(template, request, line)
-        if isinstance(rendered, Rendered):
-            mended += rendered.mended
-            notes += rendered.notes
-            rendered = rendered.text
-        if isinstance(rendered, Fault):
-            faults.append(rendered)
+        made = template if isinstance(template, (Fault, bytes)) else rendered(template, request, line)
+        if isinstance(made, Rendered):
+            mended += made.mended
+            notes += made.notes
+            made = made.text
+        if isinstance(made, Fault):
+            faults.append(made)
             if request.on_error == STOP:
                 at = len(text)
                 break
             if request.on_error == SKIP or part.outside:
                 continue
-            rendered = null_of(text[part.start : part.end], json=form == "json")
+            made = null_of(text[part.start : part.end], json=form == "json")
         kept += 1
-        out += [text[part.begin : part.start], rendered, text[part.end : part.after]]
+        out += [text[part.begin : part.start], made, text[part.end : part.after]]
     out.append(text[at:])
     return Outcome(b"".join(out), faults, len(parts), text.count(b"\n"), mended, notes, len(text), kept)
 
@@ -143,7 +143,7 @@ class Rendered(NamedTuple):
     notes: list[RowNote]
 
 
-def _rendered(template: Template, request: Request, line: int) -> Rendered | Fault:
+def rendered(template: Template, request: Request, line: int) -> Rendered | Fault:
     """Return the text of a record's result, or why there is none; lines count from 0."""
     try:
         answers = template.answers(request)
