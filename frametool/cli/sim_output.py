@@ -18,75 +18,35 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import FULL, TEXT, Digits, Number, Text, decorated
+from frametool.cli.options import FULL, TEXT, Digits, Number, Parsed, decorated
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.documents.source import Source, decode, read_text
-from frametool.errors import FileProblem, FormatError, ValueInvalid, alternatives, shown
+from frametool.errors import FileProblem, FormatError, alternatives, shown
 from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.grammar.result import Style
-from frametool.sim.command_file import read_commands, read_script
-from frametool.sim.controllers import LAWS, TARGETS
-from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
-from frametool.sim.scene import LONGEST
+from frametool.sim.drivers import LAWS, LEADERS, TARGETS, Mailbox, built_in, scripted
+from frametool.sim.readers import parse_seconds, parse_spawn, read_commands, read_script
 from frametool.sim.simulate import RunSummary, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
 from frametool.sim.turtle import VARIANTS
-from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.cli.sink import Write
-    from frametool.sim.leaders import MakeLeader
+    from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
     from frametool.view.run_plot import Drawing
     Watch = Callable[[SimulationStep], None]
 
 NUMBER = Number()
-
-
-class Spawn(Text):
-    """A place: X,Y or X,Y,THETA."""
-
-    name = "x,y,theta"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read metres and radians; the angle may carry a unit."""
-        cells = [cell.strip() for cell in str(super().convert(value, param, ctx)).split(",")]
-        if len(cells) not in (2, 3):
-            self.fail(f"expected X,Y,THETA, found {shown(str(value))}", param, ctx)
-        try:
-            angle, unit = parse_angle(cells[2]) if len(cells) == 3 else (0.0, None)
-            return parse_number(cells[0]), parse_number(cells[1]), math.radians(angle) if unit == "deg" else angle
-        except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
-
-
-class Seconds(Number):
-    """A span of time, 0 or more."""
-
-    name = "seconds"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read it, and check that stamps reach so far."""
-        seconds = float(super().convert(value, param, ctx))
-        if not 0.0 <= seconds <= LONGEST:
-            self.fail(f"expected 0 or more, and at most {LONGEST}, found {seconds:g}", param, ctx)
-        return seconds
-
-
-class Duration(Seconds):
-    """Seconds, or inf."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read it."""
-        return math.inf if value == "inf" else super().convert(value, param, ctx)
-
-
+SPAWN_TYPE = Parsed("x,y,theta", parse_spawn)
+SECONDS = Parsed("seconds", parse_seconds)
+DURATION = Parsed("seconds", lambda text: math.inf if text == "inf" else parse_seconds(text))
 LEADER = click.option("--leader", type=TEXT, default="still", show_default=True, metavar="NAME|FILE|-",
                       help="still, circle, square, figure8, random, a file of commands, or - for standard input")
 LAW = click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
@@ -94,19 +54,18 @@ LAW = click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show
 RATE = click.option("--rate", type=NUMBER, metavar="HZ", help="control steps a second")
 MAX_LINEAR = click.option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]")
 MAX_ANGULAR = click.option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]")
-SPAWN = click.option("--spawn", type=Spawn(), default="4,2,0", show_default=True, metavar="X,Y,THETA",
+SPAWN = click.option("--spawn", type=SPAWN_TYPE, default="4,2,0", show_default=True, metavar="X,Y,THETA",
                      help="where turtle2 begins: metres, radians (or 90deg)")
 SEED = click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader")
 REACH = click.option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D",
                      help="metres that count as having come to the target")
-FOLLOWERS = click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
-                         help="each follows the one before, the first follows turtle1")  # fmt: skip
 
 
 def follow_options(duration: str) -> Callable[[Any], Any]:
     """Add to a command the options of followers; `duration` is how long it runs if not told."""
     options = [
-        FOLLOWERS,
+        click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
+                     help="each follows the one before, the first follows turtle1"),
         LAW,
         RATE,
         click.option("--gain-linear", type=NUMBER, metavar="K", help="speed for each metre of distance"),
@@ -115,10 +74,10 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
         MAX_ANGULAR,
         click.option("--target", type=click.Choice(TARGETS), default="leader", show_default=True,
                      help="the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m"),
-        click.option("--delay", type=Seconds(), default=0.0, metavar="S",
+        click.option("--delay", type=SECONDS, default=0.0, metavar="S",
                      help="follow where the target was so long ago, looked up through world  [default: 0]"),
         SPAWN,
-        click.option("--duration", type=Duration(), default=duration, show_default=True, metavar="S",
+        click.option("--duration", type=DURATION, default=duration, show_default=True, metavar="S",
                      help="simulated seconds, or inf"),
         click.option("--turtlesim", type=click.Choice(VARIANTS), default="ros1", show_default=True,
                      help="whose turtlesim"),
@@ -126,6 +85,15 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
         SEED,
     ]  # fmt: skip
     return lambda function: decorated(function, options)
+
+
+def sweep_options(function: Any) -> Any:
+    """Add to a command the options of one run for each pair of gains."""
+    duration = click.option(
+        "--duration", type=DURATION, default="20", show_default=True, metavar="S", help="simulated seconds"
+    )
+    options = (LEADER, LAW, RATE, MAX_LINEAR, MAX_ANGULAR, SPAWN, duration, REACH, SEED, format_options)
+    return decorated(function, options)
 
 
 def format_options(function: Any) -> Any:
@@ -231,7 +199,7 @@ class SimOutput:
         if self.realtime:
             yield RealTimeClock().wait
         if self.live:
-            from frametool.view.live import Screen
+            from frametool.view.terminal import Screen
 
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
         else:

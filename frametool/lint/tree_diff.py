@@ -5,15 +5,18 @@ Signs of quaternions and the order of names do not count.  Where a tree moves it
 
 from __future__ import annotations
 
+import re
+from functools import partial
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import shown
+from frametool.errors import ValueInvalid, shown
 from frametool.frames.snapshot import Snapshot
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.rotation import NEAR
 from frametool.geometry.transform import NEAR_BY
+from frametool.text.numbers import parse_length, read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -55,6 +58,28 @@ class Tolerance(NamedTuple):
         if apart is None:
             return -1.0
         return max(apart.metres / (self.metres or NEAR_BY), apart.radians / (self.radians or NEAR))
+
+
+def parse_tolerance(text: str) -> Tolerance:
+    """Read `1mm,0.1deg`, or one of them; bare numbers are metres and radians, in this order.
+
+    Raises ValueInvalid.
+    """
+    parts: dict[str, str] = {}
+    cells = [cell.strip() for cell in text.split(",")]
+    for index, cell in enumerate(cells):
+        is_angle = re.search("deg|rad|°|pi|π", cell) or (index == 1 and not cell.endswith("m"))
+        parts["radians" if is_angle else "metres"] = cell
+    try:
+        if len(parts) != len(cells):
+            raise ValueInvalid(f"{shown(text)} is not one length and one angle")
+        read = {"metres": parse_length, "radians": partial(read_number_or_angle, degrees=False)}
+        found = Tolerance(**{name: read[name](cell) for name, cell in parts.items()})
+        if negative := [cell for name, cell in parts.items() if getattr(found, name) < 0.0]:
+            raise ValueInvalid(f"{shown(negative[0])} is less than 0")
+    except ValueInvalid as error:
+        raise ValueInvalid(f"{error}; write a length, an angle or both: 1mm,0.1deg") from None
+    return found
 
 
 class Apart(NamedTuple):

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import LookupFailed, ValueInvalid, printable
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
-from frametool.sim.controllers import CARROT_NS, frame_of, offset, planar
-from frametool.sim.leaders import EndOfRun, Heading
+from frametool.sim.drivers import CARROT_NS, EndOfRun, Heading, frame_of, offset, planar
 from frametool.sim.scene import Follow
 from frametool.sim.turtle import TICK_NS, ServiceRefused, TurtlePose, TurtleState, World
 
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.geometry.transform import Transform
-    from frametool.sim.leaders import Leader
+    from frametool.sim.drivers import Leader
     from frametool.sim.scene import Scene, ServiceCall
     from frametool.sim.turtle import Pen, Twist, WallHit
 

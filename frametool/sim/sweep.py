@@ -12,7 +12,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
-from frametool.sim.controllers import ARRIVED, FollowController, unbounded
+from frametool.sim.drivers import ARRIVED, FollowController, unbounded
 from frametool.sim.scene import TUTORIAL_SPAWN, tutorial
 from frametool.sim.simulate import simulate
 from frametool.sim.turtle import DT, FASTEST_TURN, SIZE, TICK_NS, TIMEOUT_NS, turned
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from frametool.sim.leaders import MakeLeader
+    from frametool.sim.drivers import MakeLeader
     from frametool.sim.turtle import TurtlePose, TurtleState
 
     LeaderTrack = list[tuple[TurtleState, TurtlePose]]

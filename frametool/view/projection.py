@@ -8,17 +8,20 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import printable
+from frametool.errors import ValueInvalid, printable, shown
 from frametool.geometry import quaternion
+from frametool.text.numbers import parse_angle
 from frametool.view.frame_scene import can_be_drawn
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from typing import TypeVar
 
     from frametool.geometry.types import Rigid
     from frametool.view.frame_scene import FrameScene, Point
 
     Box = tuple[float, float, float, float]  # left, top, right, bottom
+    Spot = TypeVar("Spot")
 
 SLANTED = (-0.9, 0.5)
 # name -> azimuth and elevation of the eye, radians: from where one looks along -x, along +y, and down
@@ -28,6 +31,25 @@ EYES = {
     "side": (-math.pi / 2.0, 0.0),
     "top": (-math.pi / 2.0, math.pi / 2.0),
 }
+
+
+def parse_eye(text: str) -> tuple[float, float]:
+    """Read a name of EYES, or AZ,EL in degrees, and return azimuth and elevation in radians.
+
+    Raises ValueInvalid.
+    """
+    if text in EYES:
+        return EYES[text]
+    cells = text.split(",")
+    if len(cells) != 2:
+        raise ValueInvalid(f"expected {', '.join(EYES)} or AZ,EL in degrees, found {shown(text)}")
+    angles = map(parse_angle, map(str.strip, cells))
+    azimuth, elevation = (angle if unit == "rad" else math.radians(math.fmod(angle, 360.0)) for angle, unit in angles)
+    if abs(elevation) > math.pi / 2.0:
+        raise ValueInvalid(f"the elevation must be -90 .. 90 degrees, found {shown(cells[1])}")
+    return azimuth, elevation
+
+
 AXIS_PART = 0.55  # of the usual distance between a frame and its parent
 USUAL_LINK = 0.5  # metres, where there is none
 LEAST = 1e-9  # metres; below, frames lie on one point
@@ -256,8 +278,8 @@ def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box]
                 axes.add((tip.x - 2.0, tip.y - 2.0, tip.x + 2.0, tip.y + 2.0))
     placed, hidden = [], 0
     for point, names in flat.groups(SAME):
-        words = words_of(names)
-        found = _free_spot(_spots(flat, words, point, font), taken, axes)
+        spots = _spots(flat, words_of(names), point, font)
+        found = best_spot(spots, lambda spot: taken.meets(spot.box), lambda spot: axes.meets(spot.box))
         if found is None:
             hidden += len(names)
         else:
@@ -266,13 +288,13 @@ def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box]
     return placed, hidden
 
 
-def _free_spot(spots: Iterable[Label], taken: TakenBoxes, axes: TakenBoxes) -> Label | None:
+def best_spot(spots: Iterable[Spot], is_taken: Callable[[Spot], bool], on_axes: Callable[[Spot], bool]) -> Spot | None:
     """Return the first spot over nothing at all, or else the first that is only over axes."""
     second = None
     for spot in spots:
-        if taken.meets(spot.box):
+        if is_taken(spot):
             continue
-        if not axes.meets(spot.box):
+        if not on_axes(spot):
             return spot
         second = second or spot
     return second

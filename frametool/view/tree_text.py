@@ -11,6 +11,8 @@ from frametool.grammar.result import edge_label
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from rich.console import Console
+
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
     from frametool.grammar.result import Style
@@ -39,12 +41,22 @@ def print_tree(tree: Frames, style: Style, color: str = "auto") -> None:
     """Draw a tree on the terminal, in colour where it has any, or as `color` says: always or never."""
     from rich.text import Text
 
-    from frametool.view.terminal_console import coloured_console
-
     console = coloured_console(color)
     for line, pad in _padded(tree, style):
         name = "bold green" if not line.label else "bold"
         console.print(Text.assemble((line.branch, "dim"), (line.frame, name), pad, ("  ".join(line.label), "cyan")))
+
+
+def coloured_console(color: str = "auto") -> Console:
+    """Return standard output, in colour where the terminal has any, or as `color` says: always or never."""
+    import sys
+
+    from rich.console import Console
+
+    return Console(
+        file=sys.stdout, highlight=False, soft_wrap=True, no_color=True if color == "never" else None,
+        force_terminal=True if color == "always" else None, color_system="auto" if color == "auto" else "standard",
+    )  # fmt: skip
 
 
 def _label(track: Track, style: Style) -> tuple[str, ...]:

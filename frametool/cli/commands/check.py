@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.options import FILE, Command, pose_options, reading_options, verbose_option
+from frametool.cli.options import FILE, Command, file_options
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import opened, state
@@ -38,9 +38,7 @@ class CheckCommand(Command):
 @click.option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
               help="how findings are written")  # fmt: skip
 @click.option("--strict", is_flag=True, help="let warnings fail too")
-@reading_options()
-@verbose_option
-@pose_options
+@file_options
 def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> int:
     """Look for mistakes in FILES, trees and recordings, taken together as one tree.
 

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import (
-    FILE,
-    TIME,
-    Command,
-    Text,
-    at_ns,
-    list_options,
-    pose_options,
-    reading_options,
-    verbose_option,
-)
+from frametool.cli.options import FILE, TIME, Command, Parsed, at_ns, file_options, list_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, is_quiet, load_sides
-from frametool.errors import ValueInvalid, shown
 from frametool.formats.load import lines_of
 from frametool.lint.findings import github_command
-from frametool.lint.tree_diff import Tolerance, diff, entry
-from frametool.text.numbers import parse_length, read_number_or_angle
+from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,40 +29,6 @@ class DiffCommand(Command):
     exit_codes = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
 
 
-class ToleranceOption(Text):
-    """A length and an angle, or one of them."""
-
-    name = "tolerance"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read `1mm,0.1deg`; bare numbers are metres and radians, in this order."""
-        if not isinstance(value, str):
-            return value
-        try:
-            return _tolerance(super().convert(value, param, ctx))
-        except ValueInvalid as error:
-            self.fail(f"{error}; write a length, an angle or both: 1mm,0.1deg", param, ctx)
-
-
-def _tolerance(text: str) -> Tolerance:
-    found = Tolerance()
-    parts = [part.strip() for part in text.split(",")]
-    are_angles = [_is_angle(part, bare=index == 1) for index, part in enumerate(parts)]
-    if len(set(are_angles)) != len(parts):
-        raise ValueInvalid(f"{shown(text)} is not one length and one angle")
-    for part, is_angle in zip(parts, are_angles, strict=True):
-        value = read_number_or_angle(part, degrees=False) if is_angle else parse_length(part)
-        if value < 0.0:
-            raise ValueInvalid(f"{shown(part)} is less than 0")
-        found = found._replace(radians=value) if is_angle else found._replace(metres=value)
-    return found
-
-
-def _is_angle(text: str, *, bare: bool) -> bool:
-    """Tell an angle from a length by its unit; `bare` says what it is without one."""
-    return re.search("deg|rad|°|pi|π", text) is not None or (bare and not text.endswith("m"))
-
-
 @click.command(cls=DiffCommand, name="diff")
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
@@ -85,12 +38,10 @@ def _is_angle(text: str, *, bare: bool) -> bool:
               help="compare at this time: seconds, nanoseconds with ns  [default: the latest of each]")  # fmt: skip
 @click.option("--seen-from", type=FRAME, metavar="FRAME",
               help="tell how far frames moved as seen from here too  [default: the root of A]")  # fmt: skip
-@click.option("--tolerance", type=ToleranceOption(), default=Tolerance(), metavar="LENGTH,ANGLE",
+@click.option("--tolerance", type=Parsed("tolerance", parse_tolerance), default=Tolerance(), metavar="LENGTH,ANGLE",
               help="what still counts as the same, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]")  # fmt: skip
 @click.option("--all", "everything", is_flag=True, help="list the frames that did not move, too")
-@reading_options()
-@verbose_option
-@pose_options
+@file_options
 @list_options("github")
 def command(
     a: str, b: str, with_a: Sequence[str], with_b: Sequence[str], at: int | str | None, seen_from: str | None,

@@ -12,11 +12,11 @@ from frametool.cli.sim_output import LEADER, SimOutput, follow_options, leader_o
 from frametool.cli.sink import writing
 from frametool.errors import ValueInvalid
 from frametool.formats.table import by_suffix
-from frametool.sim.controllers import FollowController
+from frametool.sim.drivers import FollowController
 from frametool.sim.scene import tutorial
 
 if TYPE_CHECKING:
-    from frametool.sim.leaders import MakeLeader
+    from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
 
 LAW_OPTIONS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")

@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.options import TEXT, Command
 from frametool.cli.poses import source_of, usage_if_inline
-from frametool.cli.sim_output import Duration, SimOutput, output_options
+from frametool.cli.sim_output import DURATION, SimOutput, output_options
 from frametool.cli.stderr import say
 from frametool.errors import FormatError
 from frametool.frames.stamps import BILLION
@@ -18,7 +18,7 @@ from frametool.sim.scene_file import read_scene
 
 @click.command(cls=Command, name="run")
 @click.argument("scene", type=TEXT)
-@click.option("--duration", type=Duration(), metavar="S", help="simulated seconds, or inf  [default: the scene's]")
+@click.option("--duration", type=DURATION, metavar="S", help="simulated seconds, or inf  [default: the scene's]")
 @click.option("--seed", type=click.IntRange(0), help="of random leaders  [default: the scene's]")
 @output_options
 def command(scene: str, duration: float | None, seed: int | None, **options: Any) -> None:

@@ -6,74 +6,23 @@ from typing import Any
 
 import click
 
-from frametool.cli.options import Command, Text
+from frametool.cli.options import Command, Parsed
 from frametool.cli.output import drawn
-from frametool.cli.sim_output import (
-    LAW,
-    LEADER,
-    MAX_ANGULAR,
-    MAX_LINEAR,
-    RATE,
-    REACH,
-    SEED,
-    SPAWN,
-    Duration,
-    check_files,
-    format_options,
-    leader_of,
-    style_of,
-    suffix_of,
-)
+from frametool.cli.sim_output import check_files, leader_of, style_of, suffix_of, sweep_options
 from frametool.cli.sink import writing
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid
+from frametool.sim.readers import parse_gains
 from frametool.sim.step_writer import table
-from frametool.text.numbers import parse_number
 
-MOST = 10_000  # values of one gain
-
-
-class Range(Text):
-    """Evenly spaced numbers, START:STOP:COUNT with both ends, or numbers separated by commas."""
-
-    name = "start:stop:count"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read them."""
-        text = str(super().convert(value, param, ctx))
-        try:
-            if ":" not in text:
-                return [parse_number(each.strip()) for each in text.split(",")]
-            start, stop, count = text.split(":")
-            return _spaced(parse_number(start), parse_number(stop), int(count))
-        except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
-        except ValueError:
-            self.fail(f"expected START:STOP:COUNT (0.1:2:20), or numbers (0.5,1); found {shown(text)}", param, ctx)
-
-
-def _spaced(start: float, stop: float, count: int) -> list[float]:
-    """Return numbers from start to stop, both included."""
-    if not 1 <= count <= MOST:
-        raise ValueInvalid(f"COUNT must be 1 .. {MOST}, found {count}")
-    values = (start + (stop - start) * index / max(count - 1, 1) for index in range(count))
-    return [float(f"{value:.12g}") for value in values]  # 0.8 rather than 0.7999999999999999
+GAINS = Parsed("start:stop:count", parse_gains)
 
 
 @click.command(cls=Command, name="sweep")
-@click.option("--gain-linear", type=Range(), default="0.1:2:20", show_default=True, metavar="START:STOP:COUNT",
+@click.option("--gain-linear", type=GAINS, default="0.1:2:20", show_default=True, metavar="START:STOP:COUNT",
               help="speeds for each metre of distance")
-@click.option("--gain-angular", type=Range(), default="1:8:20", show_default=True, metavar="START:STOP:COUNT",
+@click.option("--gain-angular", type=GAINS, default="1:8:20", show_default=True, metavar="START:STOP:COUNT",
               help="turn rates for each radian of bearing")
-@LEADER
-@LAW
-@RATE
-@MAX_LINEAR
-@MAX_ANGULAR
-@SPAWN
-@click.option("--duration", type=Duration(), default="20", show_default=True, metavar="S", help="simulated seconds")
-@REACH
-@SEED
-@format_options
+@sweep_options
 def command(
     gain_linear: list[float], gain_angular: list[float], leader: str, seed: int, format_name: str | None,
     precision: int | None, output: str | None, plot: str | None, force: bool, **options: Any,

@@ -11,7 +11,7 @@ import click
 from frametool.cli.commands.sim_follow import output_and_scene
 from frametool.cli.options import Command
 from frametool.cli.sim_output import follow_options, output_options
-from frametool.sim.leaders import HEADINGS, KEYS, Heading, Mailbox
+from frametool.sim.drivers import HEADINGS, KEYS, Heading, Mailbox
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
