@@ -11,10 +11,9 @@ import math
 import os
 import sys
 from contextlib import ExitStack
-from functools import partial
 from itertools import combinations
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
     from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
-    from frametool.view.run_plot import Drawing
     Watch = Callable[[SimulationStep], None]
 
 NUMBER = Number()
@@ -125,35 +123,35 @@ def output_options(function: Any) -> Any:
     return decorated(function, options)
 
 
-class SimOutput:
+class SimOutput(NamedTuple):
     """What is shown of a run, and where: what the options of a command say."""
 
-    def __init__(
-        self, *, emit: str = "commands", format_name: str | None = None, precision: int | None = None,
-        output: str | None = None, reach: float = 0.5, realtime: bool = False, live: bool = False,
-        plot: str | None = None, view: str | None = None, force: bool = False, leaders: bool = False,
-    ) -> None:  # fmt: skip
-        """Check what can be checked before anything runs.
+    style: Style
+    output: str | None
+    emit: str = "commands"
+    reach: float = 0.5
+    realtime: bool = False
+    live: bool = False
+    plot: str | None = None
+    view: str | None = None
+    force: bool = False
+    leaders: bool = False
+
+    @classmethod
+    def of(cls, *, format_name: str | None, output: str | None, precision: int | None, **options: Any) -> SimOutput:
+        """Take a command's options, and check what can be checked before anything runs.
 
         Raises click.UsageError, FileProblem.
         """
-        self.emit = emit
-        self.style = style_of(format_name, output, precision)
-        self.leaders = leaders
-        self.output = None if output == "-" else output
-        self.reach = reach
-        self.realtime = realtime or live
-        self.live = live
-        self.plot = plot
-        self.view = view
-        self.force = force
-        if reach < 0.0:
-            raise click.UsageError(f"--reach must be 0 or more, found {reach:g}")
-        if live and not (sys.stdout.isatty() or sys.stderr.isatty()):
+        made = cls(style_of(format_name, output, precision), None if output == "-" else output, **options)
+        if made.reach < 0.0:
+            raise click.UsageError(f"--reach must be 0 or more, found {made.reach:g}")
+        if made.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
             raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        if view and suffix_of(view) != ".html":
-            raise click.UsageError(f"--view takes a file .html; found {shown(view)}")
-        check_files(plot, self.output, view, force=force)
+        if made.view and suffix_of(made.view) != ".html":
+            raise click.UsageError(f"--view takes a file .html; found {shown(made.view)}")
+        check_files(made.plot, made.output, made.view, force=made.force)
+        return made
 
     def run(self, scene: Scene) -> None:
         """Run a scene to its end and sum it up on stderr.
@@ -183,10 +181,10 @@ class SimOutput:
         """Return what is written after the run, by file: what watches the steps, and what then makes the content."""
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
-            from frametool.view.run_plot import Drawing
+            from frametool.view.run_plot import Drawing, last_commands, run_picture
 
-            drawing = Drawing(scene)
-            pictures[self.plot] = drawing.watch, partial(_plot, drawing, suffix_of(self.plot))
+            drawing, suffix = Drawing(scene), suffix_of(self.plot)
+            pictures[self.plot] = drawing.watch, lambda: drawn(run_picture(drawing), suffix, last_commands(drawing))
         if self.view:
             from frametool.view.html_page import RunPage
 
@@ -196,14 +194,14 @@ class SimOutput:
 
     def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
         """Open what the steps go to; the stack closes it."""
-        if self.realtime:
-            yield RealTimeClock().wait
+        if self.realtime or self.live:
+            yield real_time()
         if self.live:
             from frametool.view.terminal import Screen
 
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
         else:
-            yield EventLog().watch
+            yield log_events()
         if self.output is not None or not (self.live and sys.stdout.isatty()):
             yield self._writing(stack.enter_context(writing(self.output, force=self.force)), scene)
 
@@ -219,41 +217,25 @@ class SimOutput:
         return watch
 
 
-def _plot(drawing: Drawing, suffix: str) -> str | bytes:
-    """Return the plot of a run."""
-    from frametool.view.run_plot import last_commands, run_picture
-
-    return drawn(run_picture(drawing), suffix, last_commands(drawing))
-
-
-class RealTimeClock:
-    """Keep simulated time from running ahead of the clock."""
-
-    def __init__(self) -> None:
-        """Start the clock."""
-        self._start = monotonic()
-
-    def wait(self, step: SimulationStep) -> None:
-        """Wait until a step is due."""
-        ahead = step.t_ns / BILLION - (monotonic() - self._start)
-        if ahead > 0.0:
-            sleep(ahead)
+def real_time() -> Watch:
+    """Return what keeps simulated time from running ahead of the clock, which starts now."""
+    start = monotonic()
+    return lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
 
 
-class EventLog:
-    """Print on stderr what turtlesim and the followers log; a wall once for each contact."""
+def log_events() -> Watch:
+    """Return what prints on stderr what turtlesim and the followers log; a wall once for each contact."""
+    at_wall: set[str] = set()
 
-    def __init__(self) -> None:
-        """Create the log of a run in which no turtle is at a wall yet."""
-        self._at_wall: frozenset[str] = frozenset()
-
-    def watch(self, step: SimulationStep) -> None:
-        """Print what one step logged."""
-        new = (str(hit) for hit in step.walls if hit.turtle not in self._at_wall)
+    def watch(step: SimulationStep) -> None:
+        new = (str(hit) for hit in step.walls if hit.turtle not in at_wall)
         for line in (*step.log, *new):
             say(f"{step.t_ns / BILLION:.3f} s: {line}")
         if step.is_tick:
-            self._at_wall = frozenset(hit.turtle for hit in step.walls)
+            at_wall.clear()
+            at_wall.update(hit.turtle for hit in step.walls)
+
+    return watch
 
 
 def style_of(format_name: str | None, output: str | None, precision: int | None) -> Style:

@@ -130,7 +130,8 @@ class Difference(NamedTuple):
     def sentence(self) -> str:
         """Say it in one line."""
         name, note = shown(self.frame), f": {self.note}" if self.note else ""
-        at_a, at_b = map(_under, (self.parent_a, self.parent_b))
+        parents = (self.parent_a, self.parent_b)
+        at_a, at_b = ("a root" if parent is None else f"under {shown(parent)}" for parent in parents)
         seen = f"seen from {shown(self.seen_from)} it moved {self.seen}" if self.seen else ""
         match self.kind:
             case "only-in-a":
@@ -161,10 +162,6 @@ def entry(each: Difference) -> dict[str, Any]:
         "seen_deg": each.seen and each.seen.degrees,
         "note": each.note or None,
     }
-
-
-def _under(parent: str | None) -> str:
-    return "a root" if parent is None else f"under {shown(parent)}"
 
 
 class Comparison(NamedTuple):
@@ -262,13 +259,12 @@ class _Pair:
         gone = [frame for frame in self.a.tree.frames if frame not in in_b]
         new = [frame for frame in self.b.tree.frames if frame not in in_a]
         renamed = self._renamed(gone, new)
-        before = {after: frame for frame, after in renamed.items()}
+        notes = {frame: f"renamed to {shown(after)}? it has the same pose" for frame, after in renamed.items()}
         for frame in gone:
-            note = f"renamed to {shown(renamed[frame])}? it has the same pose" if frame in renamed else ""
-            yield Difference("only-in-a", frame, self.a.parent(frame), None, note=note)
+            yield Difference("only-in-a", frame, self.a.parent(frame), None, note=notes.get(frame, ""))
+        notes = {after: f"renamed from {shown(frame)}? it has the same pose" for frame, after in renamed.items()}
         for frame in new:
-            note = f"renamed from {shown(before[frame])}? it has the same pose" if frame in before else ""
-            yield Difference("only-in-b", frame, None, self.b.parent(frame), note=note)
+            yield Difference("only-in-b", frame, None, self.b.parent(frame), note=notes.get(frame, ""))
 
     def _renamed(self, gone: Sequence[str], new: Sequence[str]) -> dict[str, str]:
         """Find the frames of A that stand under another name in B: the one pair with the same pose in one parent."""
@@ -281,13 +277,15 @@ class _Pair:
         for old, fresh in by_parent.values():
             if len(old) * len(fresh) > MOST_PAIRS:
                 continue
-            pairs = [(frame, each) for frame in old for each in fresh if self._same_pose(frame, each)]
+            pairs = [
+                (frame, each)
+                for frame in old
+                for each in fresh
+                if self.tolerance.covers(_apart(self.a.edges[frame][1], self.b.edges[each][1]))
+            ]
             froms, tos = ([pair[at] for pair in pairs] for at in (0, 1))
             found.update(pair for pair in pairs if froms.count(pair[0]) == tos.count(pair[1]) == 1)
         return found
-
-    def _same_pose(self, frame: str, other: str) -> bool:
-        return self.tolerance.covers(_apart(self.a.edges[frame][1], self.b.edges[other][1]))
 
     def about(self, frame: str) -> Iterator[Difference]:
         """Yield what differs about a frame that both have; `same` if nothing does."""
@@ -365,10 +363,10 @@ def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
     """Say at which times the two are compared, if anything moves and no time was told."""
     if at_ns is not None or not (a.moves or b.moves):
         return
-    told = " and ".join(f"{name} {format_stamp(_newest(tree))}" for name, tree in (("A", a), ("B", b)) if tree.moves)
+    newest = [
+        f"{name} {format_stamp(max(track.last_ns for track in tree.tracks() if not track.standing))}"
+        for name, tree in (("A", a), ("B", b))
+        if tree.moves
+    ]
     also = ", and sample by sample" if a.moves and b.moves else ""
-    yield f"what moves is compared at its latest ({told}){also}; --at TIME compares at one time"
-
-
-def _newest(tree: Frames) -> int:
-    return max(track.last_ns for track in tree.tracks() if not track.standing)
+    yield f"what moves is compared at its latest ({' and '.join(newest)}){also}; --at TIME compares at one time"

@@ -18,8 +18,6 @@ from frametool.lint.rules import check
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.lint.findings import Finding
-
 FAILED = 1
 
 
@@ -57,7 +55,11 @@ def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> i
     text = WRITERS[form](findings)
     with writing(None) as write:
         write(_in_terminal(text) if form == "text" and sys.stdout.isatty() else text)
-    return FAILED if _fails(findings, strict=strict) else 0
+    counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
+    summary = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
+    if summary:
+        say(summary)
+    return FAILED if counts["error"] or (strict and counts["warning"]) else 0
 
 
 def _in_terminal(text: str) -> str:
@@ -68,12 +70,3 @@ def _in_terminal(text: str) -> str:
         get_terminal_size().columns, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
     )
     return "".join(f"{wrapper.fill(line)}\n" for line in text.splitlines())
-
-
-def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:
-    """Count on stderr, and tell whether the files pass."""
-    counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
-    said = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
-    if said:
-        say(said)
-    return bool(counts["error"] or (strict and counts["warning"]))

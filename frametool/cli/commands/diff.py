@@ -69,7 +69,15 @@ def command(
     comparison = diff(one, other, at_ns=at_ns(at), seen_from=start, tolerance=tolerance)
     for note in () if is_quiet() else comparison.notes:
         say(note)
-    _write(output, comparison, places, everything=everything)
+    differences = [*comparison.differences, *(comparison.unmoved if everything else ())]
+    if output.style.form == "github":
+        output.text(_annotations(comparison, places))
+    elif output.style.form == "text":
+        from frametool.view.report_text import write_diff
+
+        output.text(write_diff(differences))
+    else:
+        output.report(list(map(entry, differences)))
     if comparison.uncompared:
         count = len(comparison.uncompared)
         say(f"{count} frame{'s' * (count != 1)} not compared: no data in A and B; --at chooses another time")
@@ -77,25 +85,12 @@ def command(
     return DIFFERENT if comparison.differences else 0
 
 
-def _write(output: Output, found: Comparison, places: Sequence[Mapping[str, Place]], *, everything: bool) -> None:
-    """Write what differs."""
-    told = [*found.differences, *(found.unmoved if everything else ())]
-    if output.style.form == "github":
-        output.text(_annotations(found, places))
-    elif output.style.form == "text":
-        from frametool.view.report_text import write_diff
-
-        output.text(write_diff(told))
-    else:
-        output.report(list(map(entry, told)))
-
-
 def _annotations(found: Comparison, places: Sequence[Mapping[str, Place]]) -> str:
     """Return workflow commands, each at the line where B says where the frame is, or else A."""
     in_a, in_b = places
     known = {each.frame: in_b.get(each.frame) or in_a.get(each.frame) for each in found.differences}
-    placed = [(frame, place) for frame, place in known.items() if place is not None]
-    where = dict(zip([frame for frame, _ in placed], lines_of([place for _, place in placed]), strict=True))
+    placed = {frame: place for frame, place in known.items() if place is not None}
+    where = dict(zip(placed, lines_of([*placed.values()]), strict=True))
     lines = []
     for each in found.differences:
         file, line = where.get(each.frame, ("", 0))

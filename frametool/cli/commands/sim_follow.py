@@ -43,30 +43,25 @@ def command(leader: str, explain_step: int | None, explain: str | None, **option
     on with --realtime, where they act when they come. A turtle at a wall is reported once, and every tick
     there is counted in the summary. Below 2 micrometres from its target a follower stands still.
     """
-    precision, told = options["precision"], _told(options)
-    output, scene = output_and_scene(options, leader)
     if explain_step is not None:
-        _explain(output, scene, explain_step, explain or "text", precision, told)
-    elif explain is not None:
+        _explain(options, leader, explain_step, explain or "text")
+        return
+    output, scene = output_and_scene(options, leader)
+    if explain is not None:
         raise click.UsageError("--explain derives one control step; name it with --explain-step N, from 0")
-    else:
-        output.run(scene)
+    output.run(scene)
 
 
-def _told(options: dict[str, Any]) -> list[str]:
-    """Name the options that are about a whole run and not about one step."""
-    named = {"live": "--live", "realtime": "--realtime", "plot": "--plot", "view": "--view"}
-    told = [option for name, option in named.items() if options[name]]
-    if options["emit"] != "commands":
-        told.append("--emit")
-    form = options["format_name"] or by_suffix(options["output"], ("yaml", "json", "csv"))
-    return [*told, f"the format {form}"] if form not in (None, "text") else told
-
-
-def _explain(output: SimOutput, scene: Scene, step: int, form: str, precision: int | None, told: list[str]) -> None:
-    """Write the derivation of one control step of the followers."""
-    if told:
-        raise click.UsageError(f"--explain-step derives one step in words; leave {' and '.join(told)} out")
+def _explain(options: dict[str, Any], leader: str, step: int, form: str) -> None:
+    """Write the derivation of one control step of the followers; refuse options that are about a whole run."""
+    precision = options["precision"]
+    too_many = [f"--{name}" for name in ("live", "realtime", "plot", "view") if options[name]]
+    too_many += ["--emit"] if options["emit"] != "commands" else []
+    chosen = options["format_name"] or by_suffix(options["output"], ("yaml", "json", "csv"))
+    too_many += [f"the format {chosen}"] if chosen not in (None, "text") else []
+    output, scene = output_and_scene(options, leader)
+    if too_many:
+        raise click.UsageError(f"--explain-step derives one step in words; leave {' and '.join(too_many)} out")
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.follow import derive_follow
     from frametool.sim.followed import follow_steps
@@ -86,10 +81,10 @@ def output_and_scene(
     chosen = {name: options.pop(name) for name in SCENE_OPTIONS}
     if chosen["holonomic"] and chosen["turtlesim"] == "ros1":
         raise click.UsageError("--holonomic is for --turtlesim ros2; in ROS 1 linear.y always counts")
-    output = SimOutput(**options, **more)
+    output = SimOutput.of(**options, **more)
     try:
         controller = FollowController(law, **changes)
-        drive = leader_of(leader, seed, paced=output.realtime) if isinstance(leader, str) else leader
+        drive = leader_of(leader, seed, paced=output.realtime or output.live) if isinstance(leader, str) else leader
         return output, tutorial(leader=drive, law=controller, **chosen)
     except ValueInvalid as error:
         raise click.UsageError(str(error)) from None

@@ -40,7 +40,7 @@ def command(scene: str, duration: float | None, seed: int | None, **options: Any
     law, rate, gain_linear, gain_angular, max_linear, max_angular, target, delay. Events are turtlesim's services:
     spawn, kill, reset, clear, teleport_absolute, teleport_relative, rotate_absolute (ROS 2), set_pen.
     """
-    output = SimOutput(**options)
+    output = SimOutput.of(**options)
     try:
         read = read_scene(source_of(scene), seed=seed)
     except FormatError as error:
