@@ -65,7 +65,10 @@ class FollowController:
         linear = self.gain_linear * distance
         angular = self.gain_angular * math.atan2(y, x)
         try:
-            return Twist(_limited(linear, self.max_linear), _limited(angular, self.max_angular))
+            return Twist(
+                max(-self.max_linear, min(self.max_linear, linear)),
+                max(-self.max_angular, min(self.max_angular, angular)),
+            )
         except ValueInvalid:
             raise ValueInvalid(unbounded(self.gain_linear, self.gain_angular, distance)) from None
 
@@ -77,10 +80,6 @@ class FollowController:
 def unbounded(gain_linear: float, gain_angular: float, distance: float) -> str:
     """Say that gains are too great; metres."""
     return f"gain_linear {gain_linear:g}, gain_angular {gain_angular:g} give no finite velocity at {distance:g} m"
-
-
-def _limited(value: float, most: float) -> float:
-    return max(-most, min(most, value))
 
 
 def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:
@@ -274,7 +273,8 @@ class Square:
             self._moves, self._stopping = not self._moves, False
             self._goal = _ahead(pose) if self._moves else pose._replace(theta=wrapped(pose.theta + PI / 2.0))
             return Twist(0.0, 0.0)
-        if self._stopping or _reached(pose, self._goal):
+        near = abs(pose.x - self._goal.x) < 0.1 and abs(pose.y - self._goal.y) < 0.1
+        if self._stopping or (near and abs(wrapped(pose.theta - self._goal.theta)) < 0.01):
             self._stopping = True
             return Twist(0.0, 0.0)
         return Twist(1.0, 0.0) if self._moves else Twist(0.0, 0.4)
@@ -334,8 +334,3 @@ def scripted(commands: Iterable[TimedTwist]) -> MakeLeader:
 def _ahead(pose: TurtlePose) -> TurtlePose:
     """Return the place 2 m ahead."""
     return pose._replace(x=math.cos(pose.theta) * 2.0 + pose.x, y=math.sin(pose.theta) * 2.0 + pose.y)
-
-
-def _reached(pose: TurtlePose, goal: TurtlePose) -> bool:
-    near = abs(pose.x - goal.x) < 0.1 and abs(pose.y - goal.y) < 0.1
-    return near and abs(wrapped(pose.theta - goal.theta)) < 0.01

@@ -116,7 +116,13 @@ class Simulation:
     def tick(self) -> None:
         """Advance turtlesim by one tick: service calls, motion, poses; at time 0 only poses."""
         step, world = self.step, self.world
-        self._answer_calls()
+        for call in self.calls:
+            try:
+                message = world.call(call.service, **call.arguments)
+            except ServiceRefused as refusal:
+                message = f"{call.place}: {refusal}" if call.place else str(refusal)
+            step.log += [message] if message else []
+        self.calls.clear()
         step.is_tick = True
         if step.t_ns:
             step.walls = world.tick(step.t_ns)
@@ -127,16 +133,6 @@ class Simulation:
             step.pens[name] = turtle.pen
             self.broadcast(WORLD, name, planar(pose.x, pose.y, pose.theta))
         self.states.update(step.states)
-
-    def _answer_calls(self) -> None:
-        """Answer the service calls that have come in since the last tick."""
-        for call in self.calls:
-            try:
-                message = self.world.call(call.service, **call.arguments)
-            except ServiceRefused as refusal:
-                message = f"{call.place}: {refusal}" if call.place else str(refusal)
-            self.step.log += [message] if message else []
-        self.calls.clear()
 
 
 def simulate(scene: Scene) -> Iterator[SimulationStep]:

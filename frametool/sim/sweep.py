@@ -91,12 +91,8 @@ def rows(
     gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult,
 ) -> Iterator[dict[str, float | None]]:  # fmt: skip
     """Yield the result of `grid` as one record a pair of gains; None where there is no number."""
-    columns = {
-        "time_to_reach": result.time_to_reach,
-        "overshoot": result.overshoot,
-        "final_distance": result.distance,
-        "wall_hits": result.wall_hits,
-    }
+    columns = {"time_to_reach": result.time_to_reach, "overshoot": result.overshoot}
+    columns |= {"final_distance": result.distance, "wall_hits": result.wall_hits}
     for row, column in np.ndindex(len(gain_linear), len(gain_angular)):
         cells = {name: values[row, column].item() for name, values in columns.items()}
         known = {name: None if math.isnan(cell) else cell for name, cell in cells.items()}

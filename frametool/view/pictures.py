@@ -14,7 +14,7 @@ from __future__ import annotations
 import io
 import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
-from xml.sax.saxutils import escape, quoteattr
+from xml.sax.saxutils import escape
 
 from frametool.errors import ValueInvalid, printable
 from frametool.view.projection import SLANTED, Projection, Size, axis_tips, nice, place_labels
@@ -120,53 +120,38 @@ def write_html(picture: Picture, more: str = "") -> str:
 
 def _style() -> str:
     """Return the rules that give the palette's colours."""
-    light, dark = (
-        "".join(
-            f".{name} {{fill: {colours[scheme]}}} .{name}-line {{stroke: {colours[scheme]}}}\n"
-            for name, colours in PALETTE.items()
-        )
-        for scheme in (0, 1)
-    )
+    rule = ".{name} {{fill: {colour}}} .{name}-line {{stroke: {colour}}}\n".format
+    light, dark = ("".join(rule(name=name, colour=PALETTE[name][scheme]) for name in PALETTE) for scheme in (0, 1))
     return f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
 
 
 def _element(shape: Shape) -> str:
     match shape:
-        case PictureLine():
-            return _line(shape)
+        case PictureLine(points, colour, width, alpha, dashes, title):
+            way = "L".join(f"{_number(x)} {_number(y)}" for x, y in points)
+            look = "" if width == 1.0 else f' stroke-width="{width:g}"'
+            look += "" if alpha == 1.0 else f' opacity="{alpha:g}"'
+            look += f' stroke-dasharray="{" ".join(map("{:g}".format, dashes))}"' if dashes else ""
+            stroke = f'class="{colour}-line"' if colour in PALETTE else f'stroke="{colour}"'
+            end = f">{_title(title)}</path>" if title else "/>"
+            return f'<path {stroke}{look} d="M{way}"{end}\n'
         case PictureDot(x, y, radius, colour, title):
             place = f'cx="{_number(x)}" cy="{_number(y)}" r="{radius:g}"'
             return f"<circle {_fill(colour)} {place}>{_title(title)}</circle>\n"
         case PictureBox(x, y, width, height, colour, title):
             size = f'width="{_number(width)}" height="{_number(height)}"'
             return f'<rect {_fill(colour)} x="{_number(x)}" y="{_number(y)}" {size}>{_title(title)}</rect>\n'
-        case PictureWords():
-            return _words(shape)
+        case PictureWords(x, y, text, colour, anchor, size_px, bold, turn):
+            look = "" if anchor == "start" else f' text-anchor="{anchor}"'
+            look += "" if size_px == 12.0 else f' font-size="{size_px:g}"'
+            look += ' font-weight="bold"' if bold else ""
+            look += f' transform="rotate({turn:g} {_number(x)} {_number(y)})"' if turn else ""
+            halo = " paper-line" if colour in PALETTE else ""
+            return f'<text {_fill(colour, halo)} x="{_number(x)}" y="{_number(y)}"{look}>{_text(text)}</text>\n'
 
 
-def _line(line: PictureLine) -> str:
-    way = "L".join(f"{_number(x)} {_number(y)}" for x, y in line.points)
-    look = "" if line.width == 1.0 else f' stroke-width="{line.width:g}"'
-    look += "" if line.alpha == 1.0 else f' opacity="{line.alpha:g}"'
-    look += f' stroke-dasharray="{" ".join(map("{:g}".format, line.dashes))}"' if line.dashes else ""
-    stroke = f'class="{line.colour}-line"' if line.colour in PALETTE else f'stroke="{line.colour}"'
-    end = f">{_title(line.title)}</path>" if line.title else "/>"
-    return f'<path {stroke}{look} d="M{way}"{end}\n'
-
-
-def _words(words: PictureWords) -> str:
-    look = "" if words.anchor == "start" else f' text-anchor="{words.anchor}"'
-    look += "" if words.size == 12.0 else f' font-size="{words.size:g}"'
-    look += ' font-weight="bold"' if words.bold else ""
-    x, y = _number(words.x), _number(words.y)
-    look += f' transform="rotate({words.turn:g} {x} {y})"' if words.turn else ""
-    halo = "paper-line" if words.colour in PALETTE else ""
-    colour = f'class="{words.colour} {halo}"' if halo else f"fill={quoteattr(words.colour)}"
-    return f'<text {colour} x="{x}" y="{y}"{look}>{_text(words.text)}</text>\n'
-
-
-def _fill(colour: str) -> str:
-    return f'class="{colour}"' if colour in PALETTE else f'fill="{colour}"'
+def _fill(colour: str, more: str = "") -> str:
+    return f'class="{colour}{more}"' if colour in PALETTE else f'fill="{colour}"'
 
 
 def _title(text: str) -> str:
