@@ -301,7 +301,8 @@ def stdin_lines() -> Iterator[str]:
 
     Raises FormatError for bytes that are no text.
     """
-    for number, data in enumerate(_lines(sys.stdin.buffer)):
+    stdin: Any = sys.stdin.buffer
+    for number, data in enumerate(_lines(stdin.raw)):
         try:
             yield decode(data, "stdin")
         except FormatError as error:
@@ -310,13 +311,13 @@ def stdin_lines() -> Iterator[str]:
 
 
 def _lines(stream: Any) -> Iterator[bytes]:
-    """Read past the stream's buffer: Python aborts when it ends while a thread waits inside that."""
+    """Read lines past the buffer of standard input: Python aborts when it ends while a thread waits inside that."""
     begun: list[bytes] = []
-    while block := stream.raw.read(1 << 16):
-        first, *more = block.split(b"\n")
-        begun.append(first)
-        for rest in more:
-            yield b"".join(begun) + b"\n"
-            begun = [rest]
-    if last := b"".join(begun):
-        yield last
+    while block := stream.read(1 << 16):
+        *whole, rest = block.split(b"\n")
+        for end in whole:
+            yield b"".join((*begun, end, b"\n"))
+            begun = []
+        begun.append(rest)
+    if any(begun):
+        yield b"".join(begun)

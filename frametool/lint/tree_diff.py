@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.frames.lookups import Frames
-    from frametool.frames.snapshot import SeenPose
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
 
@@ -197,18 +196,18 @@ def diff(
     found = [*pair.only(), *(each for frame in pair.common for each in pair.about(frame))]
     order = {kind: number for number, kind in enumerate((*KINDS, SAME))}
     limit = pair.tolerance
-    found.sort(key=lambda each: (order[each.kind], -_own_size(each, limit), -limit.times(each.seen)))
+
+    def rank(each: Difference) -> tuple[float, ...]:  # what only went along with its parent comes behind
+        own = -1.0 if limit.covers(each.own) else limit.times(each.own)
+        return order[each.kind], -own, -limit.times(each.seen)
+
+    found.sort(key=rank)
     return Comparison(
         [each for each in found if each.kind != SAME],
         [each for each in found if each.kind == SAME],
         [*pair.notes, *_times(a, b, at_ns)],
-        [frame for frame in pair.common if pair.is_blind(frame)],
+        [frame for frame in pair.common if frame in pair.a.without_data and frame in pair.b.without_data],
     )
-
-
-def _own_size(each: Difference, tolerance: Tolerance) -> float:
-    """Return by how much a frame moved itself: what only went along with its parent comes behind."""
-    return -1.0 if tolerance.covers(each.own) else tolerance.times(each.own)
 
 
 class _Pair:
@@ -249,7 +248,9 @@ class _Pair:
         in_a, in_b = self.a.seen_from(start), self.b.seen_from(start)
         for frame in self.common:
             if frame != start and frame in in_a and frame in in_b and frame not in self.seen:
-                self.seen[frame] = start, _apart_seen(in_a[frame], in_b[frame])
+                rounding = ROUNDING * max(in_a[frame].reach, in_b[frame].reach)
+                apart = _apart(in_a[frame].components, in_b[frame].components)
+                self.seen[frame] = start, apart._replace(rounding=rounding, turn_rounding=ROUNDING)
 
     # --- what there is to say ---
 
@@ -290,35 +291,25 @@ class _Pair:
     def about(self, frame: str) -> Iterator[Difference]:
         """Yield what differs about a frame that both have; `same` if nothing does."""
         parent_a, parent_b = self.a.parent(frame), self.b.parent(frame)
-        blind_a, blind_b = frame in self.a.without_data, frame in self.b.without_data
+        blind = " and ".join(name for name, side in (("A", self.a), ("B", self.b)) if frame in side.without_data)
         start, seen = self.seen.get(frame, (None, None))
         said = Difference(SAME, frame, parent_a, parent_b, None, start, seen)
         if seen is None and self.start not in (None, frame):
             said = said._replace(note=f"not connected to {shown(self.start)} in both")
-        if note := self._other_motion(frame):
+        one, other = self.a.tree.track(frame), self.b.tree.track(frame)
+        if one is not None and other is not None and one.standing != other.standing:
+            note = "stands still in A, moves in B" if one.standing else "moves in A, stands still in B"
             yield Difference("motion", frame, parent_a, parent_b, note=note)
-        if blind_a or blind_b:
-            where = "A and B" if blind_a and blind_b else "A" if blind_a else "B"
-            yield said._replace(kind="no-data", note=f"no data in {where} at {format_stamp(self.a.at_ns or 0)}")
+        if blind:
+            yield said._replace(kind="no-data", note=f"no data in {blind} at {format_stamp(self.a.at_ns or 0)}")
         elif parent_a != parent_b:
             yield said._replace(kind="parent")
         else:
             own = _apart(self.a.edges[frame][1], self.b.edges[frame][1]) if parent_a is not None else None
-            if self.a.at_ns is None and (other := self._other_samples(frame)):
-                yield other
+            if self.a.at_ns is None and (samples := self._other_samples(frame)):
+                yield samples
             same = self.tolerance.covers(own) and self.tolerance.covers(seen)
             yield said._replace(kind=SAME if same else "moved", own=own)
-
-    def is_blind(self, frame: str) -> bool:
-        """Return whether neither has data on a frame at that time."""
-        return frame in self.a.without_data and frame in self.b.without_data
-
-    def _other_motion(self, frame: str) -> str:
-        """Say in which of the two a frame moves, if it stands still in the other."""
-        one, other = self.a.tree.track(frame), self.b.tree.track(frame)
-        if one is None or other is None or one.standing == other.standing:
-            return ""
-        return "stands still in A, moves in B" if one.standing else "moves in A, stands still in B"
 
     def _other_samples(self, frame: str) -> Difference | None:
         """Compare all samples of a frame that moves in both."""
@@ -347,11 +338,6 @@ MOST_PAIRS = 10_000  # of frames below one parent that are compared
 
 def _apart(a: Rigid, b: Rigid) -> Apart:
     return Apart(*rigid.distance(*a, *b, floats))
-
-
-def _apart_seen(a: SeenPose, b: SeenPose) -> Apart:
-    apart = _apart(a.components, b.components)
-    return apart._replace(rounding=ROUNDING * max(a.reach, b.reach), turn_rounding=ROUNDING)
 
 
 def _covered(track: MovingTrack) -> str:

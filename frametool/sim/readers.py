@@ -271,7 +271,7 @@ def timed_commands(
 
 def _pieces(lines: Iterable[str], name: str) -> Iterator[CommandText]:
     """Cut lines into pieces that can be read one by one; the first line that says something tells CSV from the rest."""
-    numbered = ((number, _without_noise(line.rstrip("\r\n"))) for number, line in enumerate(lines, 1))
+    numbered = enumerate((_without_noise(line.rstrip("\r\n")) for line in lines), 1)
     for number, text in numbered:
         if not _says_something(text):
             continue

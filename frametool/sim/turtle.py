@@ -9,7 +9,7 @@ turtlesim's world: turtles by name, its clock's ticks, its services with their r
 from __future__ import annotations
 
 import math
-from struct import Struct
+from array import array
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, listing, printable, shown
@@ -26,9 +26,6 @@ CENTRE = SIZE / 2.0
 TURN_SPEED = 1.0  # radians a second, of rotate_absolute
 TURN_NEAR = 0.02  # radians, where rotate_absolute ends
 FASTEST_TURN = 1e15  # radians a second; beyond, what is left of an angle after wrapping is rounding
-
-_ONE_SINGLE = Struct("f")
-_FIVE_SINGLES = Struct("5f")
 
 
 class _Components(NamedTuple):
@@ -89,10 +86,7 @@ class Pen(NamedTuple):
 
 def single(value: float) -> float:
     """Round to float32, as turtlesim's messages and service arguments are."""
-    try:
-        return float(_ONE_SINGLE.unpack(_ONE_SINGLE.pack(value))[0])
-    except OverflowError:
-        return math.copysign(math.inf, value)
+    return array("f", (value,))[0]
 
 
 def check_single(**numbers: float) -> None:
@@ -159,7 +153,8 @@ class Turtle:
     def pose(self) -> TurtlePose:
         """Return what turtlesim would publish now, float32."""
         ahead, turning, aside = self._velocity
-        return _rounded(self._x, SIZE - self._down, self._theta, math.sqrt(ahead * ahead + aside * aside), turning)
+        speed = math.sqrt(ahead * ahead + aside * aside)
+        return TurtlePose(*array("f", (self._x, SIZE - self._down, self._theta, speed, turning)))
 
     def command(self, twist: Twist) -> None:
         """Take a velocity command; it acts from the next tick on, the last one of several wins."""
@@ -236,14 +231,6 @@ class Turtle:
         self._x = min(max(self._x, 0.0), SIZE)
         self._down = min(max(self._down, 0.0), SIZE)
         return outside
-
-
-def _rounded(*numbers: float) -> TurtlePose:
-    """Round a pose to float32."""
-    try:
-        return TurtlePose(*_FIVE_SINGLES.unpack(_FIVE_SINGLES.pack(*numbers)))
-    except OverflowError:
-        return TurtlePose(*map(single, numbers))
 
 
 VARIANTS = ("ros1", "ros2")

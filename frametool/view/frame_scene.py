@@ -46,8 +46,7 @@ def _expression(text: str) -> re.Pattern[str]:
     import warnings
 
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FutureWarning)
+        with warnings.catch_warnings(action="ignore", category=FutureWarning):
             return re.compile(text)
     except (re.error, OverflowError, RecursionError) as error:
         raise ValueInvalid(f"{shown(text)} is no regular expression: {error}") from None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
+from array import array
 from operator import mul
 from typing import TYPE_CHECKING, Any
 
@@ -105,8 +106,7 @@ def _add_axes(part: BinaryPart) -> None:
 
 def _single(value: float) -> float:
     """Round to float32, as the numbers in the buffer are."""
-    rounded: float = struct.unpack("<f", struct.pack("<f", value))[0]
-    return rounded
+    return array("f", (value,))[0]
 
 
 def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[list[dict[str, Any]], dict[str, int]]:

@@ -108,21 +108,17 @@ def write_svg(picture: Picture) -> str:
     """Return the picture as an SVG document."""
     width, height = f"{picture.width:g}", f"{picture.height:g}"
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+    rule = ".{name} {{fill: {colour}}} .{name}-line {{stroke: {colour}}}\n".format
+    light, dark = ("".join(rule(name=name, colour=PALETTE[name][scheme]) for name in PALETTE) for scheme in (0, 1))
+    style = f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
     paper = '<rect class="paper" width="100%" height="100%"/>\n'
-    return f"{head} {FONT}>\n{_title(picture.title)}{_style()}{paper}{''.join(map(_element, picture.shapes))}</svg>\n"
+    return f"{head} {FONT}>\n{_title(picture.title)}{style}{paper}{''.join(map(_element, picture.shapes))}</svg>\n"
 
 
 def write_html(picture: Picture, more: str = "") -> str:
     """Return an HTML document of the picture, and of what else it is to hold."""
     head = f'<head><meta charset="utf-8">{_title(picture.title)}</head>'
     return f'<!DOCTYPE html>\n<html lang="en">\n{head}\n<body>\n{write_svg(picture)}{more}</body>\n</html>\n'
-
-
-def _style() -> str:
-    """Return the rules that give the palette's colours."""
-    rule = ".{name} {{fill: {colour}}} .{name}-line {{stroke: {colour}}}\n".format
-    light, dark = ("".join(rule(name=name, colour=PALETTE[name][scheme]) for name in PALETTE) for scheme in (0, 1))
-    return f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
 
 
 def _element(shape: Shape) -> str:

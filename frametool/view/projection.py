@@ -6,6 +6,7 @@ Names beside points, none over another: a grid of cells holds what is taken, so 
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable, shown
@@ -86,13 +87,14 @@ class Projection:
     links: (parent, child) where both are drawn
     axis: metres of a drawn axis
     scale: pixels of a metre
-    view: the rows right, up, toward the eye
+    view: the directions right, up and toward the eye
     """
 
     def __init__(self, scene: FrameScene, size: Size, eye: tuple[float, float] = SLANTED) -> None:
         """Fit all that is drawn into the picture."""
         self.scene, self.size = scene, size
-        self.view = _view(*eye)
+        sa, ca, se, ce = (function(angle) for angle in eye for function in (math.sin, math.cos))
+        self.view = (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
         self.poses = {name: pose for name, pose in scene.poses().items() if can_be_drawn(pose[:3])}
         self.trails = scene.trails
         self.links = [(parent, name) for name in self.poses if (parent := scene.parent(name)) in self.poses and parent]
@@ -195,12 +197,6 @@ def nice(length: float) -> float:
     return (1.0 if factor < 1.5 else 2.0 if factor < 3.5 else 5.0 if factor < 7.5 else 10.0) * power
 
 
-def _view(azimuth: float, elevation: float) -> tuple[Point, Point, Point]:
-    """Return the directions right, up and toward the eye."""
-    ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
-    return (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
-
-
 def _bounds(points: Iterable[Sequence[float]]) -> tuple[list[float], list[float]]:
     """Return the least and the greatest coordinates of some points; of none, 0."""
     columns = list(zip(*points, strict=True)) or [(0.0,)] * 3
@@ -256,9 +252,7 @@ class TakenBoxes:
 
 def _cells(box: Box) -> Iterator[tuple[int, int]]:
     left, top, right, bottom = (math.floor(edge / CELL) for edge in box)
-    for column in range(left, right + 1):
-        for row in range(top, bottom + 1):
-            yield column, row
+    return product(range(left, right + 1), range(top, bottom + 1))
 
 
 def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box] = ()) -> tuple[list[Label], int]:
@@ -314,13 +308,9 @@ def _spots(flat: Projection, words: str, point: Flat, font: float) -> Iterator[L
 
 def words_of(names: list[str], most: int = 2) -> str:
     """Return the words for frames on one point: some of their names, and how many more there are."""
-    words = " · ".join(_cut(name) for name in names[:most])
+    shown_names = map(printable, names[:most])
+    words = " · ".join(name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in shown_names)
     return words + (f" +{len(names) - most}" if len(names) > most else "")
-
-
-def _cut(name: str) -> str:
-    name = printable(name)
-    return name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…"
 
 
 def width_of(words: str, font: float) -> float:
