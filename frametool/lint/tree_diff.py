@@ -6,7 +6,6 @@ Signs of quaternions and the order of names do not count.  Where a tree moves it
 from __future__ import annotations
 
 import re
-from functools import partial
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -72,8 +71,10 @@ def parse_tolerance(text: str) -> Tolerance:
     try:
         if len(parts) != len(cells):
             raise ValueInvalid(f"{shown(text)} is not one length and one angle")
-        read = {"metres": parse_length, "radians": partial(read_number_or_angle, degrees=False)}
-        found = Tolerance(**{name: read[name](cell) for name, cell in parts.items()})
+        found = Tolerance(**{
+            name: parse_length(cell) if name == "metres" else read_number_or_angle(cell, degrees=False)
+            for name, cell in parts.items()
+        })  # fmt: skip
         if negative := [cell for name, cell in parts.items() if getattr(found, name) < 0.0]:
             raise ValueInvalid(f"{shown(negative[0])} is less than 0")
     except ValueInvalid as error:

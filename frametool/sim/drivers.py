@@ -280,30 +280,30 @@ class Square:
         return Twist(1.0, 0.0) if self._moves else Twist(0.0, 0.4)
 
 
-class Wanderer:
-    """Drive to places drawn at random, one after another, at up to 2 m/s; the same seed gives the same way."""
+MARGIN = 1.0  # metres to the walls
 
-    margin = 1.0  # metres to the walls
 
-    def __init__(self, seed: int = 0) -> None:
-        """Draw the first place."""
-        from random import Random
+def wanderer(seed: int = 0) -> Callable[[int, TurtlePose], Twist]:
+    """Return what drives to places drawn at random, one after another, at up to 2 m/s; one way for each seed."""
+    from random import Random
 
-        self._random = Random(seed)  # noqa: S311 - no secret
-        self._law = FollowController(gain_linear=1.0, max_linear=2.0)
-        self._goal = self._draw()
+    random = Random(seed)  # noqa: S311 - no secret
+    law = FollowController(gain_linear=1.0, max_linear=2.0)
 
-    def drive(self, now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG002
-        """Follow the place; near it, take another."""
-        if math.dist(self._goal, pose[:2]) < 0.5:
-            self._goal = self._draw()
-        x, y = self._goal[0] - pose.x, self._goal[1] - pose.y
+    def draw() -> tuple[float, float]:
+        return random.uniform(MARGIN, SIZE - MARGIN), random.uniform(MARGIN, SIZE - MARGIN)
+
+    goal = draw()
+
+    def drive(now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG001 - has no clock
+        nonlocal goal
+        if math.dist(goal, pose[:2]) < 0.5:
+            goal = draw()
+        x, y = goal[0] - pose.x, goal[1] - pose.y
         cosine, sine = math.cos(pose.theta), math.sin(pose.theta)
-        return self._law.command(cosine * x + sine * y, cosine * y - sine * x)
+        return law.command(cosine * x + sine * y, cosine * y - sine * x)
 
-    def _draw(self) -> tuple[float, float]:
-        low, high = self.margin, SIZE - self.margin
-        return self._random.uniform(low, high), self._random.uniform(low, high)
+    return drive
 
 
 # name -> what makes the leader of a seed
@@ -312,7 +312,7 @@ LEADERS: dict[str, Callable[[int], Leader]] = {
     "circle": lambda _: Periodic(BILLION // 2, circle),
     "square": lambda _: Periodic(TICK_NS, Square().drive),
     "figure8": lambda _: Periodic(TICK_NS, figure_eight),
-    "random": lambda seed: Periodic(BILLION // 10, Wanderer(seed).drive),
+    "random": lambda seed: Periodic(BILLION // 10, wanderer(seed)),
 }
 
 

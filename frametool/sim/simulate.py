@@ -174,7 +174,7 @@ def _processes(simulation: Simulation, scene: Scene) -> Iterator[tuple[int, Proc
         if isinstance(turtle.driver, Follow):
             if turtle.driver.leader == turtle.name:
                 raise ValueInvalid(f"{turtle.name} cannot follow itself")
-            yield CONTROLLERS, _controller(FollowerNode(turtle.name, turtle.driver), simulation)
+            yield CONTROLLERS, _controller(simulation, turtle.name, turtle.driver)
         elif turtle.driver is not None:
             yield LEADERS, _leader(simulation, turtle.name, turtle.driver())
 
@@ -218,52 +218,42 @@ def _leader(simulation: Simulation, name: str, leader: Leader) -> Process:
             step.led.append(IssuedCommand(step.t_ns, name, given, None, None, turtle.state))
 
 
-def _controller(follower: FollowerNode, simulation: Simulation) -> Process:
-    """Let a follower steer at the rate of its law."""
+def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:
+    """Be the tutorial's listener: look the target up in tf at the rate of the law, and drive there.
+
+    Without an answer it skips the cycle and logs once why, until there is one again.
+    """
+    frame, failing = frame_of(follow.leader, follow.target), ""
     for number in count():
-        yield follower.follow.controller.due_ns(number)
-        if follower.turtle in simulation.world.turtles:
-            follower.steer(simulation)
-
-
-class FollowerNode:
-    """The tutorial's listener: looks its target up in tf, and drives there; without an answer it skips the cycle."""
-
-    def __init__(self, turtle: str, follow: Follow) -> None:
-        """Let a turtle follow."""
-        self.turtle = turtle
-        self.follow = follow
-        self.frame = frame_of(follow.leader, follow.target)
-        self._failing = ""
-
-    def steer(self, simulation: Simulation) -> None:
-        """Look the target up and command the turtle; log once why there is no command, until there is one again."""
-        step = simulation.step
+        yield follow.controller.due_ns(number)
+        step, turtle = simulation.step, simulation.world.turtles.get(name)
+        if turtle is None:
+            continue
         try:
-            x, y = self._look(simulation.buffer, step.t_ns)
+            x, y = _look(simulation.buffer, name, frame, step.t_ns, follow.delay_ns)
         except LookupFailed as error:
-            if type(error).__name__ != self._failing:
-                self._failing = type(error).__name__
-                step.log.append(f"Could not transform {self.turtle} to {self.frame}: {error}")
-            return
-        self._failing = ""
+            if type(error).__name__ != failing:
+                failing = type(error).__name__
+                step.log.append(f"Could not transform {name} to {frame}: {error}")
+            continue
+        failing = ""
         try:
-            twist = self.follow.controller.command(x, y)
+            twist = follow.controller.command(x, y)
         except ValueInvalid as error:
-            raise ValueInvalid(f"{self.turtle}: {error}") from None
-        simulation.world.turtles[self.turtle].command(twist)
-        leader, state = simulation.states.get(self.follow.leader), simulation.states[self.turtle]
-        step.commands.append(IssuedCommand(step.t_ns, self.turtle, twist, math.sqrt(x * x + y * y), leader, state))
+            raise ValueInvalid(f"{name}: {error}") from None
+        turtle.command(twist)
+        leader, state = simulation.states.get(follow.leader), simulation.states[name]
+        step.commands.append(IssuedCommand(step.t_ns, name, twist, math.sqrt(x * x + y * y), leader, state))
 
-    def _look(self, buffer: TransformBuffer, now_ns: int) -> tuple[float, float]:
-        """Return the target as the turtle sees it: at the latest common time, or where it was `delay_ns` before now.
 
-        Looking back, the turtle itself counts as standing where tf saw it last (tf2's lookup across time).
-        """
-        if not self.follow.delay_ns:
-            return buffer.lookup(self.turtle, self.frame).components[:2]
-        past_ns = now_ns - self.follow.delay_ns
-        return buffer.lookup_across(self.turtle, None, self.frame, past_ns, WORLD).components[:2]
+def _look(buffer: TransformBuffer, turtle: str, frame: str, now_ns: int, delay_ns: int) -> tuple[float, float]:
+    """Return a frame as the turtle sees it: at the latest common time, or where it was `delay_ns` before now.
+
+    Looking back, the turtle itself counts as standing where tf saw it last (tf2's lookup across time).
+    """
+    if not delay_ns:
+        return buffer.lookup(turtle, frame).components[:2]
+    return buffer.lookup_across(turtle, None, frame, now_ns - delay_ns, WORLD).components[:2]
 
 
 class RunSummary:

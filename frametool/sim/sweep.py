@@ -71,7 +71,10 @@ def simulate_many(
     numbers = [_checked(name, getattr(law_itself, name) if value is None else value) for name, value in given.items()]
     columns = np.broadcast_arrays(*np.moveaxis(_places(spawn), -1, 0), *numbers)
     shape, flat = columns[0].shape, [column.reshape(-1) for column in columns]
-    track = _leader_track(leader, duration, seed)
+    if not 0.0 <= duration < math.inf:
+        raise ValueInvalid(f"duration must be finite and 0 or more, found {duration}")
+    steps = simulate(tutorial(leader=leader, followers=0, duration=duration, seed=seed))
+    track = [(step.states["turtle1"], step.poses["turtle1"]) for step in steps if step.is_tick]
     blocks = [
         _follow([column[at : at + BLOCK] for column in flat], track, law_itself, reach)
         for at in range(0, max(flat[0].size, 1), BLOCK)
@@ -91,7 +94,7 @@ def rows(
     gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult,
 ) -> Iterator[dict[str, float | None]]:  # fmt: skip
     """Yield the result of `grid` as one record a pair of gains; None where there is no number."""
-    columns = {"time_to_reach": result.time_to_reach, "overshoot": result.overshoot}
+    columns: dict[str, NDArray[Any]] = {"time_to_reach": result.time_to_reach, "overshoot": result.overshoot}
     columns |= {"final_distance": result.distance, "wall_hits": result.wall_hits}
     for row, column in np.ndindex(len(gain_linear), len(gain_angular)):
         cells = {name: values[row, column].item() for name, values in columns.items()}
@@ -125,14 +128,6 @@ def _places(spawn: ArrayLike) -> Floats:
 def _single(values: Floats) -> Floats:
     """Round to float32."""
     return values.astype(np.float32).astype(float)
-
-
-def _leader_track(leader: MakeLeader | str, duration: float, seed: int) -> LeaderTrack:
-    """Run the leader alone: where it is at time 0 and after every tick, and what it publishes of that."""
-    if not 0.0 <= duration < math.inf:
-        raise ValueInvalid(f"duration must be finite and 0 or more, found {duration}")
-    steps = simulate(tutorial(leader=leader, followers=0, duration=duration, seed=seed))
-    return [(step.states["turtle1"], step.poses["turtle1"]) for step in steps if step.is_tick]
 
 
 def _follow(columns: list[Floats], track: LeaderTrack, law: FollowController, reach: float) -> tuple[Any, ...]:

@@ -174,19 +174,13 @@ class FrameScene:
 
     def _movers_above(self, name: str) -> set[str]:
         """Return the moving frames on any way from a frame to a root."""
-        found: set[str] = set()
-        waiting, seen = [name], {name}
-        while waiting:
-            each = waiting.pop()
-            track = self.tree.track(each)
-            if track is None:
-                continue
-            if not track.standing:
-                found.add(each)
-            above = {parent for _, parent, _ in track.walk()} if track.varies else {track.parent}
-            waiting += above - seen
-            seen |= above
-        return found
+        seen, waiting = {name}, [name]
+        for each in waiting:  # it grows as it is walked
+            if track := self.tree.track(each):
+                above = {parent for _, parent, _ in track.walk()} if track.varies else {track.parent}
+                waiting += above - seen
+                seen |= above
+        return seen & self.tracks.keys()
 
 
 def can_be_drawn(point: Sequence[float]) -> bool:

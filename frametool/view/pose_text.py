@@ -63,7 +63,7 @@ def _describe(result: Result, style: Style) -> str:
     if pose.rotation is not None:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)
-    lines += [NumberLine(*extra) for extra in _extra_lines(result)]
+    lines += _extra_lines(result)
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
 
 
@@ -99,13 +99,13 @@ def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Nu
         yield NumberLine("", [], "gimbal lock: not unique, third angle set to 0")
 
 
-def _extra_lines(result: Result) -> Iterator[tuple[str, Sequence[tuple[str, float]], str]]:
+def _extra_lines(result: Result) -> Iterator[NumberLine]:
     """Yield the lines of what is only said about a pose."""
     units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s"}
     for key, value in result.extras.items():
         if isinstance(value, float):
             unit = "deg" if key.endswith("_deg") else units.get(key.partition("_")[0], "")
-            yield key.removesuffix("_deg"), [("", value)], unit
+            yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)
 
 
 def _layout(lines: Sequence[NumberLine], style: Style) -> str:
@@ -117,15 +117,14 @@ def _layout(lines: Sequence[NumberLine], style: Style) -> str:
         if line.label or not parts:
             parts.append([])
         parts[-1].append(line)
-    for split in (list(lines),), parts:
-        texts = [_columns(part, label, style) for part in split]
-        if max(len(text) for part in texts for text in part) <= width:
-            break
-    return "".join(
-        text
-        for part, rows in zip(split, texts, strict=True)
-        for text in (rows if max(map(len, rows)) <= width else _columns(_stacked(part), label, style))
-    )
+    texts = _columns(lines, label, style)
+    if max(map(len, texts)) <= width:
+        return "".join(texts)
+    found = []
+    for part in parts:
+        texts = _columns(part, label, style)
+        found += texts if max(map(len, texts)) <= width else _columns(_stacked(part), label, style)
+    return "".join(found)
 
 
 def _columns(lines: Sequence[NumberLine], label: int, style: Style) -> list[str]:

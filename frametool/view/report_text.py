@@ -85,7 +85,7 @@ def write_diff(found: Iterable[Difference]) -> str:
     for each in found:
         kinds.setdefault(each.kind, []).append(each)
     moved = [*kinds.pop("moved", ()), *kinds.pop("same", ())]
-    parts = [_list(kind, found) for kind, found in kinds.items()]
+    parts = [f"{_HEADINGS[kind]}:\n{''.join(map(_said, alike))}" for kind, alike in kinds.items()]
     starts = dict.fromkeys(each.seen_from for each in moved)
     parts += (_table(start, [each for each in moved if each.seen_from == start]) for start in starts)
     return "\n".join(parts)
@@ -95,13 +95,8 @@ _HEADINGS = {"only-in-a": "only in A", "only-in-b": "only in B", "parent": "othe
              "no-data": "no data", "samples": "other samples"}  # fmt: skip
 
 
-def _list(kind: str, found: Iterable[Difference]) -> str:
-    """Return a heading and the lines of differences that are said in words."""
-    return f"{_HEADINGS[kind]}:\n" + "".join(f"{line}\n" for each in found for line in _said(each))
-
-
-def _said(each: Difference) -> Iterator[str]:
-    """Yield the lines about one frame."""
+def _said(each: Difference) -> str:
+    """Return the lines about one frame, in words."""
     text = short(each.frame, WIDTH - 4)
     if each.kind in ("only-in-a", "only-in-b"):
         parent = each.parent_a if each.kind == "only-in-a" else each.parent_b
@@ -112,9 +107,10 @@ def _said(each: Difference) -> Iterator[str]:
     elif each.own:
         text += f" by up to {each.own}"
     text += f": {each.note}" if each.note else ""
-    yield from _folded(text)
+    lines = list(_folded(text))
     if each.kind == "parent" and each.seen:
-        yield f"    moved {each.seen}, seen from {short(str(each.seen_from), WIDTH // 2 - 10)}"
+        lines.append(f"    moved {each.seen}, seen from {short(str(each.seen_from), WIDTH // 2 - 10)}")
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _folded(text: str) -> Iterator[str]:
