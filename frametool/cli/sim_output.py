@@ -1,8 +1,6 @@
-"""What a run of turtles shows, and where: records to stdout or a file, messages to stderr, a drawing, a plot.
+"""What the commands of the turtles share: their options, leaders by name, file or standard input, and where a run goes.
 
-Options that several commands of the turtles share, and the types of their values.
-
-Leaders from the command line: a built-in name, a file, standard input.
+Records go to stdout or a file, messages to stderr, beside a drawing in the terminal, a plot and a page.
 """
 
 from __future__ import annotations
@@ -60,7 +58,7 @@ REACH = click.option("--reach", type=NUMBER, default=0.5, show_default=True, met
 
 
 def follow_options(duration: str) -> Callable[[Any], Any]:
-    """Add to a command the options of followers; `duration` is how long it runs if not told."""
+    """Add to a command the options of followers; `duration` is how long it runs by default."""
     options = [
         click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
                      help="each follows the one before, the first follows turtle1"),
@@ -239,7 +237,7 @@ def log_events() -> Watch:
 
 
 def style_of(format_name: str | None, output: str | None, precision: int | None) -> Style:
-    """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+    """Choose the form: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe."""
     is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
     form = format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
     return Style(form, precision=None if precision == FULL else precision)

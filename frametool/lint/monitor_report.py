@@ -23,7 +23,7 @@ def monitor(
 ) -> list[dict[str, Any]]:
     """Describe every edge of some files; or, of `ends` (target, source), those between the two and their chain.
 
-    clashing: takes the errors about frames that come by the topics of two robots, whose samples are then told as one
+    clashing: takes the errors about frames that come by the topics of two robots, whose samples then count as one
     Raises FormatError for files without transforms, UnknownFrame, NotConnected.
     """
 

@@ -1,7 +1,4 @@
-"""What `check` finds in files, and its rules about edges together: the shape of the tree, what happens over time.
-
-Trees and recordings read for `check`: what is wrong with one entry does not hide the others.
-"""
+"""The rules of `check`: mistakes in one entry, which hide no others, then the shape of the tree and what moves."""
 
 from __future__ import annotations
 
@@ -80,8 +77,8 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
-    for told in recording.tally.told():
-        find(Finding(told.rule, told.message, recording.name, told.line, 1))
+    for note in recording.tally.told():
+        find(Finding(note.rule, note.message, recording.name, note.line, 1))
 
 
 def _stated(edge: Edge, source: str, line: int, column: int) -> Statement:
@@ -101,19 +98,19 @@ def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[State
     except FormatError as error:
         find(Finding("syntax", error.message, source.name, error.line, error.column))
         return
-    said: list[Note] = []
+    notes: list[Note] = []
     edges = []
     for document in documents:
-        edges += _read_document(document, Reading(source, normalize=normalize), said)
-    places = locate_many(source.text, [*(note.path for note in said), *(edge.path for edge, _ in edges)])
-    for note, (line, column) in zip(said, places, strict=False):
+        edges += _read_document(document, Reading(source, normalize=normalize), notes)
+    places = locate_many(source.text, [*(note.path for note in notes), *(edge.path for edge, _ in edges)])
+    for note, (line, column) in zip(notes, places, strict=False):
         find(Finding(note.rule, note.message, source.name, line, column))
-    for (edge, w_first), place in zip(edges, places[len(said) :], strict=True):
+    for (edge, w_first), place in zip(edges, places[len(notes) :], strict=True):
         yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
 
 
-def _read_document(document: Document, reading: Reading, said: list[Note]) -> list[tuple[Edge, bool]]:
-    """Return the edges of a document, each with whether it looks written w first; keep what is to be said."""
+def _read_document(document: Document, reading: Reading, notes: list[Note]) -> list[tuple[Edge, bool]]:
+    """Return the edges of a document, each with whether it looks written w first; collect its notes."""
     reading.faults = []
     edges = []
     try:
@@ -125,7 +122,7 @@ def _read_document(document: Document, reading: Reading, said: list[Note]) -> li
     except Misfit as misfit:
         reading.faults.append(misfit)
     faults = (Note(misfit.rule or "syntax", str(misfit), misfit.path) for misfit in reading.faults)
-    said += [note._replace(path=(document.index, *note.path)) for note in (*faults, *reading.notes)]
+    notes += [note._replace(path=(document.index, *note.path)) for note in (*faults, *reading.notes)]
     return edges
 
 
@@ -280,7 +277,7 @@ def _steps(child: Child) -> Iterator[Finding]:
 
 
 def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
-    """Find the cycles among the newest parents; each is told once."""
+    """Find the cycles among the newest parents; each is reported once."""
     done: set[str] = set()
     for start in children:
         line: list[str] = []

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 ROUNDING = 2.0**-46  # of the largest number on a way: what a product of some dozens of poses is off at most
 
-# kind -> what it is, in the order in which differences are told; each of them makes two trees different
+# kind -> what it is, in the order in which differences are listed; each of them makes two trees different
 KINDS = {
     "only-in-a": "a frame that B does not have",
     "only-in-b": "a frame that A does not have",
@@ -168,7 +168,7 @@ class Comparison(NamedTuple):
     """What differs between two trees.
 
     differences: by kind, the farthest first
-    unmoved: the common frames of which nothing is told there
+    unmoved: the common frames that are not among them
     notes: sentences about how the two were compared
     uncompared: frames that could not be compared: neither has data at that time
     """
@@ -222,7 +222,7 @@ class _Pair:
         self.common = [frame for frame in a.frames if frame in in_b]
         self.notes = [] if self.common else ["no frame is in both A and B"]
         self.seen: dict[str, tuple[str, Apart]] = {}  # frame -> from where, how far it moved
-        self.start: str | None = None  # from where all frames are seen, if that was told
+        self.start: str | None = None  # from where all frames are seen, if it was named
 
     # --- seen from one frame ---
 
@@ -294,23 +294,23 @@ class _Pair:
         parent_a, parent_b = self.a.parent(frame), self.b.parent(frame)
         blind = " and ".join(name for name, side in (("A", self.a), ("B", self.b)) if frame in side.without_data)
         start, seen = self.seen.get(frame, (None, None))
-        said = Difference(SAME, frame, parent_a, parent_b, None, start, seen)
+        found = Difference(SAME, frame, parent_a, parent_b, None, start, seen)
         if seen is None and self.start not in (None, frame):
-            said = said._replace(note=f"not connected to {shown(self.start)} in both")
+            found = found._replace(note=f"not connected to {shown(self.start)} in both")
         one, other = self.a.tree.track(frame), self.b.tree.track(frame)
         if one is not None and other is not None and one.standing != other.standing:
             note = "stands still in A, moves in B" if one.standing else "moves in A, stands still in B"
             yield Difference("motion", frame, parent_a, parent_b, note=note)
         if blind:
-            yield said._replace(kind="no-data", note=f"no data in {blind} at {format_stamp(self.a.at_ns or 0)}")
+            yield found._replace(kind="no-data", note=f"no data in {blind} at {format_stamp(self.a.at_ns or 0)}")
         elif parent_a != parent_b:
-            yield said._replace(kind="parent")
+            yield found._replace(kind="parent")
         else:
             own = _apart(self.a.edges[frame][1], self.b.edges[frame][1]) if parent_a is not None else None
             if self.a.at_ns is None and (samples := self._other_samples(frame)):
                 yield samples
             same = self.tolerance.covers(own) and self.tolerance.covers(seen)
-            yield said._replace(kind=SAME if same else "moved", own=own)
+            yield found._replace(kind=SAME if same else "moved", own=own)
 
     def _other_samples(self, frame: str) -> Difference | None:
         """Compare all samples of a frame that moves in both."""
@@ -347,7 +347,7 @@ def _covered(track: MovingTrack) -> str:
 
 
 def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
-    """Say at which times the two are compared, if anything moves and no time was told."""
+    """Say at which times the two are compared, if anything moves and no time was asked for."""
     if at_ns is not None or not (a.moves or b.moves):
         return
     newest = [

@@ -28,7 +28,7 @@ ARRIVED = 2e-6  # metres: positions near 11 m are float32, 1e-6 apart; a bearing
 
 
 class FollowController:
-    """Drive towards a target: linear = gain * distance, angular = gain * bearing; each limited if told.
+    """Drive towards a target: linear = gain * distance, angular = gain * bearing; each limited if asked for.
 
         FollowController().command(1.0, 1.0)         # Twist(linear_x=0.707.., angular_z=3.14159..)
 
@@ -40,7 +40,7 @@ class FollowController:
         self, law: str = "ros1", *, rate: float | None = None, gain_linear: float | None = None,
         gain_angular: float | None = None, max_linear: float | None = None, max_angular: float | None = None,
     ) -> None:
-        """Take what is given and the law's own numbers for the rest.
+        """Take these numbers, and the law's own for those that are None.
 
         Raises:
             ValueInvalid: unknown law, impossible rate, negative limit, a gain that is not finite.
@@ -152,7 +152,7 @@ class Leader(Protocol):
 
 
 class Script:
-    """Commands at given times (nanoseconds), read one ahead; between them turtlesim keeps the last for a second."""
+    """Commands at their times (nanoseconds), read one ahead; between them turtlesim keeps the last for a second."""
 
     def __init__(self, commands: Iterable[TimedTwist]) -> None:
         """Take the commands in the order of their times.

@@ -49,7 +49,7 @@ def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
 
 
 class _Seen:
-    """What tf has seen of each frame lately: turtles in the world, carrots beside their leader."""
+    """What tf has seen of each frame lately: turtles in the world, carrots next to their leader."""
 
     def __init__(self, keep_ns: int) -> None:
         self.keep_ns = keep_ns
@@ -61,10 +61,10 @@ class _Seen:
         for sent in step.broadcasts:
             x, y, theta, *_ = step.poses.get(sent.child) or (*sent.transform.components[:2], 0.0)
             sample = PlanarSample(sent.stamp_ns, x, y, theta)
-            kept = self.samples.setdefault(sent.child, deque())
-            kept.append(sample)
-            while kept[0].stamp_ns < sample.stamp_ns - self.keep_ns:
-                kept.popleft()
+            recent = self.samples.setdefault(sent.child, deque())
+            recent.append(sample)
+            while recent[0].stamp_ns < sample.stamp_ns - self.keep_ns:
+                recent.popleft()
         self.reason = next((line for line in step.log if line.startswith("Could not transform")), self.reason)
 
     def step(self, command: IssuedCommand, follow: Follow, number: int) -> FollowStep:

@@ -1,4 +1,4 @@
-"""Readers of what the turtles are told: single values, and velocity commands, one at a time, each with its line.
+"""Readers of scenes and leader files: single values, and velocity commands, one at a time, each with its line.
 
     t,linear,angular                                     CSV: columns by name, also linear_y and those of sim's own CSV
     - {t: 0.5, linear: 2.0, angular: 0.0}                YAML or JSON: mappings, in a list or as documents
@@ -316,7 +316,7 @@ def _says_something(line: str) -> bool:
 
 
 def _without_noise(text: str) -> str:
-    """Blank a line that the shell or the tools wrote beside the messages; one of theirs ends a document."""
+    """Blank a line that the shell or the tools wrote between the messages; one of theirs ends a document."""
     return text if NOISE(text) is None else "---" if text.endswith("---") else ""
 
 
@@ -335,7 +335,7 @@ def _columns(header: CommandText) -> list[str]:
 
 
 def _entries(value: Any, path: Path) -> Iterator[tuple[int | None, Twist, Path]]:
-    """Read one command, or a list of them: nanoseconds if given, the command, and where its time stands."""
+    """Read one command, or a list of them: nanoseconds or None, the command, and where its time stands."""
     if type(value) is list and not (value and all(type(item) is str for item in value)):
         for index, item in enumerate(value):
             yield from _entries(item, (*path, index))

@@ -5,7 +5,7 @@
               turtle2: {spawn: [4, 2, 0], follow: turtle1}}       # metres, radians (or 90deg); law: ros1, gains, ..
     events: [{t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 0}}]
 
-Leader files are looked for beside the scene.
+Leader files are looked for next to the scene.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def _field(mapping: Mapping[str, Any], key: str, default: Any = None) -> Any:
 
 
 def read_scene(source: Source, *, seed: int | None = None) -> Scene:
-    """Read the one scene of a text; files that it names are looked for beside it.
+    """Read the one scene of a text; files that it names are looked for next to it.
 
     seed: instead of the scene's own.
     Raises FormatError with file, line and column.
@@ -149,7 +149,7 @@ class _SceneReader:
             raise Misfit(f"no turtle {shown(leader)} to follow{alternatives(leader, self.names, 'turtles')}")
 
     def _leader(self, value: Any) -> MakeLeader:
-        """Read a leader: a built-in name, a file beside the scene, or the commands themselves."""
+        """Read a leader: a built-in name, a file next to the scene, or the commands themselves."""
         if type(value) is list:
             return scripted(list(readers.timed_commands(value)))
         if type(value) is not str:
@@ -169,7 +169,7 @@ class _SceneReader:
 
 
 def _entries(value: Any) -> Iterator[tuple[str | int, str, Any]]:
-    """Yield the turtles of a mapping or a list: key or index, name, what is said of it."""
+    """Yield the turtles of a mapping or a list: key or index, name, the rest of its entry."""
     if type(value) is not list:
         turtles = as_mapping(value, "the turtles by name, or a list of {name: .., spawn: .., ..}")
         yield from ((name, name, entry or {}) for name, entry in turtles.items())
@@ -202,11 +202,11 @@ def _call(value: Any) -> ServiceCall:
     if "t" not in entry or len(named) != 1:
         raise Misfit(f"an event has t and one of {', '.join(SERVICES)}")
     service = named[0]
-    given = entry[service]
-    if service == "kill" and type(given) is str:
-        given = {"name": given}
-    arguments = within((service,), _arguments, service, given or {})
-    return ServiceCall(_field(entry, "t"), service, arguments)
+    arguments = entry[service]
+    if service == "kill" and type(arguments) is str:
+        arguments = {"name": arguments}
+    read = within((service,), _arguments, service, arguments or {})
+    return ServiceCall(_field(entry, "t"), service, read)
 
 
 def _arguments(service: str, value: Any) -> dict[str, float | str]:

@@ -1,9 +1,7 @@
-"""Run a scene in simulated time: ticks, broadcasts, leaders and followers, each when it is due; all is seen through tf.
+"""Run a scene in simulated time: ticks, broadcasts, leaders and followers, each when it is due; and sum the run up.
 
-At equal times: tick, then carrots, service calls, leaders, controllers. Commands and calls act at the first tick
-strictly later. Poses enter the buffer as float32, the stamp is the tick's time, nothing is late on its way.
-
-What a run comes to: how near each follower is, how soon it was there, how often a wall was hit.
+All is seen through tf. At equal times: tick, then carrots, service calls, leaders, controllers. Commands and calls act
+at the first tick strictly later. Poses enter the buffer as float32, the stamp is the tick's time, nothing is late.
 """
 
 from __future__ import annotations
@@ -187,7 +185,7 @@ def _ticks(simulation: Simulation) -> Process:
 
 
 def _carrot(simulation: Simulation, turtle: str, target: str) -> Process:
-    """Broadcast a carrot frame beside a turtle, fixed or moving, ten times a second."""
+    """Broadcast a carrot frame next to a turtle, fixed or moving, ten times a second."""
     for now_ns in count(0, CARROT_NS):
         yield now_ns
         x, y = offset(target, now_ns)
@@ -207,15 +205,15 @@ def _leader(simulation: Simulation, name: str, leader: Leader) -> Process:
         yield leader.due_ns
         turtle = simulation.world.turtles.get(name)
         pose = pose if turtle is None else turtle.pose
-        given = leader.command(pose)
-        if turtle is None or given is None:
+        command = leader.command(pose)
+        if turtle is None or command is None:
             continue
-        if isinstance(given, Heading):
-            turtle.rotate_absolute(given.theta)
+        if isinstance(command, Heading):
+            turtle.rotate_absolute(command.theta)
         else:
-            turtle.command(given)
+            turtle.command(command)
             step = simulation.step
-            step.led.append(IssuedCommand(step.t_ns, name, given, None, None, turtle.state))
+            step.led.append(IssuedCommand(step.t_ns, name, command, None, None, turtle.state))
 
 
 def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:

@@ -67,8 +67,8 @@ def simulate_many(
     Raises ValueInvalid for what `FollowController` would refuse, for velocities and a spawn that are not finite.
     """
     law_itself = FollowController(law, rate=rate)
-    given = dict(zip(NUMBERS, (gain_linear, gain_angular, max_linear, max_angular), strict=True))
-    numbers = [_checked(name, getattr(law_itself, name) if value is None else value) for name, value in given.items()]
+    options = dict(zip(NUMBERS, (gain_linear, gain_angular, max_linear, max_angular), strict=True))
+    numbers = [_checked(name, getattr(law_itself, name) if value is None else value) for name, value in options.items()]
     columns = np.broadcast_arrays(*np.moveaxis(_places(spawn), -1, 0), *numbers)
     shape, flat = columns[0].shape, [column.reshape(-1) for column in columns]
     if not 0.0 <= duration < math.inf:

@@ -1,9 +1,7 @@
-"""One turtle, moved as turtlesim moves it: its arithmetic, its constants, its rounding.
+"""Turtlesim's world and its turtles: motion, constants and rounding of the node, its services with their refusals.
 
 Lengths in metres, angles in radians, x to the right, y up; inside, y runs down from the top as in turtlesim's window.
 Source: turtlesim's turtle.cpp, for ROS 1 and ROS 2.
-
-turtlesim's world: turtles by name, its clock's ticks, its services with their refusals.
 """
 
 from __future__ import annotations
@@ -235,7 +233,7 @@ class Turtle:
 
 VARIANTS = ("ros1", "ros2")
 FAR = 1e9  # metres, from where on a place is written with an exponent
-# service -> its arguments and what they are when left out (None: must be given)
+# service -> its arguments and what they are when left out (None: needed)
 SERVICES: dict[str, dict[str, float | str | None]] = {
     "spawn": {"x": None, "y": None, "theta": 0.0, "name": ""},
     "kill": {"name": None},
@@ -344,14 +342,14 @@ class World:
         Returns what turtlesim logs of it, or "".
         Raises ServiceRefused; ValueInvalid for an unknown service or a wrong argument.
         """
-        given = complete(service, arguments)
+        values = complete(service, arguments)
         if self.variant == "ros1" and service == "rotate_absolute":
             raise ServiceRefused("rotate_absolute is an action of the ROS 2 turtlesim; add turtlesim: ros2")
-        receiver = self.turtle(str(given.pop("turtle"))) if "turtle" in given else self
-        answer = getattr(receiver, service)(**given)
+        receiver = self.turtle(str(values.pop("turtle"))) if "turtle" in values else self
+        answer = getattr(receiver, service)(**values)
         if service == "spawn":
             return f"Spawning turtle [{answer}] at " + ", ".join(
-                f"{name}=[{single(float(given[name])):f}]" for name in ("x", "y", "theta")
+                f"{name}=[{single(float(values[name])):f}]" for name in ("x", "y", "theta")
             )
         return {"reset": "Resetting turtlesim.", "clear": "Clearing turtlesim."}.get(service, "")
 
@@ -371,8 +369,8 @@ def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float
     expected = SERVICES[service]
     if unknown := [name for name in arguments if name not in expected]:
         raise ValueInvalid(f"{service} has no {shown(unknown[0])}; expected {', '.join(expected) or 'nothing'}")
-    given = {name: arguments.get(name, default) for name, default in expected.items()}
-    if missing := [name for name, value in given.items() if value is None]:
+    values = {name: arguments.get(name, default) for name, default in expected.items()}
+    if missing := [name for name, value in values.items() if value is None]:
         raise ValueInvalid(f"{service} needs {', '.join(missing)}")
-    check_single(**{name: value for name, value in given.items() if isinstance(value, float)})
-    return {name: value for name, value in given.items() if value is not None}
+    check_single(**{name: value for name, value in values.items() if isinstance(value, float)})
+    return {name: value for name, value in values.items() if value is not None}

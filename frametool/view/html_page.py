@@ -1,11 +1,8 @@
 """One HTML file in which frames can be looked at from all sides, with everything inside and no request to anywhere.
 
 Its script and style stand as plain files in the folder `page`, one after another in the order of SCRIPTS; the page
-lets nothing else run.  Poses go in as doubles, stamps as doubles of nanoseconds since the first.
-
-What the page needs to move the joints of a robot: where each stands, between which limits, and which it follows.
-
-A run of turtles as the page of `view`: their frames over time, as their followers saw them in tf.
+lets nothing else run.  Poses go in as doubles, stamps as doubles of nanoseconds since the first; joints of a robot
+with their limits.  A run of turtles is shown as its followers saw it in tf.
 """
 
 from __future__ import annotations

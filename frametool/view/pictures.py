@@ -1,12 +1,7 @@
-"""What pictures are made of: lines, dots, boxes and words, in pixels with y down; `svg` writes them, `png` paints them.
+"""Still pictures of lines, dots, boxes and words, in pixels with y down; as SVG, as HTML around that, or as PNG.
 
-A colour is `#rrggbb`, or a name of PALETTE, which is another one where the reader's system is dark.
-
-A picture as SVG, without any library, light or dark as the reader's system is; and as an HTML page around that.
-
-A picture as PNG, painted by matplotlib, which only the extra `plot` brings; a pixel is a pixel of the picture.
-
-Frames as a still picture: ground, links, trails, axes, names and a scale.
+A colour is `#rrggbb`, or a name of PALETTE, which is another one where the reader's system is dark.  Only PNG needs a
+library, matplotlib.  Also draws frames so: ground, links, trails, axes, names and a scale.
 """
 
 from __future__ import annotations
@@ -308,5 +303,5 @@ def _scale(flat: Projection, step: float) -> Iterator[Shape]:
     left, right, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0
     yield PictureLine([(left, base - 6.0), (left, base), (right, base), (right, base - 6.0)], "soft")
     yield PictureWords((left + right) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
-    said = f"in {flat.scene.fixed[:40]}, grid {step:g} m"
-    yield PictureWords(right, HEIGHT - 46.0, said, "soft", "end", 11.0)
+    words = f"in {flat.scene.fixed[:40]}, grid {step:g} m"
+    yield PictureWords(right, HEIGHT - 46.0, words, "soft", "end", 11.0)

@@ -1,7 +1,4 @@
-"""One pose for a person: which frame in which, then every notation, aligned on the decimal point.
-
-Blocks as tf2_echo prints them: time, translation, the rotation in three notations, the matrix.
-"""
+"""Poses for a person: every notation aligned on the decimal point, or blocks as tf2_echo prints them."""
 
 from __future__ import annotations
 

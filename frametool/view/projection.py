@@ -1,6 +1,6 @@
-"""A picture's geometry: from metres in space to pixels on a plane, seen from a direction, without perspective.
+"""A picture's geometry: from metres in space to pixels, seen from a direction, without perspective; places for names.
 
-Names beside points, none over another: a grid of cells holds what is taken, so that only near ones are compared.
+No name stands over another: a grid of cells holds what is taken, so that only near ones are compared.
 """
 
 from __future__ import annotations
@@ -223,7 +223,7 @@ class Label(NamedTuple):
 class TakenBoxes:
     """Rectangles that nothing may be put over.
 
-    Of those that are the same to a pixel one is kept: a million frames on one spot cost their names no more than one.
+    Of those that are the same to a pixel one is stored: a million frames on one spot cost their names no more than one.
     """
 
     def __init__(self) -> None:
@@ -256,7 +256,7 @@ def _cells(box: Box) -> Iterator[tuple[int, int]]:
 
 
 def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box] = ()) -> tuple[list[Label], int]:
-    """Place a name beside every group of frames that lie on one point, the nearest to the eye first.
+    """Place a name next to every group of frames that lie on one point, the nearest to the eye first.
 
     font: its size in pixels.  blocked: what else stands on the picture.
     Returns the places, and how many names found none.

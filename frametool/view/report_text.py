@@ -1,9 +1,4 @@
-"""What `monitor` tells, for a person: a table of the edges, then a sentence about the chain.
-
-What differs between two trees, for a person: what only one has, other parents, then tables of what moved.
-
-The forms of text for a person: a list of all, or all there is to say of one, within 80 columns.
-"""
+"""Reports for a person, within 80 columns: edges of a recording, differences between trees, forms of files."""
 
 from __future__ import annotations
 
@@ -66,12 +61,13 @@ def _chain(entry: dict[str, Any]) -> str:
     """Return the sentence about the interval in which the whole chain has data."""
     first, last = entry["first_ns"], entry["last_ns"]
     if first is None:
-        said = "stands still: any time will do"
+        sentence = "stands still: any time will do"
     elif first > last:
-        said = f"its edges share no time: one begins at {format_stamp(first)}, one ends at {format_stamp(last)}"
+        sentence = f"its edges share no time: one begins at {format_stamp(first)}, one ends at {format_stamp(last)}"
     else:
-        said = f"all edges have data from {format_stamp(first)} to {format_stamp(last)} ({(last - first) / 1e9:.3f} s)"
-    return in_width(f"{entry['parents']}:", said)
+        seconds = (last - first) / 1e9
+        sentence = f"all edges have data from {format_stamp(first)} to {format_stamp(last)} ({seconds:.3f} s)"
+    return in_width(f"{entry['parents']}:", sentence)
 
 
 WIDTH = 80

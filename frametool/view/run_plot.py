@@ -1,8 +1,6 @@
-"""A run of turtles as a picture: turtlesim's window at its own scale, beside it distance and commands over time.
+"""Runs of turtles as pictures: turtlesim's window with distance and commands over time, and maps of two gains.
 
-What a plot shows of a run: the turtles' trails by pen, and each follower's distance and commands over time.
-
-A sweep of two gains as two maps of colours: time to reach, and overshoot; empty where it never was within reach.
+Knows what a plot needs of a run, and no file; a map is empty where the follower never was within reach.
 """
 
 from __future__ import annotations
@@ -103,7 +101,7 @@ class Drawing:
 
 
 def _extend(points: list[Point], place: Point) -> None:
-    """Go on to a place; a point on the straight way there is not kept."""
+    """Go on to a place; a point on the straight way there is left out."""
     if len(points) > 1 and _is_straight(points[-2], points[-1], place):
         points[-1] = place
     elif not points or points[-1] != place:

@@ -1,6 +1,6 @@
 """Pictures of dots in a terminal: braille characters, eight dots a cell, one colour a cell. Memory does not grow.
 
-Frames with their axes, names beside them and a scale bar, as plain text for a pipe; the turtles while they walk, with
+Frames with their axes, names next to them and a scale bar, as plain text for a pipe; the turtles while they walk, with
 trails of dots and an arrow for each, at most 20 pictures a second.
 """
 
@@ -41,7 +41,7 @@ class Canvas:
     """Some lines of cells; a terminal's cell is about twice as high as wide, so that dots are about square."""
 
     def __init__(self, lines: int, columns: int | None = None) -> None:
-        """Create an empty one, a square where the columns are not given."""
+        """Create an empty one, a square where the columns are None."""
         self.lines = lines
         self.columns = 2 * lines if columns is None else columns
         self._cells: dict[tuple[int, int], tuple[int, str, int]] = {}
@@ -60,8 +60,8 @@ class Canvas:
             return
         cell = down // 4, across // 2
         bits, before, before_rank = self._cells.get(cell, (0, colour, rank))
-        kept = (colour, rank) if rank >= before_rank else (before, before_rank)
-        self._cells[cell] = bits | DOTS[down % 4][across % 2], *kept
+        shown = (colour, rank) if rank >= before_rank else (before, before_rank)
+        self._cells[cell] = bits | DOTS[down % 4][across % 2], *shown
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
         """Return line and column of a place."""
@@ -166,9 +166,9 @@ class TerminalPicture:
         fixed = printable(self._flat.scene.fixed)[:40]
         stamp_ns = self._flat.scene.at_ns
         time = "" if stamp_ns is None else f" at {format_stamp(stamp_ns)[:-6]} s"
-        said = f"├{bar}┤ {metres:g} m  in {fixed}{time}, from {azimuth}, {elevation} deg{more}  axes "
-        said = said[: self._canvas.columns - 6]
-        return [(said, ""), ("x", AXES[0]), (" ", ""), ("y", AXES[1]), (" ", ""), ("z", AXES[2])]
+        words = f"├{bar}┤ {metres:g} m  in {fixed}{time}, from {azimuth}, {elevation} deg{more}  axes "
+        words = words[: self._canvas.columns - 6]
+        return [(words, ""), ("x", AXES[0]), (" ", ""), ("y", AXES[1]), (" ", ""), ("z", AXES[2])]
 
 
 def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
@@ -247,7 +247,7 @@ class Screen:
         console = console or Console(stderr=to_stderr)
         room = console.height - TALK - 3 - len(scene.followers)
         self._canvas = Canvas(max(5, min(room, (console.width - 4) // 2, 40)))
-        # what goes to stdout beside the picture is data and must not be caught
+        # what goes to stdout next to the picture is data and must not be caught
         self._live = Live(console=console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
         self._talk: list[str] = []
         self._last: dict[str, IssuedCommand] = {}
@@ -257,13 +257,13 @@ class Screen:
 
     def __enter__(self) -> Self:
         """Take the terminal."""
-        self._live.__enter__()
+        self._live.start()
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, *_: object) -> None:
         """Draw the last frame and give the terminal back."""
         self._live.update(self._picture(), refresh=True)
-        self._live.__exit__(*error)
+        self._live.stop()
 
     def watch(self, step: SimulationStep) -> None:
         """Add a step to the picture, and show it if the last frame is old enough."""

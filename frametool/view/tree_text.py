@@ -31,7 +31,7 @@ class DrawnFrame(NamedTuple):
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Draw a tree with plain lines: each frame below its parent, its pose beside it."""
+    """Draw a tree with plain lines: each frame below its parent, its pose behind it."""
     return "".join(
         f"{line.branch}{line.frame}{pad}{'  '.join(line.label)}".rstrip() + "\n" for line, pad in _padded(tree, style)
     )

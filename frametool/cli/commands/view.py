@@ -115,7 +115,7 @@ def command(
 
 
 def _form(form: str | None, output: str | None, *, opens: bool) -> str:
-    """Choose the form: as told, else by the file's suffix, else text; a browser shows pages."""
+    """Choose the form: that of --format, else by the file's suffix, else text; a browser shows pages."""
     suffix = os.path.splitext(output or "")[1].lower()
     chosen = form or SUFFIXES.get(suffix) or ("html" if opens else None)
     if chosen is None and suffix and output != "-":
@@ -154,7 +154,7 @@ def _content(
 
 
 def _joints(tree: str, scene: FrameScene) -> list[dict[str, Any]]:
-    """Return the joints of a robot's file that get a slider; its warnings were told when its frames were read."""
+    """Return the joints of a robot's file that get a slider; its warnings came when its frames were read."""
     from frametool.errors import overheard
     from frametool.formats.robots.robot import robot_of
     from frametool.view.html_page import joint_sliders
