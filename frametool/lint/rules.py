@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from frametool.formats.load import Recording
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge
+
     Find = Callable[[Finding], None]
 
 WRITTEN_XYZW = frozenset(("quaternion", "xyzw", "rotation", "orientation", "transform"))
@@ -296,9 +297,7 @@ def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
 def _roots(children: dict[str, Child]) -> Iterator[Finding]:
     """Report more than one root, at the first edge of the second."""
     roots = {
-        child.newest.parent: child.first
-        for child in reversed(children.values())
-        if child.newest.parent not in children
+        child.newest.parent: child.first for child in reversed(children.values()) if child.newest.parent not in children
     }
     if len(roots) > 1:
         names = sorted(roots)
