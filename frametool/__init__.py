@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
-    from frametool.sim.controllers import FollowController as FollowController
+    from frametool.sim.drivers import FollowController as FollowController
     from frametool.sim.followed import follow_steps as follow_steps
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
@@ -45,7 +45,7 @@ __version__ = "0.2.0"
 _HOMES = {
     "calc": "frametool.calc",
     "FORMATS": "frametool.formats.table",
-    "FollowController": "frametool.sim.controllers",
+    "FollowController": "frametool.sim.drivers",
     "FrameTree": "frametool.frames.lookups",
     "FrametoolError": "frametool.errors",
     "Rotation": "frametool.geometry.rotation",

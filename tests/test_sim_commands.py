@@ -12,7 +12,6 @@ import subprocess
 import sys
 import termios
 import xml.etree.ElementTree as ET
-from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -20,7 +19,7 @@ import console
 import pytest
 import yaml
 
-from frametool.cli.commands.sim import SUBCOMMANDS
+from frametool.cli.commands.sim import SUBCOMMANDS, command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,8 +34,8 @@ TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
 SCENE = "turtles:\n  turtle1: {leader: square}\n  turtle2: {spawn: [4, 2], follow: turtle1}\nduration: 1\n"
 HELP_EXAMPLES = [
     line.strip()
-    for module, _ in SUBCOMMANDS.values()
-    for line in (import_module(module).command.help or "").splitlines()
+    for each in command.commands.values()
+    for line in (each.help or "").splitlines()
     if line.strip().startswith("frametool ") and "teleop" not in line
 ]
 

@@ -112,6 +112,22 @@ class File(Text):
         return [CompletionItem(incomplete, type="file")]
 
 
+class Parsed(Text):
+    """A text that a function reads; what it refuses is a wrong value of the option."""
+
+    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+        """Keep what it is called, and what reads it."""
+        self.name = name
+        self.parse = parse
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read it."""
+        try:
+            return self.parse(super().convert(value, param, ctx)) if isinstance(value, str) else value
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+
+
 class Number(Text):
     """A finite number."""
 
@@ -305,6 +321,27 @@ def pose_options(function: Function) -> Function:
     return click.option(
         "--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation"
     )(function)
+
+
+def file_options(function: Function) -> Function:
+    """Add to a command of files of frames the options about reading them and their poses, and -v."""
+    return decorated(function, (reading_options(), verbose_option, pose_options))
+
+
+def moving_options(function: Function) -> Function:
+    """Add to a command of one tree the options about moving frames and about reading files, and -v."""
+    return decorated(function, (rules_options, reading_options(), verbose_option))
+
+
+def tree_options(function: Function) -> Function:
+    """Add to a command that writes poses of a tree those of `moving_options` and those about poses and rotations."""
+    return decorated(function, (moving_options, pose_options, rotation_options))
+
+
+color_option = click.option(
+    "--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
+    help="colour of the text; auto is on a terminal, and NO_COLOR is heeded",
+)  # fmt: skip
 
 
 def decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
@@ -518,6 +555,11 @@ def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool =
     from frametool.formats.load import Rules
 
     return Rules(moving=moving, policy=tf2 or "frametool", keep_ns=cache, normalize=normalize)
+
+
+def rules_of(options: dict[str, Any]) -> Rules:
+    """Take out of a command's options what they say about how frames are taken."""
+    return rules(**{name: options.pop(name) for name in ("moving", "cache", "tf2", "normalize") if name in options})
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:

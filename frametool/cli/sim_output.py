@@ -1,8 +1,6 @@
-"""What a run of turtles shows, and where: records to stdout or a file, messages to stderr, a drawing, a plot.
+"""What the commands of the turtles share: their options, leaders by name, file or standard input, and where a run goes.
 
-Options that several commands of the turtles share, and the types of their values.
-
-Leaders from the command line: a built-in name, a file, standard input.
+Records go to stdout or a file, messages to stderr, beside a drawing in the terminal, a plot and a page.
 """
 
 from __future__ import annotations
@@ -11,82 +9,40 @@ import math
 import os
 import sys
 from contextlib import ExitStack
-from functools import partial
 from itertools import combinations
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.options import FULL, TEXT, Digits, Number, Text, decorated
+from frametool.cli.options import FULL, TEXT, Digits, Number, Parsed, decorated
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.documents.source import Source, decode, read_text
-from frametool.errors import FileProblem, FormatError, ValueInvalid, alternatives, shown
+from frametool.errors import FileProblem, FormatError, alternatives, shown
 from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.grammar.result import Style
-from frametool.sim.command_file import read_commands, read_script
-from frametool.sim.controllers import LAWS, TARGETS
-from frametool.sim.leaders import LEADERS, Mailbox, built_in, scripted
-from frametool.sim.scene import LONGEST
+from frametool.sim.drivers import LAWS, LEADERS, TARGETS, Mailbox, built_in, scripted
+from frametool.sim.readers import parse_seconds, parse_spawn, read_commands, read_script
 from frametool.sim.simulate import RunSummary, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
 from frametool.sim.turtle import VARIANTS
-from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.cli.sink import Write
-    from frametool.sim.leaders import MakeLeader
+    from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
-    from frametool.view.run_plot import Drawing
     Watch = Callable[[SimulationStep], None]
 
 NUMBER = Number()
-
-
-class Spawn(Text):
-    """A place: X,Y or X,Y,THETA."""
-
-    name = "x,y,theta"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read metres and radians; the angle may carry a unit."""
-        cells = [cell.strip() for cell in str(super().convert(value, param, ctx)).split(",")]
-        if len(cells) not in (2, 3):
-            self.fail(f"expected X,Y,THETA, found {shown(str(value))}", param, ctx)
-        try:
-            angle, unit = parse_angle(cells[2]) if len(cells) == 3 else (0.0, None)
-            return parse_number(cells[0]), parse_number(cells[1]), math.radians(angle) if unit == "deg" else angle
-        except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
-
-
-class Seconds(Number):
-    """A span of time, 0 or more."""
-
-    name = "seconds"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read it, and check that stamps reach so far."""
-        seconds = float(super().convert(value, param, ctx))
-        if not 0.0 <= seconds <= LONGEST:
-            self.fail(f"expected 0 or more, and at most {LONGEST}, found {seconds:g}", param, ctx)
-        return seconds
-
-
-class Duration(Seconds):
-    """Seconds, or inf."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read it."""
-        return math.inf if value == "inf" else super().convert(value, param, ctx)
-
-
+SPAWN_TYPE = Parsed("x,y,theta", parse_spawn)
+SECONDS = Parsed("seconds", parse_seconds)
+DURATION = Parsed("seconds", lambda text: math.inf if text == "inf" else parse_seconds(text))
 LEADER = click.option("--leader", type=TEXT, default="still", show_default=True, metavar="NAME|FILE|-",
                       help="still, circle, square, figure8, random, a file of commands, or - for standard input")
 LAW = click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
@@ -94,19 +50,18 @@ LAW = click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show
 RATE = click.option("--rate", type=NUMBER, metavar="HZ", help="control steps a second")
 MAX_LINEAR = click.option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]")
 MAX_ANGULAR = click.option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]")
-SPAWN = click.option("--spawn", type=Spawn(), default="4,2,0", show_default=True, metavar="X,Y,THETA",
+SPAWN = click.option("--spawn", type=SPAWN_TYPE, default="4,2,0", show_default=True, metavar="X,Y,THETA",
                      help="where turtle2 begins: metres, radians (or 90deg)")
 SEED = click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader")
 REACH = click.option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D",
                      help="metres that count as having come to the target")
-FOLLOWERS = click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
-                         help="each follows the one before, the first follows turtle1")  # fmt: skip
 
 
 def follow_options(duration: str) -> Callable[[Any], Any]:
-    """Add to a command the options of followers; `duration` is how long it runs if not told."""
+    """Add to a command the options of followers; `duration` is how long it runs by default."""
     options = [
-        FOLLOWERS,
+        click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
+                     help="each follows the one before, the first follows turtle1"),
         LAW,
         RATE,
         click.option("--gain-linear", type=NUMBER, metavar="K", help="speed for each metre of distance"),
@@ -115,10 +70,10 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
         MAX_ANGULAR,
         click.option("--target", type=click.Choice(TARGETS), default="leader", show_default=True,
                      help="the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m"),
-        click.option("--delay", type=Seconds(), default=0.0, metavar="S",
+        click.option("--delay", type=SECONDS, default=0.0, metavar="S",
                      help="follow where the target was so long ago, looked up through world  [default: 0]"),
         SPAWN,
-        click.option("--duration", type=Duration(), default=duration, show_default=True, metavar="S",
+        click.option("--duration", type=DURATION, default=duration, show_default=True, metavar="S",
                      help="simulated seconds, or inf"),
         click.option("--turtlesim", type=click.Choice(VARIANTS), default="ros1", show_default=True,
                      help="whose turtlesim"),
@@ -126,6 +81,15 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
         SEED,
     ]  # fmt: skip
     return lambda function: decorated(function, options)
+
+
+def sweep_options(function: Any) -> Any:
+    """Add to a command the options of one run for each pair of gains."""
+    duration = click.option(
+        "--duration", type=DURATION, default="20", show_default=True, metavar="S", help="simulated seconds"
+    )
+    options = (LEADER, LAW, RATE, MAX_LINEAR, MAX_ANGULAR, SPAWN, duration, REACH, SEED, format_options)
+    return decorated(function, options)
 
 
 def format_options(function: Any) -> Any:
@@ -157,35 +121,35 @@ def output_options(function: Any) -> Any:
     return decorated(function, options)
 
 
-class SimOutput:
+class SimOutput(NamedTuple):
     """What is shown of a run, and where: what the options of a command say."""
 
-    def __init__(
-        self, *, emit: str = "commands", format_name: str | None = None, precision: int | None = None,
-        output: str | None = None, reach: float = 0.5, realtime: bool = False, live: bool = False,
-        plot: str | None = None, view: str | None = None, force: bool = False, leaders: bool = False,
-    ) -> None:  # fmt: skip
-        """Check what can be checked before anything runs.
+    style: Style
+    output: str | None
+    emit: str = "commands"
+    reach: float = 0.5
+    realtime: bool = False
+    live: bool = False
+    plot: str | None = None
+    view: str | None = None
+    force: bool = False
+    leaders: bool = False
+
+    @classmethod
+    def of(cls, *, format_name: str | None, output: str | None, precision: int | None, **options: Any) -> SimOutput:
+        """Take a command's options, and check what can be checked before anything runs.
 
         Raises click.UsageError, FileProblem.
         """
-        self.emit = emit
-        self.style = style_of(format_name, output, precision)
-        self.leaders = leaders
-        self.output = None if output == "-" else output
-        self.reach = reach
-        self.realtime = realtime or live
-        self.live = live
-        self.plot = plot
-        self.view = view
-        self.force = force
-        if reach < 0.0:
-            raise click.UsageError(f"--reach must be 0 or more, found {reach:g}")
-        if live and not (sys.stdout.isatty() or sys.stderr.isatty()):
+        made = cls(style_of(format_name, output, precision), None if output == "-" else output, **options)
+        if made.reach < 0.0:
+            raise click.UsageError(f"--reach must be 0 or more, found {made.reach:g}")
+        if made.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
             raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        if view and suffix_of(view) != ".html":
-            raise click.UsageError(f"--view takes a file .html; found {shown(view)}")
-        check_files(plot, self.output, view, force=force)
+        if made.view and suffix_of(made.view) != ".html":
+            raise click.UsageError(f"--view takes a file .html; found {shown(made.view)}")
+        check_files(made.plot, made.output, made.view, force=made.force)
+        return made
 
     def run(self, scene: Scene) -> None:
         """Run a scene to its end and sum it up on stderr.
@@ -215,10 +179,10 @@ class SimOutput:
         """Return what is written after the run, by file: what watches the steps, and what then makes the content."""
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
-            from frametool.view.run_plot import Drawing
+            from frametool.view.run_plot import Drawing, last_commands, run_picture
 
-            drawing = Drawing(scene)
-            pictures[self.plot] = drawing.watch, partial(_plot, drawing, suffix_of(self.plot))
+            drawing, suffix = Drawing(scene), suffix_of(self.plot)
+            pictures[self.plot] = drawing.watch, lambda: drawn(run_picture(drawing), suffix, last_commands(drawing))
         if self.view:
             from frametool.view.html_page import RunPage
 
@@ -228,14 +192,14 @@ class SimOutput:
 
     def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
         """Open what the steps go to; the stack closes it."""
-        if self.realtime:
-            yield RealTimeClock().wait
+        if self.realtime or self.live:
+            yield real_time()
         if self.live:
-            from frametool.view.live import Screen
+            from frametool.view.terminal import Screen
 
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
         else:
-            yield EventLog().watch
+            yield log_events()
         if self.output is not None or not (self.live and sys.stdout.isatty()):
             yield self._writing(stack.enter_context(writing(self.output, force=self.force)), scene)
 
@@ -251,45 +215,29 @@ class SimOutput:
         return watch
 
 
-def _plot(drawing: Drawing, suffix: str) -> str | bytes:
-    """Return the plot of a run."""
-    from frametool.view.run_plot import last_commands, run_picture
-
-    return drawn(run_picture(drawing), suffix, last_commands(drawing))
-
-
-class RealTimeClock:
-    """Keep simulated time from running ahead of the clock."""
-
-    def __init__(self) -> None:
-        """Start the clock."""
-        self._start = monotonic()
-
-    def wait(self, step: SimulationStep) -> None:
-        """Wait until a step is due."""
-        ahead = step.t_ns / BILLION - (monotonic() - self._start)
-        if ahead > 0.0:
-            sleep(ahead)
+def real_time() -> Watch:
+    """Return what keeps simulated time from running ahead of the clock, which starts now."""
+    start = monotonic()
+    return lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
 
 
-class EventLog:
-    """Print on stderr what turtlesim and the followers log; a wall once for each contact."""
+def log_events() -> Watch:
+    """Return what prints on stderr what turtlesim and the followers log; a wall once for each contact."""
+    at_wall: set[str] = set()
 
-    def __init__(self) -> None:
-        """Create the log of a run in which no turtle is at a wall yet."""
-        self._at_wall: frozenset[str] = frozenset()
-
-    def watch(self, step: SimulationStep) -> None:
-        """Print what one step logged."""
-        new = (str(hit) for hit in step.walls if hit.turtle not in self._at_wall)
+    def watch(step: SimulationStep) -> None:
+        new = (str(hit) for hit in step.walls if hit.turtle not in at_wall)
         for line in (*step.log, *new):
             say(f"{step.t_ns / BILLION:.3f} s: {line}")
         if step.is_tick:
-            self._at_wall = frozenset(hit.turtle for hit in step.walls)
+            at_wall.clear()
+            at_wall.update(hit.turtle for hit in step.walls)
+
+    return watch
 
 
 def style_of(format_name: str | None, output: str | None, precision: int | None) -> Style:
-    """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+    """Choose the form: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe."""
     is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
     form = format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
     return Style(form, precision=None if precision == FULL else precision)
@@ -351,7 +299,8 @@ def stdin_lines() -> Iterator[str]:
 
     Raises FormatError for bytes that are no text.
     """
-    for number, data in enumerate(_lines(sys.stdin.buffer)):
+    stdin: Any = sys.stdin.buffer
+    for number, data in enumerate(_lines(stdin.raw)):
         try:
             yield decode(data, "stdin")
         except FormatError as error:
@@ -360,13 +309,13 @@ def stdin_lines() -> Iterator[str]:
 
 
 def _lines(stream: Any) -> Iterator[bytes]:
-    """Read past the stream's buffer: Python aborts when it ends while a thread waits inside that."""
+    """Read lines past the buffer of standard input: Python aborts when it ends while a thread waits inside that."""
     begun: list[bytes] = []
-    while block := stream.raw.read(1 << 16):
-        first, *more = block.split(b"\n")
-        begun.append(first)
-        for rest in more:
-            yield b"".join(begun) + b"\n"
-            begun = [rest]
-    if last := b"".join(begun):
-        yield last
+    while block := stream.read(1 << 16):
+        *whole, rest = block.split(b"\n")
+        for end in whole:
+            yield b"".join((*begun, end, b"\n"))
+            begun = []
+        begun.append(rest)
+    if any(begun):
+        yield b"".join(begun)

@@ -70,10 +70,11 @@ def write_text(findings: Iterable[Finding]) -> str:
     alike: dict[tuple[str, str, str], list[Finding]] = {}
     for each in findings:
         alike.setdefault((each.source, each.rule, each.message), []).append(each)
-    return "".join(
-        f"{_place(each)}: {each.level}: {each.message} [{each.rule}]{_further(more)}\n"
-        for each, *more in alike.values()
-    )
+    lines = []
+    for each, *more in alike.values():
+        place = ":".join(str(part) for part in (each.source, each.line, each.column) if part)
+        lines.append(f"{place}: {each.level}: {each.message} [{each.rule}]{_further(more)}\n")
+    return "".join(lines)
 
 
 def _further(more: Sequence[Finding]) -> str:
@@ -85,38 +86,22 @@ def _further(more: Sequence[Finding]) -> str:
     return f" (and {len(more)} more{f': lines {named}' if len(lines) > 1 else f': line {named}' if lines else ''})"
 
 
-def _place(finding: Finding) -> str:
-    return ":".join(str(part) for part in (finding.source, finding.line, finding.column) if part)
-
-
 def write_json(findings: Iterable[Finding]) -> str:
     """Return one object a line."""
-    return "".join(
-        dump(
-            {
-                "file": each.source,
-                "line": each.line or None,
-                "column": each.column or None,
-                "level": each.level,
-                "rule": each.rule,
-                "message": each.message,
-            }
-        )
-        + "\n"
-        for each in findings
-    )
+    lines = []
+    for each in findings:
+        place = {"file": each.source, "line": each.line or None, "column": each.column or None}
+        lines.append(f"{dump(place | {'level': each.level, 'rule': each.rule, 'message': each.message})}\n")
+    return "".join(lines)
 
 
 def write_github(findings: Iterable[Finding]) -> str:
     """Return workflow commands, which GitHub shows beside the lines of a pull request."""
-    return "".join(map(_command, findings))
-
-
-def _command(finding: Finding) -> str:
-    level = "notice" if finding.level == "note" else finding.level
-    return github_command(
-        level, finding.message, file=finding.source, line=finding.line, col=finding.column, title=finding.rule
-    )
+    lines = []
+    for each in findings:
+        level, place = "notice" if each.level == "note" else each.level, {"line": each.line, "col": each.column}
+        lines.append(github_command(level, each.message, file=each.source, **place, title=each.rule))
+    return "".join(lines)
 
 
 def github_command(level: str, message: str, **place: str | int) -> str:

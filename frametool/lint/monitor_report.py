@@ -23,7 +23,7 @@ def monitor(
 ) -> list[dict[str, Any]]:
     """Describe every edge of some files; or, of `ends` (target, source), those between the two and their chain.
 
-    clashing: takes the errors about frames that come by the topics of two robots, whose samples are then told as one
+    clashing: takes the errors about frames that come by the topics of two robots, whose samples then count as one
     Raises FormatError for files without transforms, UnknownFrame, NotConnected.
     """
 
@@ -77,19 +77,22 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
     """Describe the edges between two frames together: their common interval, and their worst."""
     interval = common_interval(logs)
     entries = [edge_entry(log) for log in logs]
+    rates, gaps, delays = (
+        [entry[key] for entry in entries if entry[key] is not None] for key in ("rate_hz", "gap_s", "delay_max_s")
+    )
     first, last = interval or (None, None)
     return {
         "kind": "chain",
         "parent": target,
         "child": source,
         "count": sum(log.count for log in logs),
-        "rate_hz": _extreme(min, [entry["rate_hz"] for entry in entries]),
+        "rate_hz": min(rates, default=None),
         "first_ns": first,
         "last_ns": last,
-        "gap_s": _extreme(max, [entry["gap_s"] for entry in entries]),
+        "gap_s": max(gaps, default=None),
         "gap_until_ns": None,
         "delay_mean_s": None,
-        "delay_max_s": _extreme(max, [entry["delay_max_s"] for entry in entries]),
+        "delay_max_s": max(delays, default=None),
         "jumps": sum(entry["jumps"] for entry in entries),
         "backward": sum(entry["backward"] for entry in entries),
         "parents": " <- ".join(frames_on(target, source, logs)),
@@ -97,8 +100,3 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
         "topics": "",
         "overlap": None if interval is None else interval[0] <= interval[1],
     }
-
-
-def _extreme(choose: Any, values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return choose(known) if known else None

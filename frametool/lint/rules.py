@@ -1,7 +1,4 @@
-"""What `check` finds in files, and its rules about edges together: the shape of the tree, what happens over time.
-
-Trees and recordings read for `check`: what is wrong with one entry does not hide the others.
-"""
+"""The rules of `check`: mistakes in one entry, which hide no others, then the shape of the tree and what moves."""
 
 from __future__ import annotations
 
@@ -23,9 +20,9 @@ if TYPE_CHECKING:
     from frametool.documents.document import Document
     from frametool.documents.source import Source
     from frametool.formats.load import Recording
-    from frametool.frames.edge_log import SampleStep
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge
+
     Find = Callable[[Finding], None]
 
 WRITTEN_XYZW = frozenset(("quaternion", "xyzw", "rotation", "orientation", "transform"))
@@ -52,11 +49,10 @@ class Statement(NamedTuple):
 
 
 def read_all(recording: Recording, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
-    """Yield everything that can be read of a file, and report what cannot."""
-    if recording.holds_samples:
-        yield from _read_recording(recording, find, normalize=normalize)
-    else:
-        yield from _read_tree(recording.source, find, normalize=normalize)
+    """Read everything that can be read of a file, and report what cannot."""
+    if not recording.holds_samples:
+        return _read_tree(recording.source, find, normalize=normalize)
+    return _read_recording(recording, find, normalize=normalize)
 
 
 def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Iterator[Statement]:
@@ -82,8 +78,8 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
-    for told in recording.tally.told():
-        find(Finding(told.rule, told.message, recording.name, told.line, 1))
+    for note in recording.tally.told():
+        find(Finding(note.rule, note.message, recording.name, note.line, 1))
 
 
 def _stated(edge: Edge, source: str, line: int, column: int) -> Statement:
@@ -103,19 +99,19 @@ def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[State
     except FormatError as error:
         find(Finding("syntax", error.message, source.name, error.line, error.column))
         return
-    said: list[Note] = []
+    notes: list[Note] = []
     edges = []
     for document in documents:
-        edges += _read_document(document, Reading(source, normalize=normalize), said)
-    places = locate_many(source.text, [*(note.path for note in said), *(edge.path for edge, _ in edges)])
-    for note, (line, column) in zip(said, places, strict=False):
+        edges += _read_document(document, Reading(source, normalize=normalize), notes)
+    places = locate_many(source.text, [*(note.path for note in notes), *(edge.path for edge, _ in edges)])
+    for note, (line, column) in zip(notes, places, strict=False):
         find(Finding(note.rule, note.message, source.name, line, column))
-    for (edge, w_first), place in zip(edges, places[len(said) :], strict=True):
+    for (edge, w_first), place in zip(edges, places[len(notes) :], strict=True):
         yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
 
 
-def _read_document(document: Document, reading: Reading, said: list[Note]) -> list[tuple[Edge, bool]]:
-    """Return the edges of a document, each with whether it looks written w first; keep what is to be said."""
+def _read_document(document: Document, reading: Reading, notes: list[Note]) -> list[tuple[Edge, bool]]:
+    """Return the edges of a document, each with whether it looks written w first; collect its notes."""
     reading.faults = []
     edges = []
     try:
@@ -127,7 +123,7 @@ def _read_document(document: Document, reading: Reading, said: list[Note]) -> li
     except Misfit as misfit:
         reading.faults.append(misfit)
     faults = (Note(misfit.rule or "syntax", str(misfit), misfit.path) for misfit in reading.faults)
-    said += [note._replace(path=(document.index, *note.path)) for note in (*faults, *reading.notes)]
+    notes += [note._replace(path=(document.index, *note.path)) for note in (*faults, *reading.notes)]
     return edges
 
 
@@ -182,9 +178,14 @@ class Child:
     def add(self, seen: Statement, number: int) -> None:
         """Take in one more."""
         if seen.stamp_ns is None:
-            self._stand(seen)
+            self.stands = self.stands or seen
         else:
-            self._move(seen, seen.stamp_ns)
+            fresh = (hash((seen.parent, seen.components)), seen.line)
+            known = self.stamps.setdefault(seen.stamp_ns, fresh)
+            if known is not fresh:
+                (self.again if known[0] == fresh[0] else self.clashes).append(seen)
+            if self.log.is_late(seen.stamp_ns):
+                self.backward.append(seen)
         if seen.parent != self.newest.parent:
             self.changes.append(seen)
             self.since = (number, seen)
@@ -193,18 +194,6 @@ class Child:
             self.other_pose = self.other_pose or seen
         self.newest = seen
         self.log.add(seen.parent, seen.components, seen.stamp_ns, seen.line)
-
-    def _stand(self, seen: Statement) -> None:
-        self.stands = self.stands or seen
-
-    def _move(self, seen: Statement, stamp_ns: int) -> None:
-        data = hash((seen.parent, seen.components))
-        fresh = (data, seen.line)
-        known = self.stamps.setdefault(stamp_ns, fresh)
-        if known is not fresh:
-            (self.again if known[0] == data else self.clashes).append(seen)
-        if self.log.is_late(stamp_ns):
-            self.backward.append(seen)
 
     @property
     def moves(self) -> bool:
@@ -234,81 +223,62 @@ def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
 
 def _child(child: Child) -> Iterator[Finding]:
     """Apply the rules about one frame."""
-    name = child.first.child
+    first, frame = child.first, f"frame {shown(child.first.child)}"
     if child.stands is not None and child.moves:
-        moving = next(each for each in (child.first, child.newest) if each.stamp_ns is not None)
-        yield moving.finding("static-and-moving", f"frame {shown(name)} moves, but stands still in {_at(child.stands)}")
-    elif not child.moves:
-        yield from _standing(child, name)
-    else:
-        yield from _moving(child, name)
-
-
-def _standing(child: Child, name: str) -> Iterator[Finding]:
-    """Apply the rules about a frame that has one pose."""
-    first = child.first
-    if other := child.other_parent:
+        moving = next(each for each in (first, child.newest) if each.stamp_ns is not None)
+        yield moving.finding("static-and-moving", f"{frame} moves, but stands still in {_at(child.stands)}")
+    elif child.moves:
+        yield from _moving(child, frame)
+        yield from _steps(child)
+    elif other := child.other_parent:
         parents = f"{shown(first.parent)} ({_at(first)}) and {shown(other.parent)} ({_at(other)})"
-        yield other.finding("two-parents", f"frame {shown(name)} has two parents: {parents}")
+        yield other.finding("two-parents", f"{frame} has two parents: {parents}")
     elif other := child.other_pose:
-        message = f"frame {shown(name)} has two different poses in {shown(first.parent)}: {_at(first)} and {_at(other)}"
+        message = f"{frame} has two different poses in {shown(first.parent)}: {_at(first)} and {_at(other)}"
         yield other.finding("two-poses", message)
 
 
-def _moving(child: Child, name: str) -> Iterator[Finding]:
-    """Apply the rules about a frame over time."""
-    if child.changes:
-        yield _reparented(child, name)
+def _moving(child: Child, frame: str) -> Iterator[Finding]:
+    """Apply the rules about a frame over time: a changing parent, of one picked up or of two publishers, and stamps."""
+    if changes := child.changes:
+        parents = " -> ".join(shown(each.parent) for each in (child.first, *changes[:3]))
+        if len(changes) < FLICKER:
+            yield changes[0].finding("reparented", f"{frame} changes its parent: {parents}")
+        else:
+            times = f"{len(changes)} times: {parents} .."
+            yield changes[0].finding("flicker", f"{frame} changes its parent {times}; two publishers disagree")
     if child.again:
-        yield child.again[0].finding("repeated", f"frame {shown(name)}: the same sample again{_more(child.again)}")
+        yield child.again[0].finding("repeated", f"{frame}: the same sample again{_more(child.again)}")
     if child.clashes:
         first = child.clashes[0]
-        stamp = format_stamp(first.stamp_ns or 0)
-        line = child.stamps[first.stamp_ns or 0][1]
-        places = f"lines {line} and {first.line}"
-        message = f"frame {shown(name)} has two poses at {stamp}: {places}{_more(child.clashes)}"
-        yield first.finding("repeated-stamp", message)
+        stamp_ns = first.stamp_ns or 0
+        places = f"{format_stamp(stamp_ns)}: lines {child.stamps[stamp_ns][1]} and {first.line}"
+        yield first.finding("repeated-stamp", f"{frame} has two poses at {places}{_more(child.clashes)}")
     if child.backward:
         first = child.backward[0]
-        message = f"frame {shown(name)}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
+        message = f"{frame}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
         yield first.finding("backward", message + _more(child.backward))
-    yield from _steps(child, name)
 
 
-def _reparented(child: Child, name: str) -> Finding:
-    """Report a changing parent: of a frame that was picked up, or of publishers that disagree."""
-    parents = " -> ".join(shown(each.parent) for each in (child.first, *child.changes[:3]))
-    if len(child.changes) < FLICKER:
-        return child.changes[0].finding("reparented", f"frame {shown(name)} changes its parent: {parents}")
-    times = f"{len(child.changes)} times: {parents} .."
-    message = f"frame {shown(name)} changes its parent {times}; two publishers disagree"
-    return child.changes[0].finding("flicker", message)
-
-
-def _steps(child: Child, name: str) -> Iterator[Finding]:
+def _steps(child: Child) -> Iterator[Finding]:
     """Apply the rules about pauses and distances between samples."""
-    edge = f"{child.newest.parent} -> {name}"
-    if gaps := child.log.gaps():
-        pause = gaps[0].pause_ns / BILLION
-        message = f"{edge}: no data for {pause:g} s before {format_stamp(gaps[0].stamp_ns)}"
-        yield _at_step(child, gaps[0]).finding("gap", message + _more(gaps))
-    if returns := child.log.returns():
-        step = returns[0]
-        apart = f"{step.metres:.3g} m and {step.radians:.3g} rad"
-        message = f"{edge}: goes back and forth by {apart} at {format_stamp(step.stamp_ns)}; two publishers disagree"
-        yield _at_step(child, step).finding("disagreement", message + _more(returns))
-    if jumps := child.log.jumps():
-        step = jumps[0]
-        message = f"{edge}: jumps by {step.metres:.3g} m and {step.radians:.3g} rad at {format_stamp(step.stamp_ns)}"
-        yield _at_step(child, step).finding("jump", message + _more(jumps))
-
-
-def _at_step(child: Child, step: SampleStep) -> Statement:
-    return child.first._replace(line=step.line, column=1 if step.line else 0)
+    log = child.log
+    for rule, steps in (("gap", log.gaps()), ("disagreement", log.returns()), ("jump", log.jumps())):
+        if not steps:
+            continue
+        step = steps[0]
+        stamp, apart = format_stamp(step.stamp_ns), f"{step.metres:.3g} m and {step.radians:.3g} rad"
+        problem = {
+            "gap": f"no data for {step.pause_ns / BILLION:g} s before {stamp}",
+            "disagreement": f"goes back and forth by {apart} at {stamp}; two publishers disagree",
+            "jump": f"jumps by {apart} at {stamp}",
+        }[rule]
+        message = f"{child.newest.parent} -> {child.first.child}: {problem}{_more(steps)}"
+        yield child.first._replace(line=step.line, column=1 if step.line else 0).finding(rule, message)
 
 
 def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
-    """Find the cycles among the newest parents; each is told once."""
+    """Find the cycles among the newest parents; each is reported once."""
     done: set[str] = set()
     for start in children:
         line: list[str] = []
@@ -327,9 +297,7 @@ def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
 def _roots(children: dict[str, Child]) -> Iterator[Finding]:
     """Report more than one root, at the first edge of the second."""
     roots = {
-        child.newest.parent: child.first
-        for child in reversed(children.values())
-        if child.newest.parent not in children
+        child.newest.parent: child.first for child in reversed(children.values()) if child.newest.parent not in children
     }
     if len(roots) > 1:
         names = sorted(roots)

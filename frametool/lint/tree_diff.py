@@ -5,27 +5,28 @@ Signs of quaternions and the order of names do not count.  Where a tree moves it
 
 from __future__ import annotations
 
+import re
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import shown
+from frametool.errors import ValueInvalid, shown
 from frametool.frames.snapshot import Snapshot
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.rotation import NEAR
 from frametool.geometry.transform import NEAR_BY
+from frametool.text.numbers import parse_length, read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.frames.lookups import Frames
-    from frametool.frames.snapshot import SeenPose
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
 
 ROUNDING = 2.0**-46  # of the largest number on a way: what a product of some dozens of poses is off at most
 
-# kind -> what it is, in the order in which differences are told; each of them makes two trees different
+# kind -> what it is, in the order in which differences are listed; each of them makes two trees different
 KINDS = {
     "only-in-a": "a frame that B does not have",
     "only-in-b": "a frame that A does not have",
@@ -55,6 +56,30 @@ class Tolerance(NamedTuple):
         if apart is None:
             return -1.0
         return max(apart.metres / (self.metres or NEAR_BY), apart.radians / (self.radians or NEAR))
+
+
+def parse_tolerance(text: str) -> Tolerance:
+    """Read `1mm,0.1deg`, or one of them; bare numbers are metres and radians, in this order.
+
+    Raises ValueInvalid.
+    """
+    parts: dict[str, str] = {}
+    cells = [cell.strip() for cell in text.split(",")]
+    for index, cell in enumerate(cells):
+        is_angle = re.search("deg|rad|°|pi|π", cell) or (index == 1 and not cell.endswith("m"))
+        parts["radians" if is_angle else "metres"] = cell
+    try:
+        if len(parts) != len(cells):
+            raise ValueInvalid(f"{shown(text)} is not one length and one angle")
+        found = Tolerance(**{
+            name: parse_length(cell) if name == "metres" else read_number_or_angle(cell, degrees=False)
+            for name, cell in parts.items()
+        })  # fmt: skip
+        if negative := [cell for name, cell in parts.items() if getattr(found, name) < 0.0]:
+            raise ValueInvalid(f"{shown(negative[0])} is less than 0")
+    except ValueInvalid as error:
+        raise ValueInvalid(f"{error}; write a length, an angle or both: 1mm,0.1deg") from None
+    return found
 
 
 class Apart(NamedTuple):
@@ -105,7 +130,8 @@ class Difference(NamedTuple):
     def sentence(self) -> str:
         """Say it in one line."""
         name, note = shown(self.frame), f": {self.note}" if self.note else ""
-        at_a, at_b = map(_under, (self.parent_a, self.parent_b))
+        parents = (self.parent_a, self.parent_b)
+        at_a, at_b = ("a root" if parent is None else f"under {shown(parent)}" for parent in parents)
         seen = f"seen from {shown(self.seen_from)} it moved {self.seen}" if self.seen else ""
         match self.kind:
             case "only-in-a":
@@ -138,15 +164,11 @@ def entry(each: Difference) -> dict[str, Any]:
     }
 
 
-def _under(parent: str | None) -> str:
-    return "a root" if parent is None else f"under {shown(parent)}"
-
-
 class Comparison(NamedTuple):
     """What differs between two trees.
 
     differences: by kind, the farthest first
-    unmoved: the common frames of which nothing is told there
+    unmoved: the common frames that are not among them
     notes: sentences about how the two were compared
     uncompared: frames that could not be compared: neither has data at that time
     """
@@ -175,18 +197,18 @@ def diff(
     found = [*pair.only(), *(each for frame in pair.common for each in pair.about(frame))]
     order = {kind: number for number, kind in enumerate((*KINDS, SAME))}
     limit = pair.tolerance
-    found.sort(key=lambda each: (order[each.kind], -_own_size(each, limit), -limit.times(each.seen)))
+
+    def rank(each: Difference) -> tuple[float, ...]:  # what only went along with its parent comes behind
+        own = -1.0 if limit.covers(each.own) else limit.times(each.own)
+        return order[each.kind], -own, -limit.times(each.seen)
+
+    found.sort(key=rank)
     return Comparison(
         [each for each in found if each.kind != SAME],
         [each for each in found if each.kind == SAME],
         [*pair.notes, *_times(a, b, at_ns)],
-        [frame for frame in pair.common if pair.is_blind(frame)],
+        [frame for frame in pair.common if frame in pair.a.without_data and frame in pair.b.without_data],
     )
-
-
-def _own_size(each: Difference, tolerance: Tolerance) -> float:
-    """Return by how much a frame moved itself: what only went along with its parent comes behind."""
-    return -1.0 if tolerance.covers(each.own) else tolerance.times(each.own)
 
 
 class _Pair:
@@ -200,7 +222,7 @@ class _Pair:
         self.common = [frame for frame in a.frames if frame in in_b]
         self.notes = [] if self.common else ["no frame is in both A and B"]
         self.seen: dict[str, tuple[str, Apart]] = {}  # frame -> from where, how far it moved
-        self.start: str | None = None  # from where all frames are seen, if that was told
+        self.start: str | None = None  # from where all frames are seen, if it was named
 
     # --- seen from one frame ---
 
@@ -227,7 +249,9 @@ class _Pair:
         in_a, in_b = self.a.seen_from(start), self.b.seen_from(start)
         for frame in self.common:
             if frame != start and frame in in_a and frame in in_b and frame not in self.seen:
-                self.seen[frame] = start, _apart_seen(in_a[frame], in_b[frame])
+                rounding = ROUNDING * max(in_a[frame].reach, in_b[frame].reach)
+                apart = _apart(in_a[frame].components, in_b[frame].components)
+                self.seen[frame] = start, apart._replace(rounding=rounding, turn_rounding=ROUNDING)
 
     # --- what there is to say ---
 
@@ -237,13 +261,12 @@ class _Pair:
         gone = [frame for frame in self.a.tree.frames if frame not in in_b]
         new = [frame for frame in self.b.tree.frames if frame not in in_a]
         renamed = self._renamed(gone, new)
-        before = {after: frame for frame, after in renamed.items()}
+        notes = {frame: f"renamed to {shown(after)}? it has the same pose" for frame, after in renamed.items()}
         for frame in gone:
-            note = f"renamed to {shown(renamed[frame])}? it has the same pose" if frame in renamed else ""
-            yield Difference("only-in-a", frame, self.a.parent(frame), None, note=note)
+            yield Difference("only-in-a", frame, self.a.parent(frame), None, note=notes.get(frame, ""))
+        notes = {after: f"renamed from {shown(frame)}? it has the same pose" for frame, after in renamed.items()}
         for frame in new:
-            note = f"renamed from {shown(before[frame])}? it has the same pose" if frame in before else ""
-            yield Difference("only-in-b", frame, None, self.b.parent(frame), note=note)
+            yield Difference("only-in-b", frame, None, self.b.parent(frame), note=notes.get(frame, ""))
 
     def _renamed(self, gone: Sequence[str], new: Sequence[str]) -> dict[str, str]:
         """Find the frames of A that stand under another name in B: the one pair with the same pose in one parent."""
@@ -256,46 +279,38 @@ class _Pair:
         for old, fresh in by_parent.values():
             if len(old) * len(fresh) > MOST_PAIRS:
                 continue
-            pairs = [(frame, each) for frame in old for each in fresh if self._same_pose(frame, each)]
+            pairs = [
+                (frame, each)
+                for frame in old
+                for each in fresh
+                if self.tolerance.covers(_apart(self.a.edges[frame][1], self.b.edges[each][1]))
+            ]
             froms, tos = ([pair[at] for pair in pairs] for at in (0, 1))
             found.update(pair for pair in pairs if froms.count(pair[0]) == tos.count(pair[1]) == 1)
         return found
 
-    def _same_pose(self, frame: str, other: str) -> bool:
-        return self.tolerance.covers(_apart(self.a.edges[frame][1], self.b.edges[other][1]))
-
     def about(self, frame: str) -> Iterator[Difference]:
         """Yield what differs about a frame that both have; `same` if nothing does."""
         parent_a, parent_b = self.a.parent(frame), self.b.parent(frame)
-        blind_a, blind_b = frame in self.a.without_data, frame in self.b.without_data
+        blind = " and ".join(name for name, side in (("A", self.a), ("B", self.b)) if frame in side.without_data)
         start, seen = self.seen.get(frame, (None, None))
-        said = Difference(SAME, frame, parent_a, parent_b, None, start, seen)
+        found = Difference(SAME, frame, parent_a, parent_b, None, start, seen)
         if seen is None and self.start not in (None, frame):
-            said = said._replace(note=f"not connected to {shown(self.start)} in both")
-        if note := self._other_motion(frame):
+            found = found._replace(note=f"not connected to {shown(self.start)} in both")
+        one, other = self.a.tree.track(frame), self.b.tree.track(frame)
+        if one is not None and other is not None and one.standing != other.standing:
+            note = "stands still in A, moves in B" if one.standing else "moves in A, stands still in B"
             yield Difference("motion", frame, parent_a, parent_b, note=note)
-        if blind_a or blind_b:
-            where = "A and B" if blind_a and blind_b else "A" if blind_a else "B"
-            yield said._replace(kind="no-data", note=f"no data in {where} at {format_stamp(self.a.at_ns or 0)}")
+        if blind:
+            yield found._replace(kind="no-data", note=f"no data in {blind} at {format_stamp(self.a.at_ns or 0)}")
         elif parent_a != parent_b:
-            yield said._replace(kind="parent")
+            yield found._replace(kind="parent")
         else:
             own = _apart(self.a.edges[frame][1], self.b.edges[frame][1]) if parent_a is not None else None
-            if self.a.at_ns is None and (other := self._other_samples(frame)):
-                yield other
+            if self.a.at_ns is None and (samples := self._other_samples(frame)):
+                yield samples
             same = self.tolerance.covers(own) and self.tolerance.covers(seen)
-            yield said._replace(kind=SAME if same else "moved", own=own)
-
-    def is_blind(self, frame: str) -> bool:
-        """Return whether neither has data on a frame at that time."""
-        return frame in self.a.without_data and frame in self.b.without_data
-
-    def _other_motion(self, frame: str) -> str:
-        """Say in which of the two a frame moves, if it stands still in the other."""
-        one, other = self.a.tree.track(frame), self.b.tree.track(frame)
-        if one is None or other is None or one.standing == other.standing:
-            return ""
-        return "stands still in A, moves in B" if one.standing else "moves in A, stands still in B"
+            yield found._replace(kind=SAME if same else "moved", own=own)
 
     def _other_samples(self, frame: str) -> Difference | None:
         """Compare all samples of a frame that moves in both."""
@@ -326,24 +341,19 @@ def _apart(a: Rigid, b: Rigid) -> Apart:
     return Apart(*rigid.distance(*a, *b, floats))
 
 
-def _apart_seen(a: SeenPose, b: SeenPose) -> Apart:
-    apart = _apart(a.components, b.components)
-    return apart._replace(rounding=ROUNDING * max(a.reach, b.reach), turn_rounding=ROUNDING)
-
-
 def _covered(track: MovingTrack) -> str:
     first, last = map(format_stamp, track.span)
     return f"{track.count} sample{'s' * (track.count != 1)} {first} .. {last}"
 
 
 def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
-    """Say at which times the two are compared, if anything moves and no time was told."""
+    """Say at which times the two are compared, if anything moves and no time was asked for."""
     if at_ns is not None or not (a.moves or b.moves):
         return
-    told = " and ".join(f"{name} {format_stamp(_newest(tree))}" for name, tree in (("A", a), ("B", b)) if tree.moves)
+    newest = [
+        f"{name} {format_stamp(max(track.last_ns for track in tree.tracks() if not track.standing))}"
+        for name, tree in (("A", a), ("B", b))
+        if tree.moves
+    ]
     also = ", and sample by sample" if a.moves and b.moves else ""
-    yield f"what moves is compared at its latest ({told}){also}; --at TIME compares at one time"
-
-
-def _newest(tree: Frames) -> int:
-    return max(track.last_ns for track in tree.tracks() if not track.standing)
+    yield f"what moves is compared at its latest ({' and '.join(newest)}){also}; --at TIME compares at one time"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import ValueInvalid
 from frametool.explain.follow import FollowStep, PlanarSample, Sighting
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.sim.controllers import ARRIVED, frame_of
+from frametool.sim.drivers import ARRIVED, frame_of
 from frametool.sim.simulate import CACHE_NS, simulate
 
 if TYPE_CHECKING:
@@ -29,7 +29,10 @@ def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
     if number < 0:
         raise ValueInvalid(f"control steps are counted from 0, found {number}")
     due = {name: follow.controller.due_ns(number) for name, follow in followers.items()}
-    _refuse_late(scene, due, number)
+    if scene.duration_ns is not None and max(due.values()) > scene.duration_ns:
+        rate = followers[max(due, key=due.__getitem__)].controller.rate
+        end, last = format_stamp(scene.duration_ns)[:-6], int(scene.duration_ns / BILLION * rate + 1e-9)
+        raise ValueInvalid(f"step {number} comes after the end of the run at {end} s; steps: 0 .. {last}")
     seen = _Seen(CACHE_NS + max(follow.delay_ns for follow in followers.values()))
     found: dict[str, FollowStep] = {}
     for step in simulate(scene):
@@ -45,17 +48,8 @@ def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
     return [found[name] for name in followers]
 
 
-def _refuse_late(scene: Scene, due: dict[str, int], number: int) -> None:
-    if scene.duration_ns is None or max(due.values()) <= scene.duration_ns:
-        return
-    name = max(due, key=due.__getitem__)
-    last = int(scene.duration_ns / BILLION * scene.followers[name].controller.rate + 1e-9)
-    end = format_stamp(scene.duration_ns)[:-6]
-    raise ValueInvalid(f"step {number} comes after the end of the run at {end} s; steps: 0 .. {last}")
-
-
 class _Seen:
-    """What tf has seen of each frame lately: turtles in the world, carrots beside their leader."""
+    """What tf has seen of each frame lately: turtles in the world, carrots next to their leader."""
 
     def __init__(self, keep_ns: int) -> None:
         self.keep_ns = keep_ns
@@ -65,15 +59,12 @@ class _Seen:
     def watch(self, step: SimulationStep) -> None:
         """Keep what a step broadcast; forget what is older than a lookup goes back."""
         for sent in step.broadcasts:
-            pose = step.poses.get(sent.child)
-            x, y = sent.transform.components[:2]
-            if pose is not None:
-                x, y = pose.x, pose.y
-            sample = PlanarSample(sent.stamp_ns, x, y, 0.0 if pose is None else pose.theta)
-            kept = self.samples.setdefault(sent.child, deque())
-            kept.append(sample)
-            while kept[0].stamp_ns < sample.stamp_ns - self.keep_ns:
-                kept.popleft()
+            x, y, theta, *_ = step.poses.get(sent.child) or (*sent.transform.components[:2], 0.0)
+            sample = PlanarSample(sent.stamp_ns, x, y, theta)
+            recent = self.samples.setdefault(sent.child, deque())
+            recent.append(sample)
+            while recent[0].stamp_ns < sample.stamp_ns - self.keep_ns:
+                recent.popleft()
         self.reason = next((line for line in step.log if line.startswith("Could not transform")), self.reason)
 
     def step(self, command: IssuedCommand, follow: Follow, number: int) -> FollowStep:

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION, FURTHEST_NS
-from frametool.sim.controllers import TARGETS, FollowController
-from frametool.sim.leaders import built_in
+from frametool.sim.drivers import TARGETS, FollowController, built_in
 from frametool.sim.turtle import CENTRE, TICK_NS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.sim.leaders import MakeLeader
+    from frametool.sim.drivers import MakeLeader
 
     Place = tuple[float, float, float]
 

@@ -5,7 +5,7 @@
               turtle2: {spawn: [4, 2, 0], follow: turtle1}}       # metres, radians (or 90deg); law: ros1, gains, ..
     events: [{t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 0}}]
 
-Leader files are looked for beside the scene.
+Leader files are looked for next to the scene.
 """
 
 from __future__ import annotations
@@ -17,29 +17,71 @@ from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import Source, read_text
 from frametool.errors import alternatives, shown
 from frametool.grammar.readers import Misfit, as_mapping, kind, within
-from frametool.sim import field_readers as fields
-from frametool.sim.command_file import read_entries, read_script
-from frametool.sim.controllers import LAWS, TARGETS, FollowController
-from frametool.sim.field_readers import field, guarded, known_keys, one_of
-from frametool.sim.leaders import LEADERS, built_in, scripted
+from frametool.sim import readers
+from frametool.sim.drivers import LAWS, LEADERS, TARGETS, FollowController, built_in, scripted
+from frametool.sim.readers import guarded, known_keys
 from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall
 from frametool.sim.turtle import CENTRE, SERVICES, VARIANTS, complete
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from frametool.sim.leaders import MakeLeader
+    from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Place
 
 SCENE_KEYS = ("turtles", "events", "duration", "turtlesim", "holonomic", "seed")
 CONTROLLER_KEYS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
 FOLLOW_KEYS = ("follow", "law", *CONTROLLER_KEYS, "target", "delay")
 TURTLE_KEYS = ("spawn", "leader", *FOLLOW_KEYS)
-DURATION_S = "20"
+PLACE_KEYS = ("x", "y", "theta")
+
+
+def _name(value: Any) -> str:
+    if type(value) is not str or not value:
+        raise Misfit(f"expected a turtle's name, found {kind(value or None)}")
+    return value
+
+
+def _place(value: Any) -> Place:
+    """Read [x, y], [x, y, theta] or {x, y, theta}: metres, radians."""
+    if type(value) is dict:
+        place = known_keys(value, PLACE_KEYS, "a place")
+        x, y, theta = (_field(place, key, "0") for key in PLACE_KEYS)
+        return x, y, theta
+    if type(value) is not list or len(value) not in (2, 3):
+        raise Misfit(f"expected [x, y, theta], found {kind(value)}")
+    x, y = (within((index,), readers.read_number, value[index]) for index in (0, 1))
+    return x, y, within((2,), readers.read_angle, value[2]) if len(value) == 3 else 0.0
+
+
+# key, also of a service's argument -> its reader; others are numbers
+READERS: dict[str, Callable[[Any], Any]] = {
+    "duration": readers.read_duration,
+    "turtlesim": readers.one_of(VARIANTS),
+    "holonomic": readers.read_boolean,
+    "seed": readers.read_integer,
+    "spawn": _place,
+    "follow": _name,
+    "law": readers.one_of(LAWS),
+    "target": readers.one_of(TARGETS),
+    "delay": readers.read_time,
+    "t": readers.read_time,
+    "turtle": _name,
+    "name": _name,
+    "theta": readers.read_angle,
+    "angular": readers.read_angle,
+    "off": readers.read_flag,
+    **dict.fromkeys(("r", "g", "b", "width"), readers.read_byte),
+}
+
+
+def _field(mapping: Mapping[str, Any], key: str, default: Any = None) -> Any:
+    """Read the value of a key, or its default."""
+    return within((key,), READERS.get(key, readers.read_number), mapping.get(key, default))
 
 
 def read_scene(source: Source, *, seed: int | None = None) -> Scene:
-    """Read the one scene of a text; files that it names are looked for beside it.
+    """Read the one scene of a text; files that it names are looked for next to it.
 
     seed: instead of the scene's own.
     Raises FormatError with file, line and column.
@@ -67,16 +109,15 @@ class _SceneReader:
         scene = known_keys(value, SCENE_KEYS, "a scene {turtles: .., events: .., duration: ..}")
         if "turtles" not in scene:
             raise Misfit(f"no turtles; expected {', '.join(SCENE_KEYS)}")
-        own = int(field(scene, "seed", fields.read_integer, "0"))
+        own = _field(scene, "seed", "0")
         self.seed = own if self.seed is None else self.seed
-        variant = field(scene, "turtlesim", one_of(VARIANTS), "ros1")
+        variant = _field(scene, "turtlesim", "ros1")
         calls = within(("events",), self._calls, scene.get("events") or [])
         spawned = [str(call.arguments.get("name", "")) for call in calls if call.service == "spawn"]
         self.names.update(dict.fromkeys(filter(None, spawned)))
         self.nameless = "" in spawned or any(call.service == "reset" for call in calls)
         turtles = within(("turtles",), self._turtles, scene["turtles"])
-        duration_ns = field(scene, "duration", fields.read_duration, DURATION_S)
-        return Scene(turtles, calls, duration_ns, variant, field(scene, "holonomic", fields.read_boolean, "false"))
+        return Scene(turtles, calls, _field(scene, "duration", "20"), variant, _field(scene, "holonomic", "false"))
 
     def _turtles(self, value: Any) -> list[SceneTurtle]:
         """Read the turtles: a mapping by name, or a list of entries with a name."""
@@ -88,7 +129,7 @@ class _SceneReader:
         entry = known_keys(value, TURTLE_KEYS, "a turtle {spawn: [x, y, theta], leader: .. or follow: ..}")
         if name == "world" or not name:
             raise Misfit(f"a turtle cannot be called {shown(name)}", key=True)
-        spawn = field(entry, "spawn", _place, [repr(CENTRE), repr(CENTRE), "0"])
+        spawn = _field(entry, "spawn", [repr(CENTRE), repr(CENTRE), "0"])
         if "follow" in entry and "leader" in entry:
             raise Misfit("a turtle has a leader script or follows another, not both", ("leader",), key=True)
         if "follow" in entry:
@@ -96,7 +137,8 @@ class _SceneReader:
             return SceneTurtle(name, spawn, _follow(entry))
         if stray := [key for key in entry if key in FOLLOW_KEYS]:
             raise Misfit(f"{stray[0]} says how to follow; add follow: NAME", (stray[0],), key=True)
-        return SceneTurtle(name, spawn, field(entry, "leader", self._leader, None) if "leader" in entry else None)
+        leader = within(("leader",), self._leader, entry["leader"]) if "leader" in entry else None
+        return SceneTurtle(name, spawn, leader)
 
     def _check_leader(self, name: str, value: Any) -> None:
         """Refuse to follow oneself, or who never comes."""
@@ -107,9 +149,9 @@ class _SceneReader:
             raise Misfit(f"no turtle {shown(leader)} to follow{alternatives(leader, self.names, 'turtles')}")
 
     def _leader(self, value: Any) -> MakeLeader:
-        """Read a leader: a built-in name, a file beside the scene, or the commands themselves."""
+        """Read a leader: a built-in name, a file next to the scene, or the commands themselves."""
         if type(value) is list:
-            return scripted(read_entries(value))
+            return scripted(list(readers.timed_commands(value)))
         if type(value) is not str:
             raise Misfit(f"expected a leader's name, a file or a list of commands, found {kind(value)}")
         if value in LEADERS:
@@ -117,7 +159,7 @@ class _SceneReader:
         path = os.path.join(os.path.dirname(self.source.name), value)
         if not os.path.exists(path):
             raise Misfit(f"no file {path} and no leader {shown(value)}{alternatives(value, LEADERS, 'leaders')}")
-        return scripted(read_script(Source(path, read_text(path))))
+        return scripted(readers.read_script(Source(path, read_text(path))))
 
     def _calls(self, value: Any) -> list[ServiceCall]:
         if type(value) is not list:
@@ -127,7 +169,7 @@ class _SceneReader:
 
 
 def _entries(value: Any) -> Iterator[tuple[str | int, str, Any]]:
-    """Yield the turtles of a mapping or a list: key or index, name, what is said of it."""
+    """Yield the turtles of a mapping or a list: key or index, name, the rest of its entry."""
     if type(value) is not list:
         turtles = as_mapping(value, "the turtles by name, or a list of {name: .., spawn: .., ..}")
         yield from ((name, name, entry or {}) for name, entry in turtles.items())
@@ -145,13 +187,12 @@ def _entries(value: Any) -> Iterator[tuple[str | int, str, Any]]:
 
 def _follow(entry: Mapping[str, Any]) -> Follow:
     """Read whom a turtle follows, and how."""
-    law = field(entry, "law", one_of(LAWS), "ros1")
-    numbers = {key: field(entry, key, fields.read_number, None) for key in CONTROLLER_KEYS if key in entry}
+    law = _field(entry, "law", "ros1")
+    numbers = {key: _field(entry, key) for key in CONTROLLER_KEYS if key in entry}
     for key, number in numbers.items():
         within((key,), guarded, FollowController, law, **{key: number})
-    target = field(entry, "target", one_of(TARGETS), "leader")
-    delay_ns = field(entry, "delay", fields.read_time, "0")
-    return Follow(_name(entry["follow"]), FollowController(law, **numbers), target, delay_ns)
+    target, delay_ns = _field(entry, "target", "leader"), _field(entry, "delay", "0")
+    return Follow(_field(entry, "follow"), FollowController(law, **numbers), target, delay_ns)
 
 
 def _call(value: Any) -> ServiceCall:
@@ -161,45 +202,15 @@ def _call(value: Any) -> ServiceCall:
     if "t" not in entry or len(named) != 1:
         raise Misfit(f"an event has t and one of {', '.join(SERVICES)}")
     service = named[0]
-    given = entry[service]
-    if service == "kill" and type(given) is str:
-        given = {"name": given}
-    arguments = within((service,), _arguments, service, given or {})
-    return ServiceCall(field(entry, "t", fields.read_time, None), service, arguments)
+    arguments = entry[service]
+    if service == "kill" and type(arguments) is str:
+        arguments = {"name": arguments}
+    read = within((service,), _arguments, service, arguments or {})
+    return ServiceCall(_field(entry, "t"), service, read)
 
 
 def _arguments(service: str, value: Any) -> dict[str, float | str]:
     """Read a service's arguments and check that none is missing."""
-    given = known_keys(value, SERVICES[service], f"the arguments of {service}")
-    arguments = {key: within((key,), ARGUMENTS.get(key, fields.read_number), each) for key, each in given.items()}
+    arguments = {key: _field(value, key) for key in known_keys(value, SERVICES[service], f"the arguments of {service}")}
     guarded(complete, service, arguments)
     return arguments
-
-
-def _name(value: Any) -> str:
-    if type(value) is not str or not value:
-        raise Misfit(f"expected a turtle's name, found {kind(value or None)}")
-    return value
-
-
-# service argument -> its reader; others are numbers
-ARGUMENTS: dict[str, Callable[[Any], Any]] = {
-    "turtle": _name,
-    "name": _name,
-    "theta": fields.read_angle,
-    "angular": fields.read_angle,
-    "off": fields.read_flag,
-    **dict.fromkeys(("r", "g", "b", "width"), fields.read_byte),
-}
-
-
-def _place(value: Any) -> Place:
-    """Read [x, y], [x, y, theta] or {x, y, theta}: metres, radians."""
-    if type(value) is dict:
-        given = known_keys(value, ("x", "y", "theta"), "a place")
-        x, y, theta = (field(given, key, ARGUMENTS.get(key, fields.read_number), "0") for key in ("x", "y", "theta"))
-        return x, y, theta
-    if type(value) is not list or len(value) not in (2, 3):
-        raise Misfit(f"expected [x, y, theta], found {kind(value)}")
-    x, y = (within((index,), fields.read_number, value[index]) for index in (0, 1))
-    return x, y, within((2,), fields.read_angle, value[2]) if len(value) == 3 else 0.0

@@ -1,9 +1,7 @@
-"""Run a scene in simulated time: ticks, broadcasts, leaders and followers, each when it is due; all is seen through tf.
+"""Run a scene in simulated time: ticks, broadcasts, leaders and followers, each when it is due; and sum the run up.
 
-At equal times: tick, then carrots, service calls, leaders, controllers. Commands and calls act at the first tick
-strictly later. Poses enter the buffer as float32, the stamp is the tick's time, nothing is late on its way.
-
-What a run comes to: how near each follower is, how soon it was there, how often a wall was hit.
+All is seen through tf. At equal times: tick, then carrots, service calls, leaders, controllers. Commands and calls act
+at the first tick strictly later. Poses enter the buffer as float32, the stamp is the tick's time, nothing is late.
 """
 
 from __future__ import annotations
@@ -16,8 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import LookupFailed, ValueInvalid, printable
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
-from frametool.sim.controllers import CARROT_NS, frame_of, offset, planar
-from frametool.sim.leaders import EndOfRun, Heading
+from frametool.sim.drivers import CARROT_NS, EndOfRun, Heading, frame_of, offset, planar
 from frametool.sim.scene import Follow
 from frametool.sim.turtle import TICK_NS, ServiceRefused, TurtlePose, TurtleState, World
 
@@ -25,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.geometry.transform import Transform
-    from frametool.sim.leaders import Leader
+    from frametool.sim.drivers import Leader
     from frametool.sim.scene import Scene, ServiceCall
     from frametool.sim.turtle import Pen, Twist, WallHit
 
@@ -117,7 +114,13 @@ class Simulation:
     def tick(self) -> None:
         """Advance turtlesim by one tick: service calls, motion, poses; at time 0 only poses."""
         step, world = self.step, self.world
-        self._answer_calls()
+        for call in self.calls:
+            try:
+                message = world.call(call.service, **call.arguments)
+            except ServiceRefused as refusal:
+                message = f"{call.place}: {refusal}" if call.place else str(refusal)
+            step.log += [message] if message else []
+        self.calls.clear()
         step.is_tick = True
         if step.t_ns:
             step.walls = world.tick(step.t_ns)
@@ -128,16 +131,6 @@ class Simulation:
             step.pens[name] = turtle.pen
             self.broadcast(WORLD, name, planar(pose.x, pose.y, pose.theta))
         self.states.update(step.states)
-
-    def _answer_calls(self) -> None:
-        """Answer the service calls that have come in since the last tick."""
-        for call in self.calls:
-            try:
-                message = self.world.call(call.service, **call.arguments)
-            except ServiceRefused as refusal:
-                message = f"{call.place}: {refusal}" if call.place else str(refusal)
-            self.step.log += [message] if message else []
-        self.calls.clear()
 
 
 def simulate(scene: Scene) -> Iterator[SimulationStep]:
@@ -179,7 +172,7 @@ def _processes(simulation: Simulation, scene: Scene) -> Iterator[tuple[int, Proc
         if isinstance(turtle.driver, Follow):
             if turtle.driver.leader == turtle.name:
                 raise ValueInvalid(f"{turtle.name} cannot follow itself")
-            yield CONTROLLERS, _controller(FollowerNode(turtle.name, turtle.driver), simulation)
+            yield CONTROLLERS, _controller(simulation, turtle.name, turtle.driver)
         elif turtle.driver is not None:
             yield LEADERS, _leader(simulation, turtle.name, turtle.driver())
 
@@ -192,7 +185,7 @@ def _ticks(simulation: Simulation) -> Process:
 
 
 def _carrot(simulation: Simulation, turtle: str, target: str) -> Process:
-    """Broadcast a carrot frame beside a turtle, fixed or moving, ten times a second."""
+    """Broadcast a carrot frame next to a turtle, fixed or moving, ten times a second."""
     for now_ns in count(0, CARROT_NS):
         yield now_ns
         x, y = offset(target, now_ns)
@@ -212,63 +205,53 @@ def _leader(simulation: Simulation, name: str, leader: Leader) -> Process:
         yield leader.due_ns
         turtle = simulation.world.turtles.get(name)
         pose = pose if turtle is None else turtle.pose
-        given = leader.command(pose)
-        if turtle is None or given is None:
+        command = leader.command(pose)
+        if turtle is None or command is None:
             continue
-        if isinstance(given, Heading):
-            turtle.rotate_absolute(given.theta)
+        if isinstance(command, Heading):
+            turtle.rotate_absolute(command.theta)
         else:
-            turtle.command(given)
+            turtle.command(command)
             step = simulation.step
-            step.led.append(IssuedCommand(step.t_ns, name, given, None, None, turtle.state))
+            step.led.append(IssuedCommand(step.t_ns, name, command, None, None, turtle.state))
 
 
-def _controller(follower: FollowerNode, simulation: Simulation) -> Process:
-    """Let a follower steer at the rate of its law."""
+def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:
+    """Be the tutorial's listener: look the target up in tf at the rate of the law, and drive there.
+
+    Without an answer it skips the cycle and logs once why, until there is one again.
+    """
+    frame, failing = frame_of(follow.leader, follow.target), ""
     for number in count():
-        yield follower.follow.controller.due_ns(number)
-        if follower.turtle in simulation.world.turtles:
-            follower.steer(simulation)
-
-
-class FollowerNode:
-    """The tutorial's listener: looks its target up in tf, and drives there; without an answer it skips the cycle."""
-
-    def __init__(self, turtle: str, follow: Follow) -> None:
-        """Let a turtle follow."""
-        self.turtle = turtle
-        self.follow = follow
-        self.frame = frame_of(follow.leader, follow.target)
-        self._failing = ""
-
-    def steer(self, simulation: Simulation) -> None:
-        """Look the target up and command the turtle; log once why there is no command, until there is one again."""
-        step = simulation.step
+        yield follow.controller.due_ns(number)
+        step, turtle = simulation.step, simulation.world.turtles.get(name)
+        if turtle is None:
+            continue
         try:
-            x, y = self._look(simulation.buffer, step.t_ns)
+            x, y = _look(simulation.buffer, name, frame, step.t_ns, follow.delay_ns)
         except LookupFailed as error:
-            if type(error).__name__ != self._failing:
-                self._failing = type(error).__name__
-                step.log.append(f"Could not transform {self.turtle} to {self.frame}: {error}")
-            return
-        self._failing = ""
+            if type(error).__name__ != failing:
+                failing = type(error).__name__
+                step.log.append(f"Could not transform {name} to {frame}: {error}")
+            continue
+        failing = ""
         try:
-            twist = self.follow.controller.command(x, y)
+            twist = follow.controller.command(x, y)
         except ValueInvalid as error:
-            raise ValueInvalid(f"{self.turtle}: {error}") from None
-        simulation.world.turtles[self.turtle].command(twist)
-        leader, state = simulation.states.get(self.follow.leader), simulation.states[self.turtle]
-        step.commands.append(IssuedCommand(step.t_ns, self.turtle, twist, math.sqrt(x * x + y * y), leader, state))
+            raise ValueInvalid(f"{name}: {error}") from None
+        turtle.command(twist)
+        leader, state = simulation.states.get(follow.leader), simulation.states[name]
+        step.commands.append(IssuedCommand(step.t_ns, name, twist, math.sqrt(x * x + y * y), leader, state))
 
-    def _look(self, buffer: TransformBuffer, now_ns: int) -> tuple[float, float]:
-        """Return the target as the turtle sees it: at the latest common time, or where it was `delay_ns` before now.
 
-        Looking back, the turtle itself counts as standing where tf saw it last (tf2's lookup across time).
-        """
-        if not self.follow.delay_ns:
-            return buffer.lookup(self.turtle, self.frame).components[:2]
-        past_ns = now_ns - self.follow.delay_ns
-        return buffer.lookup_across(self.turtle, None, self.frame, past_ns, WORLD).components[:2]
+def _look(buffer: TransformBuffer, turtle: str, frame: str, now_ns: int, delay_ns: int) -> tuple[float, float]:
+    """Return a frame as the turtle sees it: at the latest common time, or where it was `delay_ns` before now.
+
+    Looking back, the turtle itself counts as standing where tf saw it last (tf2's lookup across time).
+    """
+    if not delay_ns:
+        return buffer.lookup(turtle, frame).components[:2]
+    return buffer.lookup_across(turtle, None, frame, now_ns - delay_ns, WORLD).components[:2]
 
 
 class RunSummary:

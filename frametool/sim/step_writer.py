@@ -64,7 +64,6 @@ class StepWriter:
         """Choose what is written and how."""
         self._emissions = _EMISSIONS["all commands" if leaders and emit == "commands" else emit]
         self._style = style
-        self._write: Callable[[Emission], str] = getattr(self, f"_{style.form}")
         self._labelled = labelled
         self._headed = False
 
@@ -74,7 +73,7 @@ class StepWriter:
             if not self._headed:
                 self._headed = True
                 yield self._header(emission)
-            yield self._write(emission)
+            yield self._record(emission)
 
     def _header(self, emission: Emission) -> str:
         columns = list(emission.cells)
@@ -82,20 +81,18 @@ class StepWriter:
             return _aligned([SHORT.get(name, name) for name in columns], map(_step_width, columns))
         return row(columns, self._style) if self._style.form == "csv" and not emission.ros2_row else ""
 
-    def _yaml(self, emission: Emission) -> str:
-        labels = emission.labels
-        comment = f"# {printable(labels['turtle'])} at {labels['t']} s\n" if self._labelled and labels else ""
-        return comment + message_text(emission.message, self._style)
-
-    def _json(self, emission: Emission) -> str:
-        return f"{dump(emission.labels | emission.message, self._style.number)}\n"
-
-    def _csv(self, emission: Emission) -> str:
-        return row(emission.ros2_row or emission.cells.values(), self._style)
-
-    def _text(self, emission: Emission) -> str:
+    def _record(self, emission: Emission) -> str:
+        labels, style = emission.labels, self._style
+        match style.form:
+            case "yaml":
+                comment = f"# {printable(labels['turtle'])} at {labels['t']} s\n" if self._labelled and labels else ""
+                return comment + message_text(emission.message, style)
+            case "json":
+                return f"{dump(labels | emission.message, style.number)}\n"
+            case "csv":
+                return row(emission.ros2_row or emission.cells.values(), style)
         t, *others = emission.cells.values()
-        cells = [f"{t:.3f}", *(_text_cell(cell, self._style, STEP_DECIMALS) for cell in others)]
+        cells = [f"{t:.3f}", *(_text_cell(cell, style, STEP_DECIMALS) for cell in others)]
         return _aligned(cells, map(_step_width, emission.cells))
 
 
@@ -135,7 +132,7 @@ def _commands(commands: Iterable[IssuedCommand]) -> Iterator[Emission]:
     """Yield commands, as geometry_msgs/Twist."""
     for command in commands:
         ahead, turning, aside = command.twist
-        labels = _labels(command.t_ns, command.turtle)
+        labels = {"t": command.t_ns / BILLION, "turtle": command.turtle}
         seen = zip(("leader_x", "leader_y", "leader_theta"), command.leader or (None, None, None), strict=True)
         cells = {"linear_x": ahead, "angular_z": turning, "distance": command.distance, **dict(seen)}
         message = {"linear": {"x": ahead, "y": aside, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": turning}}
@@ -148,7 +145,7 @@ def _poses(step: SimulationStep) -> Iterator[Emission]:
         if not all(map(math.isfinite, pose)):
             when = f"{name} at {step.t_ns / BILLION:g} s"
             raise ValueInvalid(f"{when}: its speed does not fit the float32 of a pose message")
-        labels, message = _labels(step.t_ns, name), pose._asdict()
+        labels, message = {"t": step.t_ns / BILLION, "turtle": name}, pose._asdict()
         yield Emission(labels | message, message, labels)
 
 
@@ -168,10 +165,6 @@ def _transforms(step: SimulationStep) -> Iterator[Emission]:
         }
         cells |= dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), numbers, strict=True))
         yield Emission(cells, message, {}, (seconds, nanoseconds, parent, child, *numbers))
-
-
-def _labels(t_ns: int, turtle: str) -> Record:
-    return {"t": t_ns / BILLION, "turtle": turtle}
 
 
 _EMISSIONS: dict[str, Callable[[SimulationStep], Iterator[Emission]]] = {

@@ -12,7 +12,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
-from frametool.sim.controllers import ARRIVED, FollowController, unbounded
+from frametool.sim.drivers import ARRIVED, FollowController, unbounded
 from frametool.sim.scene import TUTORIAL_SPAWN, tutorial
 from frametool.sim.simulate import simulate
 from frametool.sim.turtle import DT, FASTEST_TURN, SIZE, TICK_NS, TIMEOUT_NS, turned
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from frametool.sim.leaders import MakeLeader
+    from frametool.sim.drivers import MakeLeader
     from frametool.sim.turtle import TurtlePose, TurtleState
 
     LeaderTrack = list[tuple[TurtleState, TurtlePose]]
@@ -67,11 +67,14 @@ def simulate_many(
     Raises ValueInvalid for what `FollowController` would refuse, for velocities and a spawn that are not finite.
     """
     law_itself = FollowController(law, rate=rate)
-    given = dict(zip(NUMBERS, (gain_linear, gain_angular, max_linear, max_angular), strict=True))
-    numbers = [_checked(name, getattr(law_itself, name) if value is None else value) for name, value in given.items()]
+    options = dict(zip(NUMBERS, (gain_linear, gain_angular, max_linear, max_angular), strict=True))
+    numbers = [_checked(name, getattr(law_itself, name) if value is None else value) for name, value in options.items()]
     columns = np.broadcast_arrays(*np.moveaxis(_places(spawn), -1, 0), *numbers)
     shape, flat = columns[0].shape, [column.reshape(-1) for column in columns]
-    track = _leader_track(leader, duration, seed)
+    if not 0.0 <= duration < math.inf:
+        raise ValueInvalid(f"duration must be finite and 0 or more, found {duration}")
+    steps = simulate(tutorial(leader=leader, followers=0, duration=duration, seed=seed))
+    track = [(step.states["turtle1"], step.poses["turtle1"]) for step in steps if step.is_tick]
     blocks = [
         _follow([column[at : at + BLOCK] for column in flat], track, law_itself, reach)
         for at in range(0, max(flat[0].size, 1), BLOCK)
@@ -91,12 +94,8 @@ def rows(
     gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult,
 ) -> Iterator[dict[str, float | None]]:  # fmt: skip
     """Yield the result of `grid` as one record a pair of gains; None where there is no number."""
-    columns = {
-        "time_to_reach": result.time_to_reach,
-        "overshoot": result.overshoot,
-        "final_distance": result.distance,
-        "wall_hits": result.wall_hits,
-    }
+    columns: dict[str, NDArray[Any]] = {"time_to_reach": result.time_to_reach, "overshoot": result.overshoot}
+    columns |= {"final_distance": result.distance, "wall_hits": result.wall_hits}
     for row, column in np.ndindex(len(gain_linear), len(gain_angular)):
         cells = {name: values[row, column].item() for name, values in columns.items()}
         known = {name: None if math.isnan(cell) else cell for name, cell in cells.items()}
@@ -129,14 +128,6 @@ def _places(spawn: ArrayLike) -> Floats:
 def _single(values: Floats) -> Floats:
     """Round to float32."""
     return values.astype(np.float32).astype(float)
-
-
-def _leader_track(leader: MakeLeader | str, duration: float, seed: int) -> LeaderTrack:
-    """Run the leader alone: where it is at time 0 and after every tick, and what it publishes of that."""
-    if not 0.0 <= duration < math.inf:
-        raise ValueInvalid(f"duration must be finite and 0 or more, found {duration}")
-    steps = simulate(tutorial(leader=leader, followers=0, duration=duration, seed=seed))
-    return [(step.states["turtle1"], step.poses["turtle1"]) for step in steps if step.is_tick]
 
 
 def _follow(columns: list[Floats], track: LeaderTrack, law: FollowController, reach: float) -> tuple[Any, ...]:

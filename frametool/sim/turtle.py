@@ -1,15 +1,13 @@
-"""One turtle, moved as turtlesim moves it: its arithmetic, its constants, its rounding.
+"""Turtlesim's world and its turtles: motion, constants and rounding of the node, its services with their refusals.
 
 Lengths in metres, angles in radians, x to the right, y up; inside, y runs down from the top as in turtlesim's window.
 Source: turtlesim's turtle.cpp, for ROS 1 and ROS 2.
-
-turtlesim's world: turtles by name, its clock's ticks, its services with their refusals.
 """
 
 from __future__ import annotations
 
 import math
-from struct import Struct
+from array import array
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, listing, printable, shown
@@ -26,9 +24,6 @@ CENTRE = SIZE / 2.0
 TURN_SPEED = 1.0  # radians a second, of rotate_absolute
 TURN_NEAR = 0.02  # radians, where rotate_absolute ends
 FASTEST_TURN = 1e15  # radians a second; beyond, what is left of an angle after wrapping is rounding
-
-_ONE_SINGLE = Struct("f")
-_FIVE_SINGLES = Struct("5f")
 
 
 class _Components(NamedTuple):
@@ -89,10 +84,7 @@ class Pen(NamedTuple):
 
 def single(value: float) -> float:
     """Round to float32, as turtlesim's messages and service arguments are."""
-    try:
-        return float(_ONE_SINGLE.unpack(_ONE_SINGLE.pack(value))[0])
-    except OverflowError:
-        return math.copysign(math.inf, value)
+    return array("f", (value,))[0]
 
 
 def check_single(**numbers: float) -> None:
@@ -159,7 +151,8 @@ class Turtle:
     def pose(self) -> TurtlePose:
         """Return what turtlesim would publish now, float32."""
         ahead, turning, aside = self._velocity
-        return _rounded(self._x, SIZE - self._down, self._theta, math.sqrt(ahead * ahead + aside * aside), turning)
+        speed = math.sqrt(ahead * ahead + aside * aside)
+        return TurtlePose(*array("f", (self._x, SIZE - self._down, self._theta, speed, turning)))
 
     def command(self, twist: Twist) -> None:
         """Take a velocity command; it acts from the next tick on, the last one of several wins."""
@@ -238,17 +231,9 @@ class Turtle:
         return outside
 
 
-def _rounded(*numbers: float) -> TurtlePose:
-    """Round a pose to float32."""
-    try:
-        return TurtlePose(*_FIVE_SINGLES.unpack(_FIVE_SINGLES.pack(*numbers)))
-    except OverflowError:
-        return TurtlePose(*map(single, numbers))
-
-
 VARIANTS = ("ros1", "ros2")
 FAR = 1e9  # metres, from where on a place is written with an exponent
-# service -> its arguments and what they are when left out (None: must be given)
+# service -> its arguments and what they are when left out (None: needed)
 SERVICES: dict[str, dict[str, float | str | None]] = {
     "spawn": {"x": None, "y": None, "theta": 0.0, "name": ""},
     "kill": {"name": None},
@@ -357,14 +342,14 @@ class World:
         Returns what turtlesim logs of it, or "".
         Raises ServiceRefused; ValueInvalid for an unknown service or a wrong argument.
         """
-        given = complete(service, arguments)
+        values = complete(service, arguments)
         if self.variant == "ros1" and service == "rotate_absolute":
             raise ServiceRefused("rotate_absolute is an action of the ROS 2 turtlesim; add turtlesim: ros2")
-        receiver = self.turtle(str(given.pop("turtle"))) if "turtle" in given else self
-        answer = getattr(receiver, service)(**given)
+        receiver = self.turtle(str(values.pop("turtle"))) if "turtle" in values else self
+        answer = getattr(receiver, service)(**values)
         if service == "spawn":
             return f"Spawning turtle [{answer}] at " + ", ".join(
-                f"{name}=[{single(float(given[name])):f}]" for name in ("x", "y", "theta")
+                f"{name}=[{single(float(values[name])):f}]" for name in ("x", "y", "theta")
             )
         return {"reset": "Resetting turtlesim.", "clear": "Clearing turtlesim."}.get(service, "")
 
@@ -384,8 +369,8 @@ def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float
     expected = SERVICES[service]
     if unknown := [name for name in arguments if name not in expected]:
         raise ValueInvalid(f"{service} has no {shown(unknown[0])}; expected {', '.join(expected) or 'nothing'}")
-    given = {name: arguments.get(name, default) for name, default in expected.items()}
-    if missing := [name for name, value in given.items() if value is None]:
+    values = {name: arguments.get(name, default) for name, default in expected.items()}
+    if missing := [name for name, value in values.items() if value is None]:
         raise ValueInvalid(f"{service} needs {', '.join(missing)}")
-    check_single(**{name: value for name, value in given.items() if isinstance(value, float)})
-    return {name: value for name, value in given.items() if value is not None}
+    check_single(**{name: value for name, value in values.items() if isinstance(value, float)})
+    return {name: value for name, value in values.items() if value is not None}

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
 from frametool.frames.path import IDENTITY
+from frametool.frames.snapshot import Snapshot
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:
@@ -45,8 +46,7 @@ def _expression(text: str) -> re.Pattern[str]:
     import warnings
 
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FutureWarning)
+        with warnings.catch_warnings(action="ignore", category=FutureWarning):
             return re.compile(text)
     except (re.error, OverflowError, RecursionError) as error:
         raise ValueInvalid(f"{shown(text)} is no regular expression: {error}") from None
@@ -84,7 +84,9 @@ class FrameScene:
         self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.standing}
         self.names, self._roots = _in_order(tree, {name: _first_parent(tree, name) for name in tree.frames})
         self.target, self.source, self.path_only = target, source, path_only
-        self.at_ns = self._time(at_ns)
+        if self.tracks and at_ns is None:
+            at_ns = max(track.first_ns for track in self.tracks.values())
+        self.at_ns = at_ns if self.tracks else None
         self.fixed = fixed or target or below or max(self._roots, key=lambda root: self._roots[root])
         self.chosen = self._choice(below, only)
 
@@ -96,22 +98,13 @@ class FrameScene:
             max((track.last_ns for track in self.tracks.values()), default=0),
         )
 
-    def _time(self, at_ns: int | None) -> int | None:
-        if not self.tracks:
-            return None
-        return max(track.first_ns for track in self.tracks.values()) if at_ns is None else at_ns
-
     def _choice(self, below: str | None, only: str | None) -> set[str] | None:
         """Return the names to draw."""
         if below is None and only is None and not self.path_only:
             return None
         chosen = set(self.names)
         if below is not None:
-            found = {below}
-            for name in self._ordered_now():
-                if self.parent(name) in found:
-                    found.add(name)
-            chosen &= found
+            chosen &= {*Snapshot(self.tree, self.at_ns).below(below)}
         if self.path_only and self.target and self.source:
             chosen &= set(self.tree.path(self.target, self.source, self.at_ns))
         if only is not None:
@@ -132,22 +125,16 @@ class FrameScene:
 
     def poses(self) -> dict[str, Rigid]:
         """Return the pose in `fixed` of every chosen frame that is connected to it at the time, parents first."""
-        in_root: dict[str, tuple[str, Rigid]] = {}
-        for name in self._ordered_now():
-            parent, pose = self.parent(name), self.edge(name)
-            if parent is None and self.tree.track(name) is None:
-                in_root[name] = name, IDENTITY
-            elif pose is not None and parent in in_root:
-                root, above = in_root[parent]
-                in_root[name] = root, rigid.compose(*above, *pose)
-        if self.fixed not in in_root:
+        now = Snapshot(self.tree, self.at_ns)
+        root = now.roots[self.fixed]
+        if root in now.without_data:
             return {self.fixed: IDENTITY} if self._is_chosen(self.fixed) else {}
-        home, fixed_in_home = in_root[self.fixed]
-        back = rigid.inverse(*fixed_in_home)
+        in_root = now.seen_from(root)
+        back = rigid.inverse(*in_root[self.fixed].components)
         return {
-            name: IDENTITY if name == self.fixed else rigid.compose(*back, *pose)
-            for name, (root, pose) in in_root.items()
-            if root == home and self._is_chosen(name)
+            name: IDENTITY if name == self.fixed else rigid.compose(*back, *in_root[name].components)
+            for name in self._ordered_now()
+            if name in in_root and self._is_chosen(name)
         }
 
     def _is_chosen(self, name: str) -> bool:
@@ -187,19 +174,13 @@ class FrameScene:
 
     def _movers_above(self, name: str) -> set[str]:
         """Return the moving frames on any way from a frame to a root."""
-        found: set[str] = set()
-        waiting, seen = [name], {name}
-        while waiting:
-            each = waiting.pop()
-            track = self.tree.track(each)
-            if track is None:
-                continue
-            if not track.standing:
-                found.add(each)
-            above = {parent for _, parent, _ in track.walk()} if track.varies else {track.parent}
-            waiting += above - seen
-            seen |= above
-        return found
+        seen, waiting = {name}, [name]
+        for each in waiting:  # it grows as it is walked
+            if track := self.tree.track(each):
+                above = {parent for _, parent, _ in track.walk()} if track.varies else {track.parent}
+                waiting += above - seen
+                seen |= above
+        return seen & self.tracks.keys()
 
 
 def can_be_drawn(point: Sequence[float]) -> bool:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import struct
+from array import array
+from operator import mul
 from typing import TYPE_CHECKING, Any
 
 from frametool import __version__
@@ -16,7 +18,7 @@ from frametool.view.frame_scene import can_be_drawn
 from frametool.view.projection import Projection, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
@@ -79,12 +81,8 @@ def write_glb(scene: FrameScene) -> bytes:
     document |= {"accessors": part.accessors, "bufferViews": part.views, "buffers": [{"byteLength": len(part.data)}]}
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
-    chunks = _chunk(b"JSON", text) + _chunk(b"BIN\0", bytes(part.data))
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack("<I4s", len(data), kind) + data
+    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(part.data), len(text), b"JSON")
+    return head + text + struct.pack("<I4s", len(part.data), b"BIN\0") + part.data
 
 
 def _add_axes(part: BinaryPart) -> None:
@@ -108,8 +106,7 @@ def _add_axes(part: BinaryPart) -> None:
 
 def _single(value: float) -> float:
     """Round to float32, as the numbers in the buffer are."""
-    rounded: float = struct.unpack("<f", struct.pack("<f", value))[0]
-    return rounded
+    return array("f", (value,))[0]
 
 
 def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[list[dict[str, Any]], dict[str, int]]:
@@ -118,12 +115,11 @@ def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[lis
     index: dict[str, int] = {}
     for name, pose in poses.items():
         parent, edge = scene.parent(name), scene.edge(name)
-        inside = parent in index and edge is not None
+        above, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
         index[name] = len(nodes)
-        place = edge if inside and edge else pose
+        nodes[above]["children"].append(index[name])
         nodes.append({"name": name, "translation": place[:3], "rotation": place[3:], "children": [len(nodes) + 1]})
         nodes.append({"name": f"{name} axes", "mesh": 0, "scale": [axis] * 3})
-        nodes[index[parent] if inside and parent else 0]["children"].append(index[name])
     return nodes, index
 
 
@@ -137,7 +133,7 @@ def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> di
         if not drawn or not all(can_be_drawn(sample[:3]) for _, _, sample in track.walk()):
             continue
         seconds, places, rotations = _keys(track, first_ns)
-        times = part.floats([[each] for each in seconds], "SCALAR", min=[seconds[0]], max=[seconds[-1]])
+        times = part.floats([*zip(seconds, strict=True)], "SCALAR", min=[seconds[0]], max=[seconds[-1]])
         for path, rows, kind in (("translation", places, "VEC3"), ("rotation", rotations, "VEC4")):
             channels.append({"sampler": len(samplers), "target": {"node": index[name], "path": path}})
             samplers.append({"input": times, "output": part.floats(rows, kind), "interpolation": "LINEAR"})
@@ -154,13 +150,9 @@ def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence
         if seconds and second <= seconds[-1]:
             continue
         rotation = sample[3:]
-        if rotations and _dot(rotation, rotations[-1]) < 0.0:
+        if rotations and sum(map(mul, rotation, rotations[-1])) < 0.0:
             rotation = tuple(-each for each in rotation)
         seconds.append(second)
         places.append(sample[:3])
         rotations.append(rotation)
     return seconds, places, rotations
-
-
-def _dot(a: Iterable[float], b: Iterable[float]) -> float:
-    return sum(one * other for one, other in zip(a, b, strict=True))

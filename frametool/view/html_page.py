@@ -1,11 +1,8 @@
 """One HTML file in which frames can be looked at from all sides, with everything inside and no request to anywhere.
 
 Its script and style stand as plain files in the folder `page`, one after another in the order of SCRIPTS; the page
-lets nothing else run.  Poses go in as doubles, stamps as doubles of nanoseconds since the first.
-
-What the page needs to move the joints of a robot: where each stands, between which limits, and which it follows.
-
-A run of turtles as the page of `view`: their frames over time, as their followers saw them in tf.
+lets nothing else run.  Poses go in as doubles, stamps as doubles of nanoseconds since the first; joints of a robot
+with their limits.  A run of turtles is shown as its followers saw it in tf.
 """
 
 from __future__ import annotations
@@ -17,6 +14,7 @@ from array import array
 from base64 import b64encode
 from hashlib import sha256
 from html import escape
+from json import dumps
 from typing import TYPE_CHECKING, Any
 
 from frametool import __version__
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
 
     from frametool.formats.robots.joints import Value
     from frametool.formats.robots.robot import Robot
-    from frametool.frames.track import MovingTrack
     from frametool.sim.simulate import SimulationStep
     from frametool.view.frame_scene import FrameScene
 
@@ -68,10 +65,13 @@ def write_page(
         data = compress(data, 6)
     script, style = "".join(_file(f"{name}.js") for name in (WITH_JOINTS if joints else SCRIPTS)), _file("page.css")
     parts = {
-        "POLICY": _policy(script, style),
+        # the page lets its own script and style run, and nothing else
+        "POLICY": "default-src 'none'; "
+        f"script-src '{_digest(script)}'; style-src '{_digest(style)}'; base-uri 'none'; form-action 'none'",
         "TITLE": escape(title),
         "STYLE": style,
-        "HEAD": _json(head),
+        # JSON that no name in it can end
+        "HEAD": dumps(head, separators=(",", ":")).replace("<", "\\u003c").replace("&", "\\u0026"),
         "BLOB": b64encode(data).decode(),
         "SCRIPT": script,
     }
@@ -83,21 +83,8 @@ def _file(name: str) -> str:
         return stream.read()
 
 
-def _policy(script: str, style: str) -> str:
-    """Allow the page its own script and style, and nothing else."""
-    own = (f"{kind}-src 'sha256-{_digest(text)}'" for kind, text in (("script", script), ("style", style)))
-    return f"default-src 'none'; {'; '.join(own)}; base-uri 'none'; form-action 'none'"
-
-
 def _digest(text: str) -> str:
-    return b64encode(sha256(text.encode()).digest()).decode()
-
-
-def _json(value: dict[str, Any]) -> str:
-    """Write JSON that no name in it can end."""
-    from json import dumps
-
-    return dumps(value, separators=(",", ":")).replace("<", "\\u003c").replace("&", "\\u0026")
+    return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
 def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]:
@@ -124,7 +111,8 @@ def _data(scene: FrameScene) -> tuple[dict[str, Any], array[float]]:
     tracks = []
     for name, moving in scene.tracks.items():
         at = numbers.itemsize * len(numbers)
-        tracks.append({"frame": index[name], "count": moving.count, "at": at, "parents": _parents(moving, index)})
+        parents_then = [index[parent] for _, parent, _ in moving.walk()] if moving.varies else index[moving.parent]
+        tracks.append({"frame": index[name], "count": moving.count, "at": at, "parents": parents_then})
         numbers.extend(stamp - first_ns for stamp, _, _ in moving.walk())
         for _, _, sample in moving.walk():
             numbers.extend(sample)
@@ -132,11 +120,6 @@ def _data(scene: FrameScene) -> tuple[dict[str, Any], array[float]]:
         numbers.byteswap()
     head = {"names": scene.names, "parents": parents, "tracks": tracks}
     return head | {"t0": str(first_ns), "first": 0, "last": last_ns - first_ns}, numbers
-
-
-def _parents(track: MovingTrack, index: dict[str, int]) -> int | list[int]:
-    """Return the parent of all samples, or that of each where it changes."""
-    return [index[parent] for _, parent, _ in track.walk()] if track.varies else index[track.parent]
 
 
 def joint_sliders(robot: Robot, values: Mapping[str, Value], names: Sequence[str]) -> list[dict[str, Any]]:

@@ -1,12 +1,7 @@
-"""What pictures are made of: lines, dots, boxes and words, in pixels with y down; `svg` writes them, `png` paints them.
+"""Still pictures of lines, dots, boxes and words, in pixels with y down; as SVG, as HTML around that, or as PNG.
 
-A colour is `#rrggbb`, or a name of PALETTE, which is another one where the reader's system is dark.
-
-A picture as SVG, without any library, light or dark as the reader's system is; and as an HTML page around that.
-
-A picture as PNG, painted by matplotlib, which only the extra `plot` brings; a pixel is a pixel of the picture.
-
-Frames as a still picture: ground, links, trails, axes, names and a scale.
+A colour is `#rrggbb`, or a name of PALETTE, which is another one where the reader's system is dark.  Only PNG needs a
+library, matplotlib.  Also draws frames so: ground, links, trails, axes, names and a scale.
 """
 
 from __future__ import annotations
@@ -14,7 +9,7 @@ from __future__ import annotations
 import io
 import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
-from xml.sax.saxutils import escape, quoteattr
+from xml.sax.saxutils import escape
 
 from frametool.errors import ValueInvalid, printable
 from frametool.view.projection import SLANTED, Projection, Size, axis_tips, nice, place_labels
@@ -108,8 +103,11 @@ def write_svg(picture: Picture) -> str:
     """Return the picture as an SVG document."""
     width, height = f"{picture.width:g}", f"{picture.height:g}"
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+    rule = ".{name} {{fill: {colour}}} .{name}-line {{stroke: {colour}}}\n".format
+    light, dark = ("".join(rule(name=name, colour=PALETTE[name][scheme]) for name in PALETTE) for scheme in (0, 1))
+    style = f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
     paper = '<rect class="paper" width="100%" height="100%"/>\n'
-    return f"{head} {FONT}>\n{_title(picture.title)}{_style()}{paper}{''.join(map(_element, picture.shapes))}</svg>\n"
+    return f"{head} {FONT}>\n{_title(picture.title)}{style}{paper}{''.join(map(_element, picture.shapes))}</svg>\n"
 
 
 def write_html(picture: Picture, more: str = "") -> str:
@@ -118,55 +116,33 @@ def write_html(picture: Picture, more: str = "") -> str:
     return f'<!DOCTYPE html>\n<html lang="en">\n{head}\n<body>\n{write_svg(picture)}{more}</body>\n</html>\n'
 
 
-def _style() -> str:
-    """Return the rules that give the palette's colours."""
-    light, dark = (
-        "".join(
-            f".{name} {{fill: {colours[scheme]}}} .{name}-line {{stroke: {colours[scheme]}}}\n"
-            for name, colours in PALETTE.items()
-        )
-        for scheme in (0, 1)
-    )
-    return f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
-
-
 def _element(shape: Shape) -> str:
     match shape:
-        case PictureLine():
-            return _line(shape)
+        case PictureLine(points, colour, width, alpha, dashes, title):
+            way = "L".join(f"{_number(x)} {_number(y)}" for x, y in points)
+            look = "" if width == 1.0 else f' stroke-width="{width:g}"'
+            look += "" if alpha == 1.0 else f' opacity="{alpha:g}"'
+            look += f' stroke-dasharray="{" ".join(map("{:g}".format, dashes))}"' if dashes else ""
+            stroke = f'class="{colour}-line"' if colour in PALETTE else f'stroke="{colour}"'
+            end = f">{_title(title)}</path>" if title else "/>"
+            return f'<path {stroke}{look} d="M{way}"{end}\n'
         case PictureDot(x, y, radius, colour, title):
             place = f'cx="{_number(x)}" cy="{_number(y)}" r="{radius:g}"'
             return f"<circle {_fill(colour)} {place}>{_title(title)}</circle>\n"
         case PictureBox(x, y, width, height, colour, title):
             size = f'width="{_number(width)}" height="{_number(height)}"'
             return f'<rect {_fill(colour)} x="{_number(x)}" y="{_number(y)}" {size}>{_title(title)}</rect>\n'
-        case PictureWords():
-            return _words(shape)
+        case PictureWords(x, y, text, colour, anchor, size_px, bold, turn):
+            look = "" if anchor == "start" else f' text-anchor="{anchor}"'
+            look += "" if size_px == 12.0 else f' font-size="{size_px:g}"'
+            look += ' font-weight="bold"' if bold else ""
+            look += f' transform="rotate({turn:g} {_number(x)} {_number(y)})"' if turn else ""
+            halo = " paper-line" if colour in PALETTE else ""
+            return f'<text {_fill(colour, halo)} x="{_number(x)}" y="{_number(y)}"{look}>{_text(text)}</text>\n'
 
 
-def _line(line: PictureLine) -> str:
-    way = "L".join(f"{_number(x)} {_number(y)}" for x, y in line.points)
-    look = "" if line.width == 1.0 else f' stroke-width="{line.width:g}"'
-    look += "" if line.alpha == 1.0 else f' opacity="{line.alpha:g}"'
-    look += f' stroke-dasharray="{" ".join(map("{:g}".format, line.dashes))}"' if line.dashes else ""
-    stroke = f'class="{line.colour}-line"' if line.colour in PALETTE else f'stroke="{line.colour}"'
-    end = f">{_title(line.title)}</path>" if line.title else "/>"
-    return f'<path {stroke}{look} d="M{way}"{end}\n'
-
-
-def _words(words: PictureWords) -> str:
-    look = "" if words.anchor == "start" else f' text-anchor="{words.anchor}"'
-    look += "" if words.size == 12.0 else f' font-size="{words.size:g}"'
-    look += ' font-weight="bold"' if words.bold else ""
-    x, y = _number(words.x), _number(words.y)
-    look += f' transform="rotate({words.turn:g} {x} {y})"' if words.turn else ""
-    halo = "paper-line" if words.colour in PALETTE else ""
-    colour = f'class="{words.colour} {halo}"' if halo else f"fill={quoteattr(words.colour)}"
-    return f'<text {colour} x="{x}" y="{y}"{look}>{_text(words.text)}</text>\n'
-
-
-def _fill(colour: str) -> str:
-    return f'class="{colour}"' if colour in PALETTE else f'fill="{colour}"'
+def _fill(colour: str, more: str = "") -> str:
+    return f'class="{colour}{more}"' if colour in PALETTE else f'fill="{colour}"'
 
 
 def _title(text: str) -> str:
@@ -327,5 +303,5 @@ def _scale(flat: Projection, step: float) -> Iterator[Shape]:
     left, right, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0
     yield PictureLine([(left, base - 6.0), (left, base), (right, base), (right, base - 6.0)], "soft")
     yield PictureWords((left + right) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
-    said = f"in {flat.scene.fixed[:40]}, grid {step:g} m"
-    yield PictureWords(right, HEIGHT - 46.0, said, "soft", "end", 11.0)
+    words = f"in {flat.scene.fixed[:40]}, grid {step:g} m"
+    yield PictureWords(right, HEIGHT - 46.0, words, "soft", "end", 11.0)

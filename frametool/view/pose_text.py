@@ -1,7 +1,4 @@
-"""One pose for a person: which frame in which, then every notation, aligned on the decimal point.
-
-Blocks as tf2_echo prints them: time, translation, the rotation in three notations, the matrix.
-"""
+"""Poses for a person: every notation aligned on the decimal point, or blocks as tf2_echo prints them."""
 
 from __future__ import annotations
 
@@ -46,15 +43,12 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     """Return one line a point, aligned, with its frame."""
-    rows = [
-        (record.get("frame"), next(value for value in record.values() if isinstance(value, list))) for record in records
-    ]
-    aligned = _aligned([[style.number(value + 0.0) for value in numbers] for _, numbers in rows])
-    lines = [
-        f"{'  '.join(cells)}  {f'm in {frame}' if frame else 'm'}"
-        for cells, (frame, _) in zip(aligned, rows, strict=True)
-    ]
-    return "".join(f"{line}\n" for line in lines)
+    frames, rows = [], []
+    for record in records:
+        frames.append(f"m in {record['frame']}" if record.get("frame") else "m")
+        numbers = next(value for value in record.values() if isinstance(value, list))
+        rows.append([style.number(value + 0.0) for value in numbers])
+    return "".join(f"{'  '.join(cells)}  {frame}\n" for cells, frame in zip(_aligned(rows), frames, strict=True))
 
 
 def _describe(result: Result, style: Style) -> str:
@@ -66,7 +60,7 @@ def _describe(result: Result, style: Style) -> str:
     if pose.rotation is not None:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)
-    lines += [NumberLine(*extra) for extra in _extra_lines(result)]
+    lines += _extra_lines(result)
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
 
 
@@ -102,13 +96,13 @@ def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Nu
         yield NumberLine("", [], "gimbal lock: not unique, third angle set to 0")
 
 
-def _extra_lines(result: Result) -> Iterator[tuple[str, Sequence[tuple[str, float]], str]]:
+def _extra_lines(result: Result) -> Iterator[NumberLine]:
     """Yield the lines of what is only said about a pose."""
     units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s"}
     for key, value in result.extras.items():
         if isinstance(value, float):
             unit = "deg" if key.endswith("_deg") else units.get(key.partition("_")[0], "")
-            yield key.removesuffix("_deg"), [("", value)], unit
+            yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)
 
 
 def _layout(lines: Sequence[NumberLine], style: Style) -> str:
@@ -120,15 +114,14 @@ def _layout(lines: Sequence[NumberLine], style: Style) -> str:
         if line.label or not parts:
             parts.append([])
         parts[-1].append(line)
-    for split in (list(lines),), parts:
-        texts = [_columns(part, label, style) for part in split]
-        if max(len(text) for part in texts for text in part) <= width:
-            break
-    return "".join(
-        text
-        for part, rows in zip(split, texts, strict=True)
-        for text in (rows if max(map(len, rows)) <= width else _columns(_stacked(part), label, style))
-    )
+    texts = _columns(lines, label, style)
+    if max(map(len, texts)) <= width:
+        return "".join(texts)
+    found = []
+    for part in parts:
+        texts = _columns(part, label, style)
+        found += texts if max(map(len, texts)) <= width else _columns(_stacked(part), label, style)
+    return "".join(found)
 
 
 def _columns(lines: Sequence[NumberLine], label: int, style: Style) -> list[str]:
@@ -164,19 +157,14 @@ def _number(value: float, style: Style) -> str:
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     """Pad the numbers of each column so that their decimal points stand below one another."""
-    columns = max(map(len, rows), default=0)
-    wholes = [max(len(_split(row[at])[0]) for row in rows if at < len(row)) for at in range(columns)]
-    rests = [max(len(_split(row[at])[1]) for row in rows if at < len(row)) for at in range(columns)]
-    return [
-        [f"{_split(cell)[0]:>{wholes[at]}}{_split(cell)[1]:<{rests[at]}}" for at, cell in enumerate(row)]
-        for row in rows
+    points = [[len(cell.partition(".")[0]) for cell in row] for row in rows]
+    wholes = [max(column) for column in zip_longest(*points, fillvalue=0)]
+    moved = [
+        [" " * (whole - point) + cell for whole, point, cell in zip(wholes, places, row, strict=False)]
+        for places, row in zip(points, rows, strict=True)
     ]
-
-
-def _split(text: str) -> tuple[str, str]:
-    """Split a number before its decimal point."""
-    whole, point, rest = text.partition(".")
-    return whole, point + rest
+    widths = [max(map(len, column)) for column in zip_longest(*moved, fillvalue="")]
+    return [[f"{cell:<{width}}" for cell, width in zip(row, widths, strict=False)] for row in moved]
 
 
 ECHO_DECIMALS = 3
@@ -194,27 +182,17 @@ def write_blocks(results: Iterable[Result], target: str, source: str, style: Sty
 def _block(result: Result, style: Style) -> str:
     """Return one block; a path that stands still has no time."""
     decimals = ECHO_DECIMALS if style.precision is None else style.precision
-    stamp_ns = result.extras.get("stamp_ns")
-    pose = result.pose
+    stamp_ns, components = result.extras.get("stamp_ns"), result.pose.components
+
+    def fixed(values: Sequence[float]) -> list[str]:
+        return [f"{round(value, decimals) + 0.0:.{decimals}f}" for value in values]  # no minus before a zero
+
     lines = ["At any time: the frames stand still" if stamp_ns is None else f"At time {format_stamp(stamp_ns)}"]
-    lines.append(f"- Translation: {_listed(pose.components[:3], decimals)}")
+    lines.append(f"- Translation: [{', '.join(fixed(components[:3]))}]")
     for spec, name in ROTATIONS:
-        lines.append(f"- Rotation: in {name} {_listed(rotation_numbers(pose, notation(spec), style), decimals)}")
-    return "\n".join([*lines, "- Matrix:", *_matrix(result, decimals)]) + "\n"
-
-
-def _matrix(result: Result, decimals: int) -> Iterable[str]:
-    """Yield the four rows of the homogeneous matrix."""
-    numbers = rigid.to_homogeneous(*result.pose.components, floats)
-    for row in range(4):
-        cells = (_fixed(value, decimals) for value in numbers[4 * row : 4 * row + 4])
-        yield "".join(f" {cell:>{decimals + 3}}" for cell in cells)
-
-
-def _listed(values: Sequence[float], decimals: int) -> str:
-    return f"[{', '.join(_fixed(value, decimals) for value in values)}]"
-
-
-def _fixed(value: float, decimals: int) -> str:
-    """Round; no minus before a zero."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+        numbers = fixed(rotation_numbers(result.pose, notation(spec), style))
+        lines.append(f"- Rotation: in {name} [{', '.join(numbers)}]")
+    lines.append("- Matrix:")
+    cells = [f" {cell:>{decimals + 3}}" for cell in fixed(rigid.to_homogeneous(*components, floats))]
+    lines += ["".join(cells[at : at + 4]) for at in range(0, 16, 4)]
+    return "\n".join(lines) + "\n"

@@ -46,9 +46,7 @@ class ProgressBar:
             self._bar.start()
             self._task = self._bar.add_task("", total=self.total, rows="0", rate="")
         with suppress(OSError):
-            self._bar.update(
-                self._task, completed=self.size, rows=f"{self.rows:,}", rate=f"{self.rows / seconds:,.0f}"
-            )
+            self._bar.update(self._task, completed=self.size, rows=f"{self.rows:,}", rate=f"{self.rows / seconds:,.0f}")
 
 
 def _bar(total: int | None) -> Any:

@@ -1,24 +1,28 @@
-"""A picture's geometry: from metres in space to pixels on a plane, seen from a direction, without perspective.
+"""A picture's geometry: from metres in space to pixels, seen from a direction, without perspective; places for names.
 
-Names beside points, none over another: a grid of cells holds what is taken, so that only near ones are compared.
+No name stands over another: a grid of cells holds what is taken, so that only near ones are compared.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import printable
+from frametool.errors import ValueInvalid, printable, shown
 from frametool.geometry import quaternion
+from frametool.text.numbers import parse_angle
 from frametool.view.frame_scene import can_be_drawn
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from typing import TypeVar
 
     from frametool.geometry.types import Rigid
     from frametool.view.frame_scene import FrameScene, Point
 
     Box = tuple[float, float, float, float]  # left, top, right, bottom
+    Spot = TypeVar("Spot")
 
 SLANTED = (-0.9, 0.5)
 # name -> azimuth and elevation of the eye, radians: from where one looks along -x, along +y, and down
@@ -28,6 +32,25 @@ EYES = {
     "side": (-math.pi / 2.0, 0.0),
     "top": (-math.pi / 2.0, math.pi / 2.0),
 }
+
+
+def parse_eye(text: str) -> tuple[float, float]:
+    """Read a name of EYES, or AZ,EL in degrees, and return azimuth and elevation in radians.
+
+    Raises ValueInvalid.
+    """
+    if text in EYES:
+        return EYES[text]
+    cells = text.split(",")
+    if len(cells) != 2:
+        raise ValueInvalid(f"expected {', '.join(EYES)} or AZ,EL in degrees, found {shown(text)}")
+    angles = map(parse_angle, map(str.strip, cells))
+    azimuth, elevation = (angle if unit == "rad" else math.radians(math.fmod(angle, 360.0)) for angle, unit in angles)
+    if abs(elevation) > math.pi / 2.0:
+        raise ValueInvalid(f"the elevation must be -90 .. 90 degrees, found {shown(cells[1])}")
+    return azimuth, elevation
+
+
 AXIS_PART = 0.55  # of the usual distance between a frame and its parent
 USUAL_LINK = 0.5  # metres, where there is none
 LEAST = 1e-9  # metres; below, frames lie on one point
@@ -64,13 +87,14 @@ class Projection:
     links: (parent, child) where both are drawn
     axis: metres of a drawn axis
     scale: pixels of a metre
-    view: the rows right, up, toward the eye
+    view: the directions right, up and toward the eye
     """
 
     def __init__(self, scene: FrameScene, size: Size, eye: tuple[float, float] = SLANTED) -> None:
         """Fit all that is drawn into the picture."""
         self.scene, self.size = scene, size
-        self.view = _view(*eye)
+        sa, ca, se, ce = (function(angle) for angle in eye for function in (math.sin, math.cos))
+        self.view = (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
         self.poses = {name: pose for name, pose in scene.poses().items() if can_be_drawn(pose[:3])}
         self.trails = scene.trails
         self.links = [(parent, name) for name in self.poses if (parent := scene.parent(name)) in self.poses and parent]
@@ -173,12 +197,6 @@ def nice(length: float) -> float:
     return (1.0 if factor < 1.5 else 2.0 if factor < 3.5 else 5.0 if factor < 7.5 else 10.0) * power
 
 
-def _view(azimuth: float, elevation: float) -> tuple[Point, Point, Point]:
-    """Return the directions right, up and toward the eye."""
-    ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
-    return (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
-
-
 def _bounds(points: Iterable[Sequence[float]]) -> tuple[list[float], list[float]]:
     """Return the least and the greatest coordinates of some points; of none, 0."""
     columns = list(zip(*points, strict=True)) or [(0.0,)] * 3
@@ -205,7 +223,7 @@ class Label(NamedTuple):
 class TakenBoxes:
     """Rectangles that nothing may be put over.
 
-    Of those that are the same to a pixel one is kept: a million frames on one spot cost their names no more than one.
+    Of those that are the same to a pixel one is stored: a million frames on one spot cost their names no more than one.
     """
 
     def __init__(self) -> None:
@@ -234,13 +252,11 @@ class TakenBoxes:
 
 def _cells(box: Box) -> Iterator[tuple[int, int]]:
     left, top, right, bottom = (math.floor(edge / CELL) for edge in box)
-    for column in range(left, right + 1):
-        for row in range(top, bottom + 1):
-            yield column, row
+    return product(range(left, right + 1), range(top, bottom + 1))
 
 
 def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box] = ()) -> tuple[list[Label], int]:
-    """Place a name beside every group of frames that lie on one point, the nearest to the eye first.
+    """Place a name next to every group of frames that lie on one point, the nearest to the eye first.
 
     font: its size in pixels.  blocked: what else stands on the picture.
     Returns the places, and how many names found none.
@@ -256,8 +272,8 @@ def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box]
                 axes.add((tip.x - 2.0, tip.y - 2.0, tip.x + 2.0, tip.y + 2.0))
     placed, hidden = [], 0
     for point, names in flat.groups(SAME):
-        words = words_of(names)
-        found = _free_spot(_spots(flat, words, point, font), taken, axes)
+        spots = _spots(flat, words_of(names), point, font)
+        found = best_spot(spots, lambda spot: taken.meets(spot.box), lambda spot: axes.meets(spot.box))
         if found is None:
             hidden += len(names)
         else:
@@ -266,13 +282,13 @@ def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box]
     return placed, hidden
 
 
-def _free_spot(spots: Iterable[Label], taken: TakenBoxes, axes: TakenBoxes) -> Label | None:
+def best_spot(spots: Iterable[Spot], is_taken: Callable[[Spot], bool], on_axes: Callable[[Spot], bool]) -> Spot | None:
     """Return the first spot over nothing at all, or else the first that is only over axes."""
     second = None
     for spot in spots:
-        if taken.meets(spot.box):
+        if is_taken(spot):
             continue
-        if not axes.meets(spot.box):
+        if not on_axes(spot):
             return spot
         second = second or spot
     return second
@@ -292,13 +308,9 @@ def _spots(flat: Projection, words: str, point: Flat, font: float) -> Iterator[L
 
 def words_of(names: list[str], most: int = 2) -> str:
     """Return the words for frames on one point: some of their names, and how many more there are."""
-    words = " · ".join(_cut(name) for name in names[:most])
+    shown_names = map(printable, names[:most])
+    words = " · ".join(name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in shown_names)
     return words + (f" +{len(names) - most}" if len(names) > most else "")
-
-
-def _cut(name: str) -> str:
-    name = printable(name)
-    return name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…"
 
 
 def width_of(words: str, font: float) -> float:

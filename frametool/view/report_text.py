@@ -1,9 +1,4 @@
-"""What `monitor` tells, for a person: a table of the edges, then a sentence about the chain.
-
-What differs between two trees, for a person: what only one has, other parents, then tables of what moved.
-
-The forms of text for a person: a list of all, or all there is to say of one, within 80 columns.
-"""
+"""Reports for a person, within 80 columns: edges of a recording, differences between trees, forms of files."""
 
 from __future__ import annotations
 
@@ -19,35 +14,23 @@ from frametool.view.pose_text import in_width
 from frametool.view.tree_text import cells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.grammar.result import Style
     from frametool.lint.tree_diff import Apart, Difference
 
 
-def _seconds(value: float | None) -> str:
-    return "" if value is None else f"{value:.3f}"
-
-
-def _stamp(value: int | None) -> str:
-    return "" if value is None else format_stamp(value)[:-6]
-
-
-COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
-    "parent": ("parent", str),
-    "child": ("child", str),
-    "count": ("count", str),
-    "rate_hz": ("rate Hz", lambda value: "static" if value is None else f"{value:.2f}"),
-    "first_ns": ("first", _stamp),
-    "last_ns": ("last", _stamp),
-    "gap_s": ("gap s", _seconds),
-    "delay_mean_s": ("delay s", _seconds),
-    "delay_max_s": ("max s", _seconds),
-    "jumps": ("jumps", str),
-    "backward": ("back", str),
-    "parent_changes": ("parents", str),
-    "topics": ("topics", str),
+HEADINGS = {
+    "rate_hz": "rate Hz",
+    "first_ns": "first",
+    "last_ns": "last",
+    "gap_s": "gap s",
+    "delay_mean_s": "delay s",
+    "delay_max_s": "max s",
+    "backward": "back",
+    "parent_changes": "parents",
 }
+HIDDEN = ("kind", "gap_until_ns", "parents", "overlap")
 RARE = ("parent_changes",)  # left out where all are 0
 LEFT = ("parent", "child", "topics")
 
@@ -55,25 +38,36 @@ LEFT = ("parent", "child", "topics")
 def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noqa: ARG001 - the numbers here are for reading
     """Return the edges as an aligned table; columns that say nothing are left out."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
-    shown = [key for key in COLUMNS if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
-    rows = [[COLUMNS[key][0] for key in shown], *([COLUMNS[key][1](entry[key]) for key in shown] for entry in edges)]
+    keys = [key for key in entries[0] if key not in HIDDEN]
+    shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
+    rows = [[HEADINGS.get(key, key) for key in shown], *([_cell(key, entry[key]) for key in shown] for entry in edges)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    sides = ["<" if key in LEFT else ">" for key in shown]
-    aligned = (zip(row, sides, widths, strict=True) for row in rows)
-    table = "".join("  ".join(f"{cell:{side}{width}}" for cell, side, width in row).rstrip() + "\n" for row in aligned)
+    pads = [str.ljust if key in LEFT else str.rjust for key in shown]
+    aligned = ([pad(cell, width) for pad, cell, width in zip(pads, row, widths, strict=True)] for row in rows)
+    table = "".join("  ".join(row).rstrip() + "\n" for row in aligned)
     return table + "".join(map(_chain, (entry for entry in entries if entry["kind"] == "chain")))
+
+
+def _cell(key: str, value: Any) -> str:
+    """Write a value; its unit is the end of its key."""
+    if value is None:
+        return "static" if key == "rate_hz" else ""
+    if key.endswith("_ns"):
+        return format_stamp(value)[:-6]
+    return f"{value:.2f}" if key == "rate_hz" else f"{value:.3f}" if key.endswith("_s") else str(value)
 
 
 def _chain(entry: dict[str, Any]) -> str:
     """Return the sentence about the interval in which the whole chain has data."""
     first, last = entry["first_ns"], entry["last_ns"]
     if first is None:
-        said = "stands still: any time will do"
+        sentence = "stands still: any time will do"
     elif first > last:
-        said = f"its edges share no time: one begins at {format_stamp(first)}, one ends at {format_stamp(last)}"
+        sentence = f"its edges share no time: one begins at {format_stamp(first)}, one ends at {format_stamp(last)}"
     else:
-        said = f"all edges have data from {format_stamp(first)} to {format_stamp(last)} ({(last - first) / 1e9:.3f} s)"
-    return in_width(f"{entry['parents']}:", said)
+        seconds = (last - first) / 1e9
+        sentence = f"all edges have data from {format_stamp(first)} to {format_stamp(last)} ({seconds:.3f} s)"
+    return in_width(f"{entry['parents']}:", sentence)
 
 
 WIDTH = 80
@@ -87,7 +81,7 @@ def write_diff(found: Iterable[Difference]) -> str:
     for each in found:
         kinds.setdefault(each.kind, []).append(each)
     moved = [*kinds.pop("moved", ()), *kinds.pop("same", ())]
-    parts = [_list(kind, found) for kind, found in kinds.items()]
+    parts = [f"{_HEADINGS[kind]}:\n{''.join(map(_said, alike))}" for kind, alike in kinds.items()]
     starts = dict.fromkeys(each.seen_from for each in moved)
     parts += (_table(start, [each for each in moved if each.seen_from == start]) for start in starts)
     return "\n".join(parts)
@@ -97,13 +91,8 @@ _HEADINGS = {"only-in-a": "only in A", "only-in-b": "only in B", "parent": "othe
              "no-data": "no data", "samples": "other samples"}  # fmt: skip
 
 
-def _list(kind: str, found: Iterable[Difference]) -> str:
-    """Return a heading and the lines of differences that are said in words."""
-    return f"{_HEADINGS[kind]}:\n" + "".join(f"{line}\n" for each in found for line in _said(each))
-
-
-def _said(each: Difference) -> Iterator[str]:
-    """Yield the lines about one frame."""
+def _said(each: Difference) -> str:
+    """Return the lines about one frame, in words."""
     text = short(each.frame, WIDTH - 4)
     if each.kind in ("only-in-a", "only-in-b"):
         parent = each.parent_a if each.kind == "only-in-a" else each.parent_b
@@ -114,9 +103,10 @@ def _said(each: Difference) -> Iterator[str]:
     elif each.own:
         text += f" by up to {each.own}"
     text += f": {each.note}" if each.note else ""
-    yield from _folded(text)
+    lines = list(_folded(text))
     if each.kind == "parent" and each.seen:
-        yield f"    moved {each.seen}, seen from {short(str(each.seen_from), WIDTH // 2 - 10)}"
+        lines.append(f"    moved {each.seen}, seen from {short(str(each.seen_from), WIDTH // 2 - 10)}")
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _folded(text: str) -> Iterator[str]:
@@ -134,7 +124,8 @@ def _table(start: str | None, found: Sequence[Difference]) -> str:
     """Return the table of the frames that moved, as far as they are seen from one frame."""
     seen = f"seen from {start}" if start is not None else "seen from elsewhere"
     both = 2 * NUMBER
-    head = f"{'moved':<{LABEL}}{'in its parent':>{both}}{_padded(short(seen, both - 2), both)}\n"
+    seen = short(seen, both - 2)
+    head = f"{'moved':<{LABEL}}{'in its parent':>{both}}{' ' * (both - cells(seen))}{seen}\n"
     units = f"{'':{LABEL}}" + 2 * f"{'mm':>{NUMBER}}{'deg':>{NUMBER}}" + "\n"
     return head + units + "".join(map(_row, found))
 
@@ -149,22 +140,16 @@ def _row(each: Difference) -> str:
 
 
 def _numbers(apart: Apart | None) -> tuple[str, str]:
-    """Write how far two poses are apart in mm and degrees; what is rounding as 0."""
+    """Write how far two poses are apart in mm and degrees; what is rounding as 0, what decimals do not show as 1e-5."""
     if apart is None:
         return "-", "-"
     metres = 0.0 if apart.metres <= apart.rounding else apart.millimetres
     turn = 0.0 if apart.radians <= apart.turn_rounding else apart.degrees
-    return _number(metres, 3), _number(turn, 4)
-
-
-def _number(value: float, decimals: int) -> str:
-    """Write a number with some decimals, or with its power of ten where they would not show it."""
-    fits = value == 0.0 or 0.5 * 10.0**-decimals <= value < 1e6
-    return f"{value:.{decimals}f}" if fits else f"{value:.2e}"
-
-
-def _padded(text: str, width: int) -> str:
-    return " " * (width - cells(text)) + text
+    length, angle = (
+        f"{value:.{decimals}f}" if value == 0.0 or 0.5 * 10.0**-decimals <= value < 1e6 else f"{value:.2e}"
+        for value, decimals in ((metres, 3), (turn, 4))
+    )
+    return length, angle
 
 
 def short(name: str, width: int) -> str:
@@ -207,9 +192,11 @@ def write_forms(entries: Iterable[dict[str, Any]]) -> str:
     parts: dict[str, list[str]] = {}
     for entry in entries:
         kind = _READ if entry["reads"] else _WRITTEN if entry["writes"] else _KNOWN
-        said = [f"{entry['summary']}{_in_brackets(entry['suffixes'])}", _uses(entry), entry["states"]]
-        said += [f"asks for {option}" for option in entry["asks"]]
-        parts.setdefault(kind, []).append(_labelled(entry["name"], [*said, entry["instead"]]))
+        suffixes = f" ({' '.join(entry['suffixes'])})" if entry["suffixes"] else ""
+        uses = (("read as", entry["reads"]), ("written from", entry["writes"]))
+        texts = [f"{entry['summary']}{suffixes}", "; ".join(f"{use} {', '.join(what)}" for use, what in uses if what)]
+        texts += [entry["states"], *(f"asks for {option}" for option in entry["asks"]), entry["instead"]]
+        parts.setdefault(kind, []).append(_labelled(entry["name"], texts))
     return "\n".join(f"{kind}:\n{''.join(parts[kind])}" for kind in (_READ, _WRITTEN, _KNOWN) if kind in parts)
 
 
@@ -219,7 +206,7 @@ _READ, _WRITTEN, _KNOWN = "read", "only written", "known and not read; what to d
 def write_form(entry: dict[str, Any]) -> str:
     """Return all there is to say of one form, with an example if its module shows one."""
     name = entry["name"]
-    said = {
+    facts = {
         "suffixes": " ".join(entry["suffixes"]),
         "read as": ", ".join(entry["reads"]),
         "written from": ", ".join(entry["writes"]),
@@ -228,7 +215,7 @@ def write_form(entry: dict[str, Any]) -> str:
         "known by": ", ".join(_signs(name)),
         "instead": entry["instead"],
     }
-    lines = "".join(_labelled(label, [text]) for label, text in said.items() if text)
+    lines = "".join(_labelled(label, [text]) for label, text in facts.items() if text)
     example = "".join(f"    {line}\n" for line in example_of(name))
     return f"{name}: {entry['summary']}\n{lines}" + (f"  example\n{example}" if example else "")
 
@@ -242,24 +229,12 @@ def example_of(name: str) -> list[str]:
     return []
 
 
-def _in_brackets(words: Iterable[str]) -> str:
-    return f" ({' '.join(words)})" if words else ""
-
-
-def _uses(entry: dict[str, Any]) -> str:
-    """Say what is read from a form and what is written in it."""
-    uses = (("read as", entry["reads"]), ("written from", entry["writes"]))
-    return "; ".join(f"{label} {', '.join(what)}" for label, what in uses if what)
-
-
 def _labelled(label: str, texts: Iterable[str | None]) -> str:
     """Return lines with a label before the first, folded."""
     lines = [line for text in texts if text for line in wrap(text, LIST_WIDTH - LIST_LABEL, break_on_hyphens=False)]
-    first = f"  {label}"
-    if len(first) >= LIST_LABEL:
-        return "".join(f"{line}\n" for line in (first, *(" " * LIST_LABEL + line for line in lines)))
-    begins = [first, *[""] * len(lines)]
-    return "".join(f"{begin:{LIST_LABEL}}{line}\n" for begin, line in zip(begins, lines, strict=False))
+    first = f"  {label:{LIST_LABEL - 2}}"
+    apart = "\n" + " " * LIST_LABEL
+    return f"{first.rstrip() + apart if len(label) + 2 >= LIST_LABEL else first}{apart.join(lines)}\n"
 
 
 def _signs(name: str) -> Iterator[str]:

@@ -1,8 +1,6 @@
-"""A run of turtles as a picture: turtlesim's window at its own scale, beside it distance and commands over time.
+"""Runs of turtles as pictures: turtlesim's window with distance and commands over time, and maps of two gains.
 
-What a plot shows of a run: the turtles' trails by pen, and each follower's distance and commands over time.
-
-A sweep of two gains as two maps of colours: time to reach, and overshoot; empty where it never was within reach.
+Knows what a plot needs of a run, and no file; a map is empty where the follower never was within reach.
 """
 
 from __future__ import annotations
@@ -27,6 +25,7 @@ if TYPE_CHECKING:
     from frametool.view.pictures import Shape
 
     Point = tuple[float, float]
+    Curve = tuple[str, str, Sequence[float], Sequence[float]]
 
 # where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names
 COLOURS = ("#f4d35e", "#ee964b", "#7bdff2", "#b2f7ef", "#f7a1c4", "#c3f584", "#d0bdf4", "#ffffff")
@@ -71,26 +70,22 @@ class Drawing:
     def watch(self, step: SimulationStep) -> None:
         """Add a step to the drawing."""
         if step.is_tick:
-            self._wipe_if_cleared(step)
+            if step.clears != self._clears:
+                self._clears = step.clears
+                self.strokes.clear()
+                self._current.clear()
             self.turtles = step.states
             for name in step.states:
                 self._draw(name, step)
         for command in step.commands:
-            curves = self.curves[command.turtle]
-            curves.times.append(step.t_ns / BILLION)
-            curves.distance.append(command.distance or 0.0)
-            curves.linear.append(command.twist.linear_x)
-            curves.angular.append(command.twist.angular_z)
+            ahead, turning, _ = command.twist
+            numbers = (step.t_ns / BILLION, command.distance or 0.0, ahead, turning)
+            for curve, number in zip(self.curves[command.turtle], numbers, strict=True):
+                curve.append(number)
 
     def colours(self) -> dict[str, str]:
         """Return the colour of every turtle: `#rrggbb`."""
         return colours_of({*self.turtles, *self.curves})
-
-    def _wipe_if_cleared(self, step: SimulationStep) -> None:
-        if step.clears != self._clears:
-            self._clears = step.clears
-            self.strokes.clear()
-            self._current.clear()
 
     def _draw(self, name: str, step: SimulationStep) -> None:
         """Go on with a turtle's stroke, or begin one with its new pen."""
@@ -106,7 +101,7 @@ class Drawing:
 
 
 def _extend(points: list[Point], place: Point) -> None:
-    """Go on to a place; a point on the straight way there is not kept."""
+    """Go on to a place; a point on the straight way there is left out."""
     if len(points) > 1 and _is_straight(points[-2], points[-1], place):
         points[-1] = place
     elif not points or points[-1] != place:
@@ -137,18 +132,8 @@ LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is 
 DARKENED = dict(
     zip(COLOURS, ("#c79a00", "#d4691b", "#1593ad", "#2a9d8f", "#d6458b", "#5a9a16", "#7d5fc7", "#666666"), strict=True)
 )
-PANELS = (("distance (m)", "distance"), ("linear.x (m/s)", "linear"), ("angular.z (rad/s)", "angular"))
-COLUMNS = ("follower", "t (s)", "distance (m)", "linear.x (m/s)", "angular.z (rad/s)")
+PANELS = ("distance (m)", "linear.x (m/s)", "angular.z (rad/s)")  # as the numbers of Curves behind the times
 FEET = [(x, y, 4.0) for x in (-9.0, 9.0) for y in (-11.0, 11.0)]
-
-
-class Curve(NamedTuple):
-    """One line of a diagram over time: seconds and values."""
-
-    name: str
-    colour: str
-    times: Sequence[float]
-    values: Sequence[float]
 
 
 def run_picture(drawing: Drawing) -> Picture:
@@ -156,10 +141,8 @@ def run_picture(drawing: Drawing) -> Picture:
     followed = {name: curve for name, curve in drawing.curves.items() if curve.times}
     shapes = list(_window(drawing))
     colours = drawing.colours()
-    for index, (title, key) in enumerate(PANELS if followed else ()):
-        curves = [
-            Curve(name, DARKENED[colours[name]], each.times, getattr(each, key)) for name, each in followed.items()
-        ]
+    for index, title in enumerate(PANELS if followed else ()):
+        curves = [(name, DARKENED[colours[name]], each.times, each[index + 1]) for name, each in followed.items()]
         height = (WINDOW - 2.0 * PANEL_GAP) / 3.0
         shapes += _panel(title, curves, MARGIN + index * (height + PANEL_GAP), height)
     return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else HEIGHT, HEIGHT, shapes, "turtles")
@@ -173,7 +156,7 @@ def last_commands(drawing: Drawing) -> str:
         for name, curve in drawing.curves.items()
         if curve.times
     )
-    head = "".join(f"<th>{title}</th>" for title in COLUMNS)
+    head = "".join(f"<th>{title}</th>" for title in ("follower", "t (s)", *PANELS))
     return f"<table>\n<tr>{head}</tr>\n{rows}</table>\n" if rows else ""
 
 
@@ -206,9 +189,10 @@ def _turtle(name: str, state: TurtleState, colour: str) -> Iterator[Shape]:
 
 
 def _panel(title: str, curves: Sequence[Curve], top: float, height: float) -> Iterator[Shape]:
-    """Draw a diagram: ticks, lines, and their names."""
-    x_ticks = ticks(0.0, max(max(curve.times) for curve in curves))
-    y_ticks = ticks(*_bounds(value for curve in curves for value in curve.values))
+    """Draw a diagram: ticks, lines, and their names; curves have a name, a colour, seconds and values."""
+    known = [0.0, *(value for _, _, _, values in curves for value in values)]
+    x_ticks = ticks(0.0, max(max(times) for _, _, times, _ in curves))
+    y_ticks = ticks(max(min(known), -FURTHEST), min(max(known), FURTHEST))
     last, low, high = x_ticks[-1], y_ticks[0], y_ticks[-1]
 
     def place(t: float, value: float) -> tuple[float, float]:
@@ -237,12 +221,6 @@ def ticks(low: float, high: float) -> list[float]:
     return [count * step for count in range(first, max(last, first + 1) + 1)]
 
 
-def _bounds(values: Iterable[float]) -> tuple[float, float]:
-    """Return the least and the greatest value, zero included, as far as an axis reaches."""
-    known = [0.0, *values]
-    return max(min(known), -FURTHEST), min(max(known), FURTHEST)
-
-
 SIDE = 400.0  # pixels of a map
 MAP_MARGIN = 70.0
 BAR = 15.0
@@ -251,69 +229,52 @@ SHADES = 50  # of the bar
 STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
 
 
-class GainMap(NamedTuple):
-    """One map: what it shows, its values in a row for each linear gain, nan where there is none, and the gains."""
-
-    title: str
-    values: Sequence[Sequence[float]]
-    linear: Sequence[float]
-    angular: Sequence[float]
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Return the least and the greatest value."""
-        known = [value for row in self.values for value in row if value == value]  # noqa: PLR0124 - nan
-        return (min(known), max(known)) if known else (0.0, 0.0)
-
-
 def sweep_picture(gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult) -> Picture:
     """Draw both maps side by side."""
     columns = {"time to reach (s)": result.time_to_reach, "overshoot (m)": result.overshoot}
-    maps = [GainMap(title, values.tolist(), gain_linear, gain_angular) for title, values in columns.items()]
     side = SIDE + 2.0 * MAP_MARGIN
-    shapes = [shape for index, each in enumerate(maps) for shape in _map(each, MAP_MARGIN + index * side)]
+    shapes: list[Shape] = []
+    for index, (title, values) in enumerate(columns.items()):
+        shapes += _map(title, values.tolist(), gain_linear, gain_angular, MAP_MARGIN + index * side)
     return Picture(2.0 * side, side, shapes)
 
 
-def _map(each: GainMap, left: float) -> Iterator[Shape]:
-    """Draw one map: a rectangle for each pair, linear gains upwards, angular gains to the right."""
-    high, wide = SIDE / len(each.linear), SIDE / len(each.angular)
-    yield PictureWords(left, MAP_MARGIN - 16.0, each.title, size=14.0)
-    for row, (linear, values) in enumerate(zip(each.linear, each.values, strict=True)):
-        for column, (angular, value) in enumerate(zip(each.angular, values, strict=True)):
-            label = f"linear {linear:g}, angular {angular:g}: {value:.4g}"
+def _map(
+    title: str, rows: Sequence[Sequence[float]], linear: Sequence[float], angular: Sequence[float], left: float,
+) -> Iterator[Shape]:  # fmt: skip
+    """Draw one map: a rectangle for each pair, linear gains upwards, angular gains to the right, and their names."""
+    high, wide = SIDE / len(linear), SIDE / len(angular)
+    known = [value for row in rows for value in row if value == value]  # noqa: PLR0124 - nan
+    low, most = (min(known), max(known)) if known else (0.0, 0.0)
+    yield PictureWords(left, MAP_MARGIN - 16.0, title, size=14.0)
+    for row, values in enumerate(rows):
+        for column, value in enumerate(values):
+            label = f"linear {linear[row]:g}, angular {angular[column]:g}: {value:.4g}"
             x, y = left + column * wide, MAP_MARGIN + SIDE - (row + 1) * high
-            yield PictureBox(x, y, wide, high, _colour(value, each.bounds), label)
-    yield from _gains(each, left)
-    yield from _bar(left + SIDE + 10.0, each.bounds)
-
-
-def _gains(each: GainMap, left: float) -> Iterator[Shape]:
-    """Name the gains at the ends of both sides."""
+            yield PictureBox(x, y, wide, high, _colour(value, low, most), label)
     below, bottom = MAP_MARGIN + SIDE + 14.0, MAP_MARGIN + SIDE
-    yield PictureWords(left, below, f"{each.angular[0]:g}")
+    yield PictureWords(left, below, f"{angular[0]:g}")
     yield PictureWords(left + SIDE / 2.0, below, "angular gain (1/s)", anchor="middle")
-    yield PictureWords(left + SIDE, below, f"{each.angular[-1]:g}", anchor="end")
-    yield PictureWords(left - 6.0, bottom - 6.0, f"{each.linear[0]:g}", anchor="end")
+    yield PictureWords(left + SIDE, below, f"{angular[-1]:g}", anchor="end")
+    yield PictureWords(left - 6.0, bottom - 6.0, f"{linear[0]:g}", anchor="end")
     yield PictureWords(left - 14.0, MAP_MARGIN + SIDE / 2.0, "linear gain (1/s)", anchor="middle", turn=-90.0)
-    yield PictureWords(left - 6.0, MAP_MARGIN + 6.0, f"{each.linear[-1]:g}", anchor="end")
+    yield PictureWords(left - 6.0, MAP_MARGIN + 6.0, f"{linear[-1]:g}", anchor="end")
+    yield from _bar(left + SIDE + 10.0, low, most)
 
 
-def _bar(left: float, bounds: tuple[float, float]) -> Iterator[Shape]:
+def _bar(left: float, low: float, high: float) -> Iterator[Shape]:
     """Draw what the colours mean."""
-    low, high = bounds
     for shade in range(SHADES):
         y = MAP_MARGIN + SIDE * (SHADES - 1 - shade) / SHADES
-        yield PictureBox(left, y, BAR, SIDE / SHADES + 0.5, _colour(shade / (SHADES - 1), (0.0, 1.0)))
+        yield PictureBox(left, y, BAR, SIDE / SHADES + 0.5, _colour(shade / (SHADES - 1), 0.0, 1.0))
     yield PictureWords(left, MAP_MARGIN - 8.0, f"{high:.3g}")
     yield PictureWords(left, MAP_MARGIN + SIDE + 14.0, f"{low:.3g}")
 
 
-def _colour(value: float, bounds: tuple[float, float]) -> str:
+def _colour(value: float, low: float, high: float) -> str:
     """Return the colour of a value between its bounds; that of the paper for nan."""
     if value != value:  # noqa: PLR0124 - nan
         return "paper"
-    low, high = bounds
     place = (value - low) / (high - low) * (len(STOPS) - 1) if high > low else 0.0
     at = min(int(place), len(STOPS) - 2)
     mixed = (round(a + (b - a) * (place - at)) for a, b in zip(STOPS[at], STOPS[at + 1], strict=True))

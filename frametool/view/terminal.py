@@ -1,6 +1,7 @@
-"""A picture of dots in a terminal: braille characters, eight dots a cell, one colour a cell. Memory does not grow.
+"""Pictures of dots in a terminal: braille characters, eight dots a cell, one colour a cell. Memory does not grow.
 
-Frames in a terminal: braille dots in the axes' colours, names beside them, a scale bar; plain text for a pipe.
+Frames with their axes, names next to them and a scale bar, as plain text for a pipe; the turtles while they walk, with
+trails of dots and an arrow for each, at most 20 pictures a second.
 """
 
 from __future__ import annotations
@@ -14,13 +15,19 @@ from unicodedata import east_asian_width
 
 from frametool.errors import printable
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.view.projection import SLANTED, Flat, Projection, Size, nice, words_of
+from frametool.sim.turtle import SIZE
+from frametool.view.projection import SLANTED, Flat, Projection, Size, best_spot, nice, words_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from typing import Self
 
+    from rich.console import Console
+    from rich.panel import Panel
     from rich.text import Text
 
+    from frametool.sim.scene import Scene
+    from frametool.sim.simulate import IssuedCommand, SimulationStep
     from frametool.view.frame_scene import FrameScene
 
     Run = tuple[str, str]  # text and its style
@@ -34,7 +41,7 @@ class Canvas:
     """Some lines of cells; a terminal's cell is about twice as high as wide, so that dots are about square."""
 
     def __init__(self, lines: int, columns: int | None = None) -> None:
-        """Create an empty one, a square where the columns are not given."""
+        """Create an empty one, a square where the columns are None."""
         self.lines = lines
         self.columns = 2 * lines if columns is None else columns
         self._cells: dict[tuple[int, int], tuple[int, str, int]] = {}
@@ -53,8 +60,8 @@ class Canvas:
             return
         cell = down // 4, across // 2
         bits, before, before_rank = self._cells.get(cell, (0, colour, rank))
-        kept = (colour, rank) if rank >= before_rank else (before, before_rank)
-        self._cells[cell] = bits | DOTS[down % 4][across % 2], *kept
+        shown = (colour, rank) if rank >= before_rank else (before, before_rank)
+        self._cells[cell] = bits | DOTS[down % 4][across % 2], *shown
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
         """Return line and column of a place."""
@@ -137,26 +144,18 @@ class TerminalPicture:
 
     def _place(self, place: Flat, names: list[str]) -> bool:
         """Write a name where it covers no other and, if that can be, no axis; False where there is no room."""
-        words = words_of(names, most=1)
-        cells = list(_cells(words))
-        line, column = math.floor(place.y) // 4, math.floor(place.x) // 2
-        spots = list(_around(line, column, len(cells)))
-        for crossing in (False, True):
-            for spot in spots:
-                if self._is_free(spot, len(cells), crossing=crossing):
-                    row, first = spot
-                    self._names |= {(row, first + offset): (letter, "bold") for offset, letter in enumerate(cells)}
-                    return True
-        return False
+        letters = list(_cells(words_of(names, most=1)))
+        around = _around(math.floor(place.y) // 4, math.floor(place.x) // 2, len(letters))
+        spots = ([(line, column + offset) for offset in range(-1, len(letters) + 1)] for line, column in around)
+        found = best_spot(spots, self._is_taken, lambda cells: any(self._canvas.rank(*cell) >= AXIS for cell in cells))
+        self._names |= zip(found[1:-1] if found else (), ((letter, "bold") for letter in letters), strict=False)
+        return found is not None
 
-    def _is_free(self, spot: Spot, wide: int, *, crossing: bool) -> bool:
-        line, column = spot
-        if not 0 <= line < self._canvas.lines or column < 0 or column + wide > self._canvas.columns:
-            return False
-        cells = [(line, column + offset) for offset in range(-1, wide + 1)]
-        if any(cell in self._names for cell in cells):
-            return False
-        return crossing or all(self._canvas.rank(*cell) < AXIS for cell in cells)
+    def _is_taken(self, cells: list[Spot]) -> bool:
+        """Tell whether a name does not fit into cells, of which the first and the last stay free, or covers another."""
+        (line, before), (_, behind) = cells[0], cells[-1]
+        inside = 0 <= line < self._canvas.lines and before >= -1 and behind <= self._canvas.columns
+        return not inside or any(cell in self._names for cell in cells)
 
     def _scale_line(self, eye: tuple[float, float], hidden: int) -> list[Run]:
         """Say how long a metre is, from where all is seen, and how many names found no room."""
@@ -167,23 +166,27 @@ class TerminalPicture:
         fixed = printable(self._flat.scene.fixed)[:40]
         stamp_ns = self._flat.scene.at_ns
         time = "" if stamp_ns is None else f" at {format_stamp(stamp_ns)[:-6]} s"
-        said = f"├{bar}┤ {metres:g} m  in {fixed}{time}, from {azimuth}, {elevation} deg{more}  axes "
-        said = said[: self._canvas.columns - 6]
-        return [(said, ""), ("x", AXES[0]), (" ", ""), ("y", AXES[1]), (" ", ""), ("z", AXES[2])]
+        words = f"├{bar}┤ {metres:g} m  in {fixed}{time}, from {azimuth}, {elevation} deg{more}  axes "
+        words = words[: self._canvas.columns - 6]
+        return [(words, ""), ("x", AXES[0]), (" ", ""), ("y", AXES[1]), (" ", ""), ("z", AXES[2])]
 
 
-def print_terminal(picture: TerminalPicture, color: str = "auto") -> None:
-    """Print a picture, in colour where the terminal has any, or as `color` says: always or never."""
-    from frametool.view.terminal_console import coloured_console
+def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
+    """Print a picture of the terminal's size, in colour where it has any, or as `color` says: always or never."""
+    from os import get_terminal_size
+    from sys import stdout
 
-    coloured_console(color).print(_rich_text(picture))
+    from frametool.view.tree_text import coloured_console
+
+    columns, lines = get_terminal_size(stdout.fileno())
+    coloured_console(color).print(_rich_text(TerminalPicture(scene, columns, lines - 1, eye)))
 
 
 def play(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
     """Show a scene from its time on to the last stamp, a second a second, in the whole terminal."""
     from rich.live import Live
 
-    from frametool.view.terminal_console import coloured_console
+    from frametool.view.tree_text import coloured_console
 
     begin_ns, (_, last_ns) = scene.at_ns or 0, scene.span_ns
     console, begin = coloured_console(color), monotonic()
@@ -223,3 +226,92 @@ def _around(line: int, column: int, wide: int) -> Iterator[Spot]:
         yield line + away, column + 2
     for away in (3, -3):
         yield line + away, column - wide // 2
+
+
+SCREEN_FRAME = 1.0 / 20.0  # seconds
+ARROWS = "→↗↑↖←↙↓↘"
+BACKGROUND = "on rgb(69,86,255)"  # turtlesim's
+TALK = 3  # lines of messages below the turtles
+
+
+class Screen:
+    """Draw the steps of a run as they come; a context, so that the terminal is as before afterwards."""
+
+    def __init__(self, scene: Scene, *, to_stderr: bool = False, console: Console | None = None) -> None:
+        """Choose where to draw; the picture takes what the terminal's height and width allow."""
+        from rich.console import Console
+        from rich.live import Live
+
+        from frametool.sim.simulate import SimulationStep
+
+        console = console or Console(stderr=to_stderr)
+        room = console.height - TALK - 3 - len(scene.followers)
+        self._canvas = Canvas(max(5, min(room, (console.width - 4) // 2, 40)))
+        # what goes to stdout next to the picture is data and must not be caught
+        self._live = Live(console=console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
+        self._talk: list[str] = []
+        self._last: dict[str, IssuedCommand] = {}
+        self._tick = SimulationStep(0)  # the last one
+        self._colours: dict[str, str] = {}
+        self._drawn = -math.inf
+
+    def __enter__(self) -> Self:
+        """Take the terminal."""
+        self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Draw the last frame and give the terminal back."""
+        self._live.update(self._picture(), refresh=True)
+        self._live.stop()
+
+    def watch(self, step: SimulationStep) -> None:
+        """Add a step to the picture, and show it if the last frame is old enough."""
+        self._talk = [*self._talk, *step.log, *map(str, step.walls)][-TALK:]
+        self._last.update((command.turtle, command) for command in step.commands)
+        if not step.is_tick:
+            return
+        self._mark(step)
+        if monotonic() - self._drawn >= SCREEN_FRAME:
+            self._live.update(self._picture(), refresh=True)
+            self._drawn = monotonic()
+
+    def _mark(self, step: SimulationStep) -> None:
+        """Set the dots of a tick."""
+        if step.clears != self._tick.clears:
+            self._canvas.clear()
+        if step.states.keys() != self._tick.states.keys():
+            from frametool.view.run_plot import colours_of
+
+            self._colours = colours_of(step.states)
+        self._tick = step
+        for name, state in step.states.items():
+            if not step.pens[name].off:
+                self._canvas.dot(state.x / SIZE, state.y / SIZE, self._colours[name])
+
+    def _picture(self) -> Panel:
+        """Return the whole picture."""
+        from rich.panel import Panel
+        from rich.text import Text
+
+        canvas = self._canvas
+        turtles = {
+            canvas.cell(state.x / SIZE, state.y / SIZE): (
+                ARROWS[round(state.theta / (math.pi / 4.0)) % 8], f"bold {self._colours[name]}",
+            )
+            for name, state in self._tick.states.items()
+        }  # fmt: skip
+        text = Text()
+        for line in range(canvas.lines):
+            for run, colour in canvas.runs(line, turtles):
+                text.append(run, f"{colour} {BACKGROUND}".strip())
+            text.append("\n")
+        text.append("".join(f"{_sentence(command)}\n" for command in self._last.values()))
+        text.append("\n".join(self._talk), "dim")
+        return Panel(text, title=f"{self._tick.t_ns / BILLION:.1f} s", width=canvas.columns + 4)
+
+
+def _sentence(command: IssuedCommand) -> str:
+    """Describe in a line what a follower does."""
+    ahead, turning, _ = command.twist
+    return f"{printable(command.turtle)}: {command.distance or 0.0:.2f} m, linear {ahead:.2f}, angular {turning:+.2f}"

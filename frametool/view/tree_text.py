@@ -11,6 +11,8 @@ from frametool.grammar.result import edge_label
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from rich.console import Console
+
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
     from frametool.grammar.result import Style
@@ -29,7 +31,7 @@ class DrawnFrame(NamedTuple):
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Draw a tree with plain lines: each frame below its parent, its pose beside it."""
+    """Draw a tree with plain lines: each frame below its parent, its pose behind it."""
     return "".join(
         f"{line.branch}{line.frame}{pad}{'  '.join(line.label)}".rstrip() + "\n" for line, pad in _padded(tree, style)
     )
@@ -39,12 +41,22 @@ def print_tree(tree: Frames, style: Style, color: str = "auto") -> None:
     """Draw a tree on the terminal, in colour where it has any, or as `color` says: always or never."""
     from rich.text import Text
 
-    from frametool.view.terminal_console import coloured_console
-
     console = coloured_console(color)
     for line, pad in _padded(tree, style):
         name = "bold green" if not line.label else "bold"
         console.print(Text.assemble((line.branch, "dim"), (line.frame, name), pad, ("  ".join(line.label), "cyan")))
+
+
+def coloured_console(color: str = "auto") -> Console:
+    """Return standard output, in colour where the terminal has any, or as `color` says: always or never."""
+    import sys
+
+    from rich.console import Console
+
+    return Console(
+        file=sys.stdout, highlight=False, soft_wrap=True, no_color=True if color == "never" else None,
+        force_terminal=True if color == "always" else None, color_system="auto" if color == "auto" else "standard",
+    )  # fmt: skip
 
 
 def _label(track: Track, style: Style) -> tuple[str, ...]:
@@ -63,16 +75,19 @@ def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
     Where that makes them too long levels stand closer; where that is not enough either poses stand behind their names.
     """
     lines = list(_lines(tree, style))
-    if _longest(lines) > WIDEST:
+    labels = [line.label for line in lines if line.label]
+    positions = max((len(label[0]) for label in labels), default=0)
+    poses = 2 + positions + max((sum(2 + cells(part) for part in label[1:]) for label in labels), default=0)
+    names = _widest(lines)
+    if names + poses > WIDEST:
         lines = [line._replace(branch=_narrowed(line.branch)) for line in lines]
-    width = max((len(line.branch) + cells(line.frame) for line in lines), default=0)
-    firsts = max((len(line.label[0]) for line in lines if line.label), default=0)
-    if _longest(lines) > WIDEST:
+        names = _widest(lines)
+    if names + poses > WIDEST:
         yield from ((line, "  " * bool(line.label)) for line in lines)
         return
     for line in lines:
-        label = (f"{line.label[0]:<{firsts}}", *line.label[1:]) if line.label else ()
-        yield line._replace(label=label), " " * bool(label) * (width - len(line.branch) - cells(line.frame) + 2)
+        label = (f"{line.label[0]:<{positions}}", *line.label[1:]) if line.label else ()
+        yield line._replace(label=label), " " * bool(label) * (names - len(line.branch) - cells(line.frame) + 2)
 
 
 def _narrowed(branch: str) -> str:
@@ -80,12 +95,9 @@ def _narrowed(branch: str) -> str:
     return "".join(branch[at] + branch[at + 3] for at in range(0, len(branch), 4))
 
 
-def _longest(lines: Sequence[DrawnFrame]) -> int:
-    """Return how many cells the longest line takes with all poses below one another."""
-    labels = [line.label for line in lines if line.label]
-    names = max((len(line.branch) + cells(line.frame) for line in lines), default=0)
-    positions = max((len(label[0]) for label in labels), default=0)
-    return names + 2 + positions + max((sum(2 + cells(part) for part in label[1:]) for label in labels), default=0)
+def _widest(lines: Sequence[DrawnFrame]) -> int:
+    """Return how many cells the widest name takes, with the lines before it."""
+    return max((len(line.branch) + cells(line.frame) for line in lines), default=0)
 
 
 def cells(text: str) -> int:

@@ -33,9 +33,8 @@ ROWS = b"stamp,frame,x,y,z,qx,qy,qz,qw\n1,lidar,1,2,3,0,0,0,1\n2,map,1,2,3,0,0,0
 def command_of(name: str) -> click.Command:
     """Import a command by its name; `sim follow` is one of two words."""
     first, _, second = name.partition(" ")
-    module = SUBCOMMANDS[second][0] if second else COMMANDS[first][0]
-    found: click.Command = import_module(module).command
-    return found
+    found: click.Command = import_module(COMMANDS[first][0]).command
+    return found.commands[second] if isinstance(found, click.Group) else found
 
 
 NAMES = [*(name for name in COMMANDS if name != "sim"), *(f"sim {name}" for name in SUBCOMMANDS)]

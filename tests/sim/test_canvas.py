@@ -9,10 +9,9 @@ from rich.console import Console
 
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
-from frametool.view.live import Screen
 from frametool.view.pictures import write_svg
 from frametool.view.run_plot import Drawing, run_picture, ticks
-from frametool.view.terminal import Canvas
+from frametool.view.terminal import Canvas, Screen
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 
-from frametool.sim.controllers import FollowController
-from frametool.sim.leaders import scripted
+from frametool.sim.drivers import FollowController, scripted
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import SimulationStep, simulate
 from frametool.sim.turtle import SIZE, Twist

@@ -11,7 +11,7 @@ import pytest
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
 from frametool.grammar.result import Style
-from frametool.sim.leaders import scripted
+from frametool.sim.drivers import scripted
 from frametool.sim.scene import tutorial
 from frametool.sim.scene_file import read_scene
 from frametool.sim.simulate import simulate

@@ -9,7 +9,7 @@ import pytest
 
 from frametool.errors import ValueInvalid
 from frametool.sim import sweep
-from frametool.sim.controllers import FollowController
+from frametool.sim.drivers import FollowController
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import RunSummary, simulate
 from frametool.sim.sweep import grid, rows, simulate_many

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from frametool.sim.leaders import scripted
+from frametool.sim.drivers import scripted
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import IssuedCommand, simulate
 from frametool.sim.turtle import Twist

@@ -7,8 +7,7 @@ import math
 import pytest
 
 from frametool.errors import ValueInvalid
-from frametool.sim.controllers import LAWS, FollowController
-from frametool.sim.leaders import LEADERS, Heading, Mailbox, Script, built_in, scripted
+from frametool.sim.drivers import LAWS, LEADERS, FollowController, Heading, Mailbox, Script, built_in, scripted
 from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall, tutorial
 from frametool.sim.simulate import RunSummary, Simulation, SimulationStep, simulate
 from frametool.sim.turtle import (

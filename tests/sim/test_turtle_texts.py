@@ -11,9 +11,8 @@ import yaml
 from frametool.documents.source import Source
 from frametool.errors import FormatError
 from frametool.grammar.result import Style
-from frametool.sim.command_file import read_commands, read_script
-from frametool.sim.controllers import FollowController
-from frametool.sim.leaders import KEYS, scripted
+from frametool.sim.drivers import KEYS, FollowController, scripted
+from frametool.sim.readers import read_commands, read_script
 from frametool.sim.scene import Follow, tutorial
 from frametool.sim.scene_file import read_scene
 from frametool.sim.simulate import RunSummary, simulate

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.options import FILE, Command, pose_options, reading_options, verbose_option
+from frametool.cli.options import FILE, Command, file_options
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import opened, state
@@ -17,8 +17,6 @@ from frametool.lint.rules import check
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from frametool.lint.findings import Finding
 
 FAILED = 1
 
@@ -38,9 +36,7 @@ class CheckCommand(Command):
 @click.option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
               help="how findings are written")  # fmt: skip
 @click.option("--strict", is_flag=True, help="let warnings fail too")
-@reading_options()
-@verbose_option
-@pose_options
+@file_options
 def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> int:
     """Look for mistakes in FILES, trees and recordings, taken together as one tree.
 
@@ -59,7 +55,11 @@ def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> i
     text = WRITERS[form](findings)
     with writing(None) as write:
         write(_in_terminal(text) if form == "text" and sys.stdout.isatty() else text)
-    return FAILED if _fails(findings, strict=strict) else 0
+    counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
+    summary = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
+    if summary:
+        say(summary)
+    return FAILED if counts["error"] or (strict and counts["warning"]) else 0
 
 
 def _in_terminal(text: str) -> str:
@@ -70,12 +70,3 @@ def _in_terminal(text: str) -> str:
         get_terminal_size().columns, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
     )
     return "".join(f"{wrapper.fill(line)}\n" for line in text.splitlines())
-
-
-def _fails(findings: Sequence[Finding], *, strict: bool) -> bool:
-    """Count on stderr, and tell whether the files pass."""
-    counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
-    said = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
-    if said:
-        say(said)
-    return bool(counts["error"] or (strict and counts["warning"]))

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import (
-    FILE,
-    TIME,
-    Command,
-    Text,
-    at_ns,
-    list_options,
-    pose_options,
-    reading_options,
-    verbose_option,
-)
+from frametool.cli.options import FILE, TIME, Command, Parsed, at_ns, file_options, list_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, is_quiet, load_sides
-from frametool.errors import ValueInvalid, shown
 from frametool.formats.load import lines_of
 from frametool.lint.findings import github_command
-from frametool.lint.tree_diff import Tolerance, diff, entry
-from frametool.text.numbers import parse_length, read_number_or_angle
+from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,40 +29,6 @@ class DiffCommand(Command):
     exit_codes = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
 
 
-class ToleranceOption(Text):
-    """A length and an angle, or one of them."""
-
-    name = "tolerance"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read `1mm,0.1deg`; bare numbers are metres and radians, in this order."""
-        if not isinstance(value, str):
-            return value
-        try:
-            return _tolerance(super().convert(value, param, ctx))
-        except ValueInvalid as error:
-            self.fail(f"{error}; write a length, an angle or both: 1mm,0.1deg", param, ctx)
-
-
-def _tolerance(text: str) -> Tolerance:
-    found = Tolerance()
-    parts = [part.strip() for part in text.split(",")]
-    are_angles = [_is_angle(part, bare=index == 1) for index, part in enumerate(parts)]
-    if len(set(are_angles)) != len(parts):
-        raise ValueInvalid(f"{shown(text)} is not one length and one angle")
-    for part, is_angle in zip(parts, are_angles, strict=True):
-        value = read_number_or_angle(part, degrees=False) if is_angle else parse_length(part)
-        if value < 0.0:
-            raise ValueInvalid(f"{shown(part)} is less than 0")
-        found = found._replace(radians=value) if is_angle else found._replace(metres=value)
-    return found
-
-
-def _is_angle(text: str, *, bare: bool) -> bool:
-    """Tell an angle from a length by its unit; `bare` says what it is without one."""
-    return re.search("deg|rad|°|pi|π", text) is not None or (bare and not text.endswith("m"))
-
-
 @click.command(cls=DiffCommand, name="diff")
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
@@ -85,12 +38,10 @@ def _is_angle(text: str, *, bare: bool) -> bool:
               help="compare at this time: seconds, nanoseconds with ns  [default: the latest of each]")  # fmt: skip
 @click.option("--seen-from", type=FRAME, metavar="FRAME",
               help="tell how far frames moved as seen from here too  [default: the root of A]")  # fmt: skip
-@click.option("--tolerance", type=ToleranceOption(), default=Tolerance(), metavar="LENGTH,ANGLE",
+@click.option("--tolerance", type=Parsed("tolerance", parse_tolerance), default=Tolerance(), metavar="LENGTH,ANGLE",
               help="what still counts as the same, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]")  # fmt: skip
 @click.option("--all", "everything", is_flag=True, help="list the frames that did not move, too")
-@reading_options()
-@verbose_option
-@pose_options
+@file_options
 @list_options("github")
 def command(
     a: str, b: str, with_a: Sequence[str], with_b: Sequence[str], at: int | str | None, seen_from: str | None,
@@ -118,7 +69,15 @@ def command(
     comparison = diff(one, other, at_ns=at_ns(at), seen_from=start, tolerance=tolerance)
     for note in () if is_quiet() else comparison.notes:
         say(note)
-    _write(output, comparison, places, everything=everything)
+    differences = [*comparison.differences, *(comparison.unmoved if everything else ())]
+    if output.style.form == "github":
+        output.text(_annotations(comparison, places))
+    elif output.style.form == "text":
+        from frametool.view.report_text import write_diff
+
+        output.text(write_diff(differences))
+    else:
+        output.report(list(map(entry, differences)))
     if comparison.uncompared:
         count = len(comparison.uncompared)
         say(f"{count} frame{'s' * (count != 1)} not compared: no data in A and B; --at chooses another time")
@@ -126,25 +85,12 @@ def command(
     return DIFFERENT if comparison.differences else 0
 
 
-def _write(output: Output, found: Comparison, places: Sequence[Mapping[str, Place]], *, everything: bool) -> None:
-    """Write what differs."""
-    told = [*found.differences, *(found.unmoved if everything else ())]
-    if output.style.form == "github":
-        output.text(_annotations(found, places))
-    elif output.style.form == "text":
-        from frametool.view.report_text import write_diff
-
-        output.text(write_diff(told))
-    else:
-        output.report(list(map(entry, told)))
-
-
 def _annotations(found: Comparison, places: Sequence[Mapping[str, Place]]) -> str:
     """Return workflow commands, each at the line where B says where the frame is, or else A."""
     in_a, in_b = places
     known = {each.frame: in_b.get(each.frame) or in_a.get(each.frame) for each in found.differences}
-    placed = [(frame, place) for frame, place in known.items() if place is not None]
-    where = dict(zip([frame for frame, _ in placed], lines_of([place for _, place in placed]), strict=True))
+    placed = {frame: place for frame, place in known.items() if place is not None}
+    where = dict(zip(placed, lines_of([*placed.values()]), strict=True))
     lines = []
     for each in found.differences:
         file, line = where.get(each.frame, ("", 0))

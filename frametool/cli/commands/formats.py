@@ -29,15 +29,10 @@ def command(name: str | None, **options: Any) -> None:
     """
     output = Output("report", **options, otherwise="text")
     entries = list(map(form_entry, FORMATS if name is None else [name]))
-    if output.style.form != "text":
-        output.report(_flat(entries) if output.style.form == "csv" else entries)
-    else:
+    if output.style.form == "text":
         output.text(write_forms(entries) if name is None else write_form(entries[0]))
-
-
-def _flat(entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Put lists into one cell each."""
-    return [
-        {key: " ".join(value) if isinstance(value, tuple) else value for key, value in entry.items()}
-        for entry in entries
-    ]
+        return
+    if output.style.form == "csv":  # a list is one cell
+        for entry in entries:
+            entry |= {key: " ".join(value) for key, value in entry.items() if isinstance(value, tuple)}
+    output.report(entries)

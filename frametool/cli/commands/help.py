@@ -11,7 +11,7 @@ import click
 
 from frametool.cli import COMMANDS
 from frametool.cli.group import show_help
-from frametool.cli.options import TEXT, Command
+from frametool.cli.options import Command, Text
 from frametool.cli.sink import writing
 from frametool.errors import alternatives, shown
 
@@ -35,7 +35,7 @@ def _wrapped(line: str, indent: int) -> str:
     return fill(line, min(get_terminal_size().columns, 100), subsequent_indent=" " * indent) + "\n"
 
 
-class Topic(click.ParamType[str]):
+class Topic(Text):
     """A subject or a command."""
 
     name = "topic"
@@ -46,11 +46,6 @@ class Topic(click.ParamType[str]):
 
         known = topics() | {name: row[1] for name, row in COMMANDS.items()}
         return [CompletionItem(name, help=about) for name, about in known.items() if name.startswith(incomplete)]
-
-    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Take the word as it is."""
-        converted: str = TEXT.convert(value, param, ctx)
-        return converted
 
 
 @click.command(cls=Command, name="help")

@@ -1,17 +1,54 @@
-"""`frametool sim`: the turtles; one file a subcommand, one table of them."""
+"""`frametool sim`: the turtles: a leader and followers, a scene of a file, keys in the terminal, many gains at once."""
 
 from __future__ import annotations
 
+import os
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
 import click
 
+from frametool.cli.explaining import EXPLAIN, significant
 from frametool.cli.group import Group
-from frametool.cli.options import EXIT_CODES
+from frametool.cli.options import EXIT_CODES, TEXT, Command, Parsed
+from frametool.cli.output import drawn
+from frametool.cli.poses import source_of, usage_if_inline
+from frametool.cli.sim_output import (
+    DURATION,
+    LEADER,
+    SimOutput,
+    check_files,
+    follow_options,
+    leader_of,
+    output_options,
+    style_of,
+    suffix_of,
+    sweep_options,
+)
+from frametool.cli.sink import writing
+from frametool.cli.stderr import say
+from frametool.errors import FormatError, ValueInvalid
+from frametool.formats.table import by_suffix
+from frametool.frames.stamps import BILLION
+from frametool.sim.drivers import HEADINGS, KEYS, FollowController, Heading, Mailbox
+from frametool.sim.readers import parse_gains
+from frametool.sim.scene import duration_ns, tutorial
+from frametool.sim.scene_file import read_scene
+from frametool.sim.step_writer import table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.sim.drivers import MakeLeader
+    from frametool.sim.scene import Scene
+    from frametool.sim.turtle import Twist
 
 SUBCOMMANDS = {
-    "follow": ("frametool.cli.commands.sim_follow", "a leader, and one or more turtles that follow"),
-    "run": ("frametool.cli.commands.sim_run", "a whole scene from one file"),
-    "teleop": ("frametool.cli.commands.sim_teleop", "drive turtle1 with the arrow keys, drawn in the terminal"),
-    "sweep": ("frametool.cli.commands.sim_sweep", "how soon a follower is there, for many gains at once"),
+    "follow": "a leader, and one or more turtles that follow",
+    "run": "a whole scene from one file",
+    "teleop": "drive turtle1 with the arrow keys, drawn in the terminal",
+    "sweep": "how soon a follower is there, for many gains at once",
 }
 HELP = """Replay turtlesim and the turtle-follow tutorial, without ROS and without a screen.
 
@@ -25,11 +62,232 @@ of transforms, as `lookup` does. A summary goes to stderr.
 
 
 class SimGroup(Group):
-    """The subcommands of the turtles."""
+    """The subcommands of the turtles, which stand below."""
 
-    table = SUBCOMMANDS
+    table = {name: (__name__, about) for name, about in SUBCOMMANDS.items()}  # noqa: RUF012 - as the group's own
+    get_command = click.Group.get_command
 
 
 @click.command(cls=SimGroup, name="sim", help=HELP, epilog=EXIT_CODES, no_args_is_help=True)
 def command() -> None:
     """Hold the subcommands."""
+
+
+LAW_OPTIONS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
+SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim", "holonomic")
+
+
+@command.command(cls=Command, name="follow")
+@LEADER
+@follow_options("20")
+@output_options
+@click.option("--explain-step", type=click.IntRange(0), metavar="N", help="derive the command of step N, from 0")
+@EXPLAIN
+def follow(leader: str, explain_step: int | None, explain: str | None, **options: Any) -> None:
+    """Let turtle2 follow turtle1 by tf, as the tutorial does, and print its velocity commands.
+
+    \b
+      frametool sim follow
+      frametool sim follow --spawn 1,1,0 --leader square --format csv
+      frametool sim follow --leader figure8 --followers 3 --plot f.svg --emit tf
+      frametool sim follow --explain-step 3
+
+    A leader file has t, linear, angular as CSV, JSON or YAML; standard input also takes Twist messages and the words
+    up, down, left, right, one a second unless they say their time: simulated time waits for the next of them, or goes
+    on with --realtime, where they act when they come. A turtle at a wall is reported once, and every tick
+    there is counted in the summary. Below 2 micrometres from its target a follower stands still.
+    """
+    if explain_step is not None:
+        _explain(options, leader, explain_step, explain or "text")
+        return
+    output, scene = output_and_scene(options, leader)
+    if explain is not None:
+        raise click.UsageError("--explain derives one control step; name it with --explain-step N, from 0")
+    output.run(scene)
+
+
+def _explain(options: dict[str, Any], leader: str, step: int, form: str) -> None:
+    """Write the derivation of one control step of the followers; refuse options that are about a whole run."""
+    precision = options["precision"]
+    too_many = [f"--{name}" for name in ("live", "realtime", "plot", "view") if options[name]]
+    too_many += ["--emit"] if options["emit"] != "commands" else []
+    chosen = options["format_name"] or by_suffix(options["output"], ("yaml", "json", "csv"))
+    too_many += [f"the format {chosen}"] if chosen not in (None, "text") else []
+    output, scene = output_and_scene(options, leader)
+    if too_many:
+        raise click.UsageError(f"--explain-step derives one step in words; leave {' and '.join(too_many)} out")
+    from frametool.explain.derive import DerivationStyle
+    from frametool.explain.follow import derive_follow
+    from frametool.sim.followed import follow_steps
+
+    plan = DerivationStyle(output.style, significant(precision))
+    text = derive_follow(follow_steps(scene, step), plan).render(form)
+    with writing(output.output, force=output.force) as write:
+        write(text)
+
+
+def output_and_scene(
+    options: dict[str, Any], leader: str | MakeLeader, **more: Any,
+) -> tuple[SimOutput, Scene]:  # fmt: skip
+    """Return the output and the scene that the options describe; what cannot be is a usage error."""
+    law, seed = options.pop("law"), options.pop("seed")
+    changes = {name: options.pop(name) for name in LAW_OPTIONS}
+    chosen = {name: options.pop(name) for name in SCENE_OPTIONS}
+    if chosen["holonomic"] and chosen["turtlesim"] == "ros1":
+        raise click.UsageError("--holonomic is for --turtlesim ros2; in ROS 1 linear.y always counts")
+    output = SimOutput.of(**options, **more)
+    try:
+        controller = FollowController(law, **changes)
+        drive = leader_of(leader, seed, paced=output.realtime or output.live) if isinstance(leader, str) else leader
+        return output, tutorial(leader=drive, law=controller, **chosen)
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+
+
+@command.command(cls=Command, name="run")
+@click.argument("scene", type=TEXT)
+@click.option("--duration", type=DURATION, metavar="S", help="simulated seconds, or inf  [default: the scene's]")
+@click.option("--seed", type=click.IntRange(0), help="of random leaders  [default: the scene's]")
+@output_options
+def run(scene: str, duration: float | None, seed: int | None, **options: Any) -> None:
+    """Run SCENE, a YAML or JSON file, and print the followers' velocity commands.
+
+    \b
+      frametool sim run turtles.yaml
+      frametool sim run turtles.yaml --emit poses --format csv --plot turtles.svg
+
+    \b
+      duration: 20
+      turtles:
+        turtle1: {leader: square}
+        turtle2: {spawn: [4, 2, 0], follow: turtle1, law: ros1}
+      events:
+        - {t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 90deg}}
+
+    A turtle has spawn, and leader (still, circle, square, figure8, random, a file, a list of commands) or follow with
+    law, rate, gain_linear, gain_angular, max_linear, max_angular, target, delay. Events are turtlesim's services:
+    spawn, kill, reset, clear, teleport_absolute, teleport_relative, rotate_absolute (ROS 2), set_pen.
+    """
+    output = SimOutput.of(**options)
+    try:
+        read = read_scene(source_of(scene), seed=seed)
+    except FormatError as error:
+        raise usage_if_inline(error) from None
+    chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
+    if late := chosen.late_calls():
+        end = f"{(chosen.duration_ns or 0) / BILLION:g} s"
+        more = f", nor do {len(late) - 1} more" if late[1:] else ""
+        say(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")
+    output.run(chosen)
+
+
+GAINS = Parsed("start:stop:count", parse_gains)
+
+
+@command.command(cls=Command, name="sweep")
+@click.option("--gain-linear", type=GAINS, default="0.1:2:20", show_default=True, metavar="START:STOP:COUNT",
+              help="speeds for each metre of distance")
+@click.option("--gain-angular", type=GAINS, default="1:8:20", show_default=True, metavar="START:STOP:COUNT",
+              help="turn rates for each radian of bearing")
+@sweep_options
+def sweep(
+    gain_linear: list[float], gain_angular: list[float], leader: str, seed: int, format_name: str | None,
+    precision: int | None, output: str | None, plot: str | None, force: bool, **options: Any,
+) -> None:  # fmt: skip
+    """Try every pair of gains: how soon the follower is within reach, and how far it was off again afterwards.
+
+    \b
+      frametool sim sweep --gain-linear 0.1:2:20 --gain-angular 1:8:20
+      frametool sim sweep --leader circle --format csv --plot gains.svg
+
+    time_to_reach is in seconds; overshoot, in metres, is how much further off than its nearest the follower was again
+    after that. Both are missing (-, null or empty) where it never comes within reach.
+    """
+    check_files(plot, output, force=force)
+    from frametool.sim.sweep import grid, rows
+
+    style = style_of(format_name, output, precision)
+    try:
+        drive = leader_of(leader, seed, paced=False)
+        result = grid(gain_linear, gain_angular, drive, **options)
+    except ValueInvalid as error:
+        raise click.UsageError(str(error)) from None
+    text = table(list(rows(gain_linear, gain_angular, result)), style)
+    with writing(output, force=force) as write:
+        write(text)
+    if plot:
+        from frametool.view.run_plot import sweep_picture
+
+        with writing(plot, force=force) as write:
+            write(drawn(sweep_picture(gain_linear, gain_angular, result), suffix_of(plot)))
+
+
+# what terminals send for the arrow keys, in both of their modes
+ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
+QUIT = b"qQ\x04"
+
+
+@command.command(cls=Command, name="teleop")
+@follow_options("inf")
+@output_options
+def teleop(**options: Any) -> None:
+    """Drive turtle1 with the arrow keys, as turtle_teleop_key does; turtle2 follows. Drawn in the terminal; q ends it.
+
+    \b
+      frametool sim teleop
+      frametool sim teleop --followers 3 --plot mine.svg
+      frametool sim teleop --turtlesim ros2 --format csv > commands.csv
+
+    Each key moves for a second: 2 m/s ahead or back, 2 rad/s to the left or right. With --turtlesim ros2 the keys
+    g t r e d c v b around f turn to a heading. When stdout is no terminal, every command goes there.
+    """
+    if not sys.stdin.isatty():
+        raise click.UsageError("standard input is no terminal; pipe key names into frametool sim follow --leader -")
+    mailbox = Mailbox()
+    output, scene = output_and_scene({**options, "live": True}, lambda: mailbox, leaders=True)
+    with keyboard(mailbox, headings=scene.variant == "ros2"):
+        output.run(scene)
+
+
+@contextmanager
+def keyboard(mailbox: Mailbox, *, headings: bool) -> Iterator[None]:
+    """Read single keys from the terminal into a mailbox; the terminal is as before afterwards."""
+    import termios
+    import tty
+    from threading import Thread
+
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)
+    try:
+        Thread(target=_listen, args=(mailbox, headings), daemon=True).start()
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _listen(mailbox: Mailbox, headings: bool) -> None:
+    """Post what keys mean until the key that ends it."""
+    while data := os.read(sys.stdin.fileno(), 64):
+        for key in keys_in(data):
+            if key in QUIT:
+                mailbox.close()
+                return
+            command = meaning(key, headings=headings)
+            if command is not None:
+                mailbox.post(command)
+
+
+def keys_in(data: bytes) -> Iterator[bytes]:
+    """Split what a terminal sent into keys: escape sequences of arrows, and single letters."""
+    at = 0
+    while at < len(data):
+        width = 3 if data[at : at + 2] in (b"\x1b[", b"\x1bO") else 1
+        yield data[at : at + width]
+        at += width
+
+
+def meaning(key: bytes, *, headings: bool) -> Twist | Heading | None:
+    """Return what a key commands; None for a key that means nothing."""
+    if len(key) == 3:
+        return KEYS.get(ARROWS.get(key[2:], ""))
+    return HEADINGS.get(key.decode("latin-1").lower()) if headings else None

@@ -6,19 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import (
-    FILE,
-    TIME,
-    Command,
-    at_ns,
-    pose_options,
-    reading_options,
-    result_options,
-    rotation_options,
-    rules,
-    rules_options,
-    verbose_option,
-)
+from frametool.cli.options import FILE, TIME, Command, at_ns, color_option, result_options, rules_of, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import load_tree
 
@@ -30,18 +18,10 @@ if TYPE_CHECKING:
 @click.argument("tree", type=FILE)
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest of each edge]")
-@click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
-              help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
-@rules_options
-@reading_options()
-@verbose_option
-@pose_options
-@rotation_options
+@color_option
+@tree_options
 @result_options("tree", "trajectory")
-def command(
-    tree: str, more: Sequence[str], at: int | str | None, color: str, moving: bool, cache: int | None, tf2: str | None,
-    normalize: bool, **options: Any,
-) -> None:  # fmt: skip
+def command(tree: str, more: Sequence[str], at: int | str | None, color: str, **options: Any) -> None:
     """Draw the frames of TREE, each with its pose in its parent; those that move with their rate and interval too.
 
     \b
@@ -54,7 +34,8 @@ def command(
     and read back, frames that move with all their samples. dot draws what moves as ROS's view_frames does, tf2 is the
     listing of tf2's all_frames_as_yaml. --at draws the tree as it stood at one time.
     """
+    taken = rules_of(options)
     output = Output("tree", "trajectory", **options)
-    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize))
+    frames = load_tree(tree, more, taken)
     stamp = at_ns(at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), color)

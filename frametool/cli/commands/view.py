@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from shutil import get_terminal_size
@@ -10,81 +9,29 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import (
-    FILE,
-    TEXT,
-    TIME,
-    Command,
-    Text,
-    at_ns,
-    decorated,
-    reading_options,
-    rules,
-    rules_options,
-    verbose_option,
-)
+from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules_of
 from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened
-from frametool.errors import ValueInvalid, shown
-from frametool.text.numbers import parse_angle
+from frametool.errors import shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.view.frame_scene import FrameScene
-    from frametool.view.pictures import StillPicture
+
+    Eye = tuple[float, float]
 
 FORMS = ("text", "html", "svg", "glb", "png")
 SUFFIXES = {".html": "html", ".htm": "html", ".svg": "svg", ".glb": "glb", ".png": "png", ".txt": "text"}
-NAMED_EYES = ("slanted", "front", "side", "top")
 PIPE_SIZE = (100, 30)  # columns and lines where nobody says how many there are
 
 
-class Eye(Text):
-    """From where one looks: a name, or azimuth and elevation in degrees."""
+def _eye(text: str) -> Eye:
+    from frametool.view.projection import parse_eye
 
-    name = "eye"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return azimuth and elevation in radians."""
-        text = str(super().convert(value, param, ctx))
-        if text in NAMED_EYES:
-            from frametool.view.projection import EYES
-
-            return EYES[text]
-        cells = text.split(",")
-        if len(cells) != 2:
-            self.fail(f"expected {', '.join(NAMED_EYES)} or AZ,EL in degrees, found {shown(text)}", param, ctx)
-        try:
-            azimuth, elevation = map(_in_radians, cells)
-        except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
-        if abs(elevation) > math.pi / 2.0:
-            self.fail(f"the elevation must be -90 .. 90 degrees, found {shown(cells[1])}", param, ctx)
-        return azimuth, elevation
-
-
-def _in_radians(text: str) -> float:
-    angle, unit = parse_angle(text.strip())
-    return angle if unit == "rad" else math.radians(math.fmod(angle, 360.0))
-
-
-def scene_options(function: Any) -> Any:
-    """Add to a command the options that choose what is drawn."""
-    options = [
-        click.option("--frame", "fixed", type=FRAME, metavar="FIXED",
-                     help="what all is seen in  [default: TARGET, or the root of most frames]"),
-        click.option("--at", type=TIME, metavar="TIME",
-                     help="seconds, nanoseconds with ns  [default: the first time that all edges have]"),
-        click.option("--below", type=FRAME, metavar="FRAME", help="only this frame and those that hang from it"),
-        click.option("--only", type=TEXT, metavar="REGEX", help="only frames whose name matches"),
-        click.option("--path", "path_only", is_flag=True, help="only the frames between TARGET and SOURCE"),
-        click.option("--from", "eye", type=Eye(), default="slanted", show_default=True, metavar="EYE",
-                     help="slanted, front, side, top, or AZ,EL in degrees"),
-    ]  # fmt: skip
-    return decorated(function, options)
+    return parse_eye(text)
 
 
 @click.command(cls=Command, name="view")
@@ -92,10 +39,16 @@ def scene_options(function: Any) -> Any:
 @click.argument("target", type=FRAME, required=False)
 @click.argument("source", type=FRAME, required=False)
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@scene_options
-@rules_options
-@reading_options()
-@verbose_option
+@click.option("--frame", "fixed", type=FRAME, metavar="FIXED",
+              help="what all is seen in  [default: TARGET, or the root of most frames]")
+@click.option("--at", type=TIME, metavar="TIME",
+              help="seconds, nanoseconds with ns  [default: the first time that all edges have]")
+@click.option("--below", type=FRAME, metavar="FRAME", help="only this frame and those that hang from it")
+@click.option("--only", type=TEXT, metavar="REGEX", help="only frames whose name matches")
+@click.option("--path", "path_only", is_flag=True, help="only the frames between TARGET and SOURCE")
+@click.option("--from", "eye", type=Parsed("eye", _eye), default="slanted", show_default=True, metavar="EYE",
+              help="slanted, front, side, top, or AZ,EL in degrees")
+@moving_options
 @click.option("-f", "--format", "form", type=click.Choice(FORMS),
               help="form of the picture  [default: by the suffix of --output, else text]")
 @click.option("-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all")
@@ -104,12 +57,10 @@ def scene_options(function: Any) -> Any:
 @click.option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
 @click.option("--sliders", is_flag=True, help="a slider for each joint of a URDF robot, on its page")
 @click.option("--open", "opens", is_flag=True, help="show the page in the browser")
-@click.option("--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
-              help="colour of the text; auto is on a terminal, and NO_COLOR is heeded")
+@color_option
 def command(
-    tree: str, target: str | None, source: str | None, more: Sequence[str], eye: tuple[float, float],
-    moving: bool, cache: int | None, tf2: str | None, form: str | None, output: str | None, force: bool, opens: bool,
-    live: bool, overlay: bool, sliders: bool, color: str, **options: Any,
+    tree: str, target: str | None, source: str | None, more: Sequence[str], eye: Eye, form: str | None,
+    output: str | None, force: bool, opens: bool, live: bool, overlay: bool, sliders: bool, color: str, **options: Any,
 ) -> None:  # fmt: skip
     """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
 
@@ -136,7 +87,7 @@ def command(
         raise click.UsageError("--path draws the way between TARGET and SOURCE; name both")
     if sliders and (chosen != "html" or tree == "-" or overlay):
         raise click.UsageError("--sliders move the joints of a robot on a page: give a file, and -o FILE.html")
-    frames = load_tree(tree, more, rules(moving=moving, cache=cache, tf2=tf2))
+    frames = load_tree(tree, more, rules_of(options))
     from frametool.view.frame_scene import FrameScene
 
     stamp_ns, ends = at_ns(options.pop("at")), {} if overlay else {"target": target, "source": source}
@@ -144,18 +95,13 @@ def command(
     options |= {key: name and frame_name(name, frames) for key, name in names.items()}
     scene = FrameScene(frames, at_ns=stamp_ns, **options)
     before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed) if overlay else None
-    if live:
-        if chosen != "text" or output is not None or not sys.stdout.isatty() or scene.at_ns is None:
-            raise click.UsageError("--live plays what moves in a terminal: give it a tree that moves and no -o")
-        from frametool.view.terminal import play
+    on_terminal = chosen == "text" and output is None and sys.stdout.isatty()
+    if live and (not on_terminal or scene.at_ns is None):
+        raise click.UsageError("--live plays what moves in a terminal: give it a tree that moves and no -o")
+    if on_terminal:
+        from frametool.view.terminal import play, print_terminal
 
-        play(scene, eye, color)
-        return
-    if chosen == "text" and output is None and sys.stdout.isatty():
-        from frametool.view.terminal import TerminalPicture, print_terminal
-
-        columns, lines = os.get_terminal_size(sys.stdout.fileno())
-        print_terminal(TerminalPicture(scene, columns, lines - 1, eye), color)
+        (play if live else print_terminal)(scene, eye, color)
         return
     content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
     path = _page_file(tree) if opens and output is None else output
@@ -169,7 +115,7 @@ def command(
 
 
 def _form(form: str | None, output: str | None, *, opens: bool) -> str:
-    """Choose the form: as told, else by the file's suffix, else text; a browser shows pages."""
+    """Choose the form: that of --format, else by the file's suffix, else text; a browser shows pages."""
     suffix = os.path.splitext(output or "")[1].lower()
     chosen = form or SUFFIXES.get(suffix) or ("html" if opens else None)
     if chosen is None and suffix and output != "-":
@@ -180,10 +126,9 @@ def _form(form: str | None, output: str | None, *, opens: bool) -> str:
 
 
 def _content(
-    scene: FrameScene, form: str, tree: str, eye: tuple[float, float], before: FrameScene | None, before_tree: str,
-    *, sliders: bool,
+    scene: FrameScene, form: str, tree: str, eye: Eye, before: FrameScene | None, before_tree: str, *, sliders: bool,
 ) -> str | bytes:  # fmt: skip
-    """Return the picture in a form."""
+    """Return the picture in a form, and say what a still one does not show."""
     title, other_title = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, before_tree))
     if form == "html":
         from frametool.view.html_page import write_page
@@ -201,26 +146,21 @@ def _content(
     from frametool.view.pictures import still_picture
 
     still = still_picture(scene, eye, title, before)
-    _tell_of_crowd(still, scene)
+    if still.crowded:
+        say(f"note: {still.crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part")
+    if still.hidden:
+        say(f"note: {still.hidden} names found no place")
     return drawn(still.picture, f".{form}")
 
 
 def _joints(tree: str, scene: FrameScene) -> list[dict[str, Any]]:
-    """Return the joints of a robot's file that get a slider; its warnings were told when its frames were read."""
+    """Return the joints of a robot's file that get a slider; its warnings came when its frames were read."""
     from frametool.errors import overheard
     from frametool.formats.robots.robot import robot_of
     from frametool.view.html_page import joint_sliders
 
     (robot, posture), _ = overheard(robot_of, opened([tree])[0])
     return joint_sliders(robot, posture.still, scene.names)
-
-
-def _tell_of_crowd(still: StillPicture, scene: FrameScene) -> None:
-    """Say what a still picture does not show."""
-    if still.crowded:
-        say(f"note: {still.crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part")
-    if still.hidden:
-        say(f"note: {still.hidden} names found no place")
 
 
 def _page_file(tree: str) -> str:

@@ -1,4 +1,4 @@
-"""Read velocity commands: leader files and streams, one command at a time, each with its line.
+"""Readers of scenes and leader files: single values, and velocity commands, one at a time, each with its line.
 
     t,linear,angular                                     CSV: columns by name, also linear_y and those of sim's own CSV
     - {t: 0.5, linear: 2.0, angular: 0.0}                YAML or JSON: mappings, in a list or as documents
@@ -11,28 +11,167 @@ Metres and radians a second, times in seconds. What has no time comes one period
 from __future__ import annotations
 
 import re
+from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import Source, error_at
-from frametool.errors import FormatError, alternatives, shown
+from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
-from frametool.frames.stamps import BILLION, format_stamp
-from frametool.grammar.readers import Misfit, read_numbers, within
+from frametool.frames.stamps import BILLION, format_stamp, parse_stamp
+from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.ros.message_stream import NOISE
-from frametool.sim.field_readers import known_keys, read_number, read_stamp
-from frametool.sim.leaders import KEYS
+from frametool.sim.drivers import KEYS
+from frametool.sim.scene import LONGEST, LONGEST_NS
 from frametool.sim.turtle import Twist
 from frametool.text.csv_line import split_line
+from frametool.text.numbers import parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+    from typing import TypeVar
 
     from frametool.grammar.readers import Path
-    from frametool.sim.leaders import TimedTwist
+    from frametool.sim.drivers import TimedTwist
+    from frametool.sim.scene import Place
 
     NumberedLines = Iterator[tuple[int, str]]
+    Value = TypeVar("Value")
+
+LONGEST_INTEGER = 30  # digits
+FLAGS = {"true": "1", "false": "0"}  # as turtlesim's services have them
+MOST_GAINS = 10_000
+
+
+def guarded(call: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
+    """Call what refuses values; what it refuses can then be placed."""
+    try:
+        return call(*arguments, **options)
+    except ValueInvalid as error:
+        raise Misfit(str(error)) from None
+
+
+def text_reader(parse: Callable[[str], Value], what: str) -> Callable[[Any], Value]:
+    """Return the reader of values for a parser of text; `what` says in errors what is expected."""
+
+    def read(value: Any) -> Value:
+        if type(value) is not str:
+            raise Misfit(f"expected {what}, found {kind(value)}")
+        return guarded(parse, value)
+
+    return read
+
+
+def one_of(names: Collection[str]) -> Callable[[Any], str]:
+    """Return the reader of one of several words."""
+
+    def parse(text: str) -> str:
+        if text not in names:
+            raise ValueInvalid(f"unknown {shown(text)}{alternatives(text, names, 'choices')}")
+        return text
+
+    return text_reader(parse, f"one of {', '.join(names)}")
+
+
+def known_keys(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
+    """Take a value for a mapping with some of these keys."""
+    mapping = as_mapping(value, what)
+    if unknown := [key for key in mapping if key not in keys]:
+        known = alternatives(unknown[0], keys, "keys")
+        raise Misfit(f"unknown key {shown(unknown[0])}{known}", (unknown[0],), key=True)
+    return mapping
+
+
+def _stamp(text: str) -> int:
+    stamp_ns = parse_stamp(text)
+    if stamp_ns > LONGEST_NS:
+        raise ValueInvalid(f"{text} s is more than {LONGEST} s")
+    return stamp_ns
+
+
+def _time(text: str) -> int:
+    stamp_ns = _stamp(text)
+    if stamp_ns < 0:
+        raise ValueInvalid(f"{text} s is before the start, which is 0")
+    return stamp_ns
+
+
+def _boolean(text: str) -> bool:
+    if text not in FLAGS:
+        raise ValueInvalid(f"expected true or false, found {shown(text)}")
+    return text == "true"
+
+
+def _integer(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) <= LONGEST_INTEGER):
+        raise ValueInvalid(f"expected a whole number, found {shown(text)}")
+    return int(text)
+
+
+def _byte(text: str) -> float:
+    value = parse_number(text)
+    if not (0.0 <= value <= 255.0 and value.is_integer()):
+        raise ValueInvalid(f"expected a whole number 0 .. 255, found {text}")
+    return value
+
+
+read_number = text_reader(parse_number, "a number")
+read_byte = text_reader(_byte, "a whole number 0 .. 255")
+read_angle = text_reader(partial(read_number_or_angle, degrees=False), "an angle in radians, or like 90deg")
+read_stamp = text_reader(_stamp, "a time in seconds")
+read_time = text_reader(_time, "a time in seconds")
+read_duration = text_reader(
+    lambda text: None if text in ("inf", ".inf") else _time(text), "a duration in seconds, or inf"
+)
+read_boolean = text_reader(_boolean, "true or false")
+read_flag = text_reader(lambda text: parse_number(FLAGS.get(text, text)), "true or false")
+read_integer = text_reader(_integer, "a whole number")
+
+
+def parse_spawn(text: str) -> Place:
+    """Read X,Y or X,Y,THETA: metres, radians; the angle may carry a unit.
+
+    Raises ValueInvalid.
+    """
+    cells = [cell.strip() for cell in text.split(",")]
+    if len(cells) not in (2, 3):
+        raise ValueInvalid(f"expected X,Y,THETA, found {shown(text)}")
+    theta = read_number_or_angle(cells[2], degrees=False) if len(cells) == 3 else 0.0
+    return parse_number(cells[0]), parse_number(cells[1]), theta
+
+
+def parse_seconds(text: str) -> float:
+    """Read a span of time in seconds.
+
+    Raises ValueInvalid for what is negative or longer than stamps reach.
+    """
+    seconds = parse_number(text)
+    if not 0.0 <= seconds <= LONGEST:
+        raise ValueInvalid(f"expected 0 or more, and at most {LONGEST}, found {seconds:g}")
+    return seconds
+
+
+def parse_gains(text: str) -> list[float]:
+    """Read evenly spaced numbers, START:STOP:COUNT with both ends, or numbers separated by commas.
+
+    Raises ValueInvalid.
+    """
+    if ":" not in text:
+        return [parse_number(each.strip()) for each in text.split(",")]
+    try:
+        start_text, stop_text, count_text = text.split(":")
+        start, stop, count = parse_number(start_text), parse_number(stop_text), int(count_text)
+    except ValueInvalid:
+        raise
+    except ValueError:
+        usage = "expected START:STOP:COUNT (0.1:2:20), or numbers (0.5,1)"
+        raise ValueInvalid(f"{usage}; found {shown(text)}") from None
+    if not 1 <= count <= MOST_GAINS:
+        raise ValueInvalid(f"COUNT must be 1 .. {MOST_GAINS}, found {count}")
+    values = (start + (stop - start) * index / max(count - 1, 1) for index in range(count))
+    return [float(f"{value:.12g}") for value in values]  # 0.8 rather than 0.7999999999999999
+
 
 COLUMNS = {
     "t": "t",
@@ -51,14 +190,15 @@ EXPECTED = f"a command is {COMMAND}"
 _WORD = re.compile(r"[A-Za-z_]+\s*").fullmatch
 
 
-class CommandText:
-    """A piece of the input that is read at once, and the number of its first line: a document, a word, a row of CSV."""
+class CommandText(NamedTuple):
+    """A piece of the input that is read at once, and the number of its first line: a document, a word, a row of CSV.
 
-    def __init__(self, name: str, text: str, line: int, columns: Sequence[str] | None = None) -> None:
-        """Keep the text; `columns` names the cells of a row of CSV, "" those that are not looked at."""
-        self.source = Source(name, text)
-        self.line = line
-        self.columns = columns
+    columns: the names of the cells of a row of CSV, "" for those that are not looked at
+    """
+
+    source: Source
+    line: int
+    columns: Sequence[str] | None = None
 
     def values(self) -> list[tuple[Path, Any]]:
         """Return the values in it, each with its path; a row of CSV is a mapping."""
@@ -84,12 +224,12 @@ class CommandText:
         return error
 
 
-def read_script(source: Source, *, period_ns: int = BILLION) -> list[TimedTwist]:
+def read_script(source: Source) -> list[TimedTwist]:
     """Read a whole leader file: nanoseconds and commands in order; at least one.
 
     Raises FormatError with the line.
     """
-    commands = list(read_commands(source.text.split("\n"), source.name, period_ns=period_ns))
+    commands = list(read_commands(source.text.split("\n"), source.name))
     if not commands:
         raise FormatError(f"no commands in it; {EXPECTED}", source=source.name, line=1)
     return commands
@@ -101,7 +241,7 @@ def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) 
     for piece in _pieces(lines, name):
         try:
             for path, value in piece.values():
-                for t_ns, twist in _timed(value, path, last_ns, period_ns):
+                for t_ns, twist in timed_commands(value, path, last_ns, period_ns):
                     yield t_ns, twist
                     last_ns = t_ns
         except Misfit as misfit:
@@ -111,37 +251,32 @@ def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) 
             raise
 
 
-def read_entries(value: Any) -> list[TimedTwist]:
-    """Read the commands written inside another document, as a list.
+def timed_commands(
+    value: Any, path: Path = (), last_ns: int | None = None, period_ns: int = BILLION
+) -> Iterator[TimedTwist]:
+    """Read the commands of a value, each with its time, which may not lie before that of the last one.
 
     Raises Misfit.
     """
-    return list(_timed(value, (), None, BILLION))
-
-
-def _timed(value: Any, path: Path, last_ns: int | None, period_ns: int) -> Iterator[TimedTwist]:
-    """Read the commands of a value, each with its time, which may not lie before that of the last one."""
-    for stamp_ns, twist, place in _entries(value, path):
-        if stamp_ns is None:
-            last_ns = 0 if last_ns is None else last_ns + period_ns
-        elif stamp_ns < 0:
+    for own_ns, twist, place in _entries(value, path):
+        stamp_ns = own_ns if own_ns is not None else 0 if last_ns is None else last_ns + period_ns
+        if stamp_ns < 0:
             raise Misfit("t is before the start, which is 0", place)
-        elif last_ns is not None and stamp_ns < last_ns:
+        if last_ns is not None and stamp_ns < last_ns:
             late = f"t {format_stamp(stamp_ns)} comes after {format_stamp(last_ns)}"
             raise Misfit(f"{late}; sort the commands by time", place)
-        else:
-            last_ns = stamp_ns
-        yield last_ns, twist
+        last_ns = stamp_ns
+        yield stamp_ns, twist
 
 
 def _pieces(lines: Iterable[str], name: str) -> Iterator[CommandText]:
     """Cut lines into pieces that can be read one by one; the first line that says something tells CSV from the rest."""
-    numbered = ((number, _without_noise(line.rstrip("\r\n"))) for number, line in enumerate(lines, 1))
+    numbered = enumerate((_without_noise(line.rstrip("\r\n")) for line in lines), 1)
     for number, text in numbered:
         if not _says_something(text):
             continue
         if detect(text.encode(), "rows", "records", otherwise="yaml")[0] == "csv":
-            yield from _rows(numbered, name, _columns(CommandText(name, text, number, ())))
+            yield from _rows(numbered, name, _columns(CommandText(Source(name, text), number, ())))
         else:
             yield from _documents(chain(((number, text),), numbered), name)
 
@@ -154,7 +289,7 @@ def _rows(numbered: NumberedLines, name: str, columns: Sequence[str]) -> Iterato
             lines.append(more[1])
             quotes += more[1].count('"')
         if _says_something(text):
-            yield CommandText(name, "\n".join(lines), number, columns)
+            yield CommandText(Source(name, "\n".join(lines)), number, columns)
 
 
 def _documents(numbered: NumberedLines, name: str) -> Iterator[CommandText]:
@@ -162,17 +297,17 @@ def _documents(numbered: NumberedLines, name: str) -> Iterator[CommandText]:
     pending: list[str] = []
     number = 0
     for number, text in numbered:
-        alone = _stands_alone(text)
+        alone = _WORD(text) is not None or (text.startswith("{") and text.rstrip().endswith("}"))
         if alone or text.startswith(("---", "...")):
             if any(map(str.strip, pending)):
-                yield CommandText(name, "\n".join(pending), number - len(pending))
+                yield CommandText(Source(name, "\n".join(pending)), number - len(pending))
             pending.clear()
             if alone:
-                yield CommandText(name, text, number)
+                yield CommandText(Source(name, text), number)
         elif pending or _says_something(text):
             pending.append(text)
     if pending:
-        yield CommandText(name, "\n".join(pending), number - len(pending) + 1)
+        yield CommandText(Source(name, "\n".join(pending)), number - len(pending) + 1)
 
 
 def _says_something(line: str) -> bool:
@@ -181,13 +316,8 @@ def _says_something(line: str) -> bool:
 
 
 def _without_noise(text: str) -> str:
-    """Blank a line that the shell or the tools wrote beside the messages; one of theirs ends a document."""
+    """Blank a line that the shell or the tools wrote between the messages; one of theirs ends a document."""
     return text if NOISE(text) is None else "---" if text.endswith("---") else ""
-
-
-def _stands_alone(text: str) -> bool:
-    """Tell whether a line needs none of the following: a key's name, an object of JSON."""
-    return _WORD(text) is not None or (text.startswith("{") and text.rstrip().endswith("}"))
 
 
 def _columns(header: CommandText) -> list[str]:
@@ -205,7 +335,7 @@ def _columns(header: CommandText) -> list[str]:
 
 
 def _entries(value: Any, path: Path) -> Iterator[tuple[int | None, Twist, Path]]:
-    """Read one command, or a list of them: nanoseconds if given, the command, and where its time stands."""
+    """Read one command, or a list of them: nanoseconds or None, the command, and where its time stands."""
     if type(value) is list and not (value and all(type(item) is str for item in value)):
         for index, item in enumerate(value):
             yield from _entries(item, (*path, index))
@@ -219,7 +349,8 @@ def _entry(value: Any) -> tuple[int | None, Twist]:
     if type(value) is list:
         if len(value) != len(NEEDED):
             raise Misfit(f"expected [{', '.join(NEEDED)}], found {len(value)} items")
-        t, linear, angular = (within((index,), read, value[index]) for index, read in enumerate(LISTED))
+        readers = (read_stamp, read_number, read_number)
+        t, linear, angular = (within((index,), read, value[index]) for index, read in enumerate(readers))
         return t, Twist(linear, angular)
     if type(value) is str and _WORD(value):
         if value.lower() not in KEYS:
@@ -242,6 +373,3 @@ def _axes(value: Any, first: int, second: int) -> tuple[float, float]:
         return read_number(value), 0.0
     numbers = read_numbers(value, AXES, partial=True)
     return numbers[first], numbers[second]
-
-
-LISTED = (read_stamp, read_number, read_number)

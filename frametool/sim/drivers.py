@@ -1,7 +1,7 @@
-"""Leaders, which drive a turtle without following another: scripts of timed commands, and those that are built in.
+"""What drives turtles: leaders, which go their own way, and the follower's law with the targets it looks at.
 
 A leader is asked at `due_ns` with the pose of its turtle, returns a command or None, and sets the next `due_ns` (None:
-no more).
+no more). The law goes from where the target is, seen by the turtle, to a velocity command.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION
-from frametool.sim.controllers import FollowController
+from frametool.geometry.transform import Transform
 from frametool.sim.turtle import PI, SIZE, TICK_NS, TurtlePose, Twist, wrapped
 
 if TYPE_CHECKING:
@@ -20,6 +20,105 @@ if TYPE_CHECKING:
 
     MakeLeader = Callable[[], "Leader"]
     TimedTwist = tuple[int, Twist]
+
+# law -> rate in Hz, linear gain in 1/s, angular gain in 1/s: turtle_tf2_listener of each ROS
+LAWS = {"ros1": (10.0, 0.5, 4.0), "ros2": (1.0, 0.5, 1.0)}
+SLOWEST, FASTEST = 1e-6, 1e6  # Hz; two steps must not fall on one nanosecond
+ARRIVED = 2e-6  # metres: positions near 11 m are float32, 1e-6 apart; a bearing between neighbours is rounding
+
+
+class FollowController:
+    """Drive towards a target: linear = gain * distance, angular = gain * bearing; each limited if asked for.
+
+        FollowController().command(1.0, 1.0)         # Twist(linear_x=0.707.., angular_z=3.14159..)
+
+    law: "ros1" or "ros2", for whatever is None.  rate in Hz, gains in 1/s, limits in m/s and rad/s (None: no limit).
+    At distance zero (below ARRIVED) the command is zero: the bearing is rounding noise there and makes turtles spin.
+    """
+
+    def __init__(
+        self, law: str = "ros1", *, rate: float | None = None, gain_linear: float | None = None,
+        gain_angular: float | None = None, max_linear: float | None = None, max_angular: float | None = None,
+    ) -> None:
+        """Take these numbers, and the law's own for those that are None.
+
+        Raises:
+            ValueInvalid: unknown law, impossible rate, negative limit, a gain that is not finite.
+        """
+        if law not in LAWS:
+            raise ValueInvalid(f"no law {shown(law)}; laws: {', '.join(LAWS)}")
+        own_rate, own_linear, own_angular = LAWS[law]
+        self.rate = _checked("rate", own_rate if rate is None else rate, SLOWEST, FASTEST)
+        self.gain_linear = _checked("gain_linear", own_linear if gain_linear is None else gain_linear)
+        self.gain_angular = _checked("gain_angular", own_angular if gain_angular is None else gain_angular)
+        self.max_linear = math.inf if max_linear is None else _checked("max_linear", max_linear, 0.0)
+        self.max_angular = math.inf if max_angular is None else _checked("max_angular", max_angular, 0.0)
+
+    def command(self, x: float, y: float) -> Twist:
+        """Return the command for a target seen at x ahead, y to the left (metres).
+
+        Raises ValueInvalid when a gain makes the velocity infinite.
+        """
+        distance = math.sqrt(x * x + y * y)
+        if distance < ARRIVED:
+            return Twist(0.0, 0.0)
+        linear = self.gain_linear * distance
+        angular = self.gain_angular * math.atan2(y, x)
+        try:
+            return Twist(
+                max(-self.max_linear, min(self.max_linear, linear)),
+                max(-self.max_angular, min(self.max_angular, angular)),
+            )
+        except ValueInvalid:
+            raise ValueInvalid(unbounded(self.gain_linear, self.gain_angular, distance)) from None
+
+    def due_ns(self, count: int) -> int:
+        """Return the time of the control step of that number, from 0; rounded once, so that no rate drifts."""
+        return round(count * BILLION / self.rate)
+
+
+def unbounded(gain_linear: float, gain_angular: float, distance: float) -> str:
+    """Say that gains are too great; metres."""
+    return f"gain_linear {gain_linear:g}, gain_angular {gain_angular:g} give no finite velocity at {distance:g} m"
+
+
+def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:
+    """Return a number back if it is finite and within its bounds."""
+    if not math.isfinite(value):
+        raise ValueInvalid(f"{name} must be finite, found {value}")
+    if not least <= value <= most:
+        bounds = f"{least:g} or more" if most == math.inf else f"{least:g} .. {most:g} Hz"
+        raise ValueInvalid(f"{name} must be {bounds}, found {value:g}")
+    return float(value)
+
+
+TARGETS = ("leader", "carrot", "moving-carrot")
+CARROT_NS = BILLION // 10  # between two broadcasts of a carrot
+CARROT_ASIDE = 2.0  # metres
+CARROT_CIRCLE = 10.0  # metres
+
+
+def frame_of(turtle: str, target: str) -> str:
+    """Name the frame that is looked up: the turtle, or its carrot (turtle1's is carrot1)."""
+    if target == "leader":
+        return turtle
+    return f"carrot{turtle[6:]}" if turtle[:6] == "turtle" and turtle[6:].isdigit() else f"{turtle}_carrot"
+
+
+def offset(target: str, now_ns: int) -> tuple[float, float]:
+    """Return where a target stands in its leader's frame, in metres."""
+    if target == "leader":
+        return 0.0, 0.0
+    if target == "carrot":
+        return 0.0, CARROT_ASIDE
+    angle = now_ns / BILLION * math.pi
+    return CARROT_CIRCLE * math.sin(angle), CARROT_CIRCLE * math.cos(angle)
+
+
+def planar(x: float, y: float, theta: float) -> Transform:
+    """Return a pose in the plane as a transform."""
+    return Transform.of(x, y, 0.0, 0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0))
+
 
 STILL = 1e-4  # m/s and rad/s: draw_square's own threshold of standing
 CIRCLING = Twist(2.0, 1.8)  # the command of the turtlesim tutorial
@@ -53,7 +152,7 @@ class Leader(Protocol):
 
 
 class Script:
-    """Commands at given times (nanoseconds), read one ahead; between them turtlesim keeps the last for a second."""
+    """Commands at their times (nanoseconds), read one ahead; between them turtlesim keeps the last for a second."""
 
     def __init__(self, commands: Iterable[TimedTwist]) -> None:
         """Take the commands in the order of their times.
@@ -174,36 +273,37 @@ class Square:
             self._moves, self._stopping = not self._moves, False
             self._goal = _ahead(pose) if self._moves else pose._replace(theta=wrapped(pose.theta + PI / 2.0))
             return Twist(0.0, 0.0)
-        if self._stopping or _reached(pose, self._goal):
+        near = abs(pose.x - self._goal.x) < 0.1 and abs(pose.y - self._goal.y) < 0.1
+        if self._stopping or (near and abs(wrapped(pose.theta - self._goal.theta)) < 0.01):
             self._stopping = True
             return Twist(0.0, 0.0)
         return Twist(1.0, 0.0) if self._moves else Twist(0.0, 0.4)
 
 
-class Wanderer:
-    """Drive to places drawn at random, one after another, at up to 2 m/s; the same seed gives the same way."""
+MARGIN = 1.0  # metres to the walls
 
-    margin = 1.0  # metres to the walls
 
-    def __init__(self, seed: int = 0) -> None:
-        """Draw the first place."""
-        from random import Random
+def wanderer(seed: int = 0) -> Callable[[int, TurtlePose], Twist]:
+    """Return what drives to places drawn at random, one after another, at up to 2 m/s; one way for each seed."""
+    from random import Random
 
-        self._random = Random(seed)  # noqa: S311 - no secret
-        self._law = FollowController(gain_linear=1.0, max_linear=2.0)
-        self._goal = self._draw()
+    random = Random(seed)  # noqa: S311 - no secret
+    law = FollowController(gain_linear=1.0, max_linear=2.0)
 
-    def drive(self, now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG002
-        """Follow the place; near it, take another."""
-        if math.dist(self._goal, pose[:2]) < 0.5:
-            self._goal = self._draw()
-        x, y = self._goal[0] - pose.x, self._goal[1] - pose.y
+    def draw() -> tuple[float, float]:
+        return random.uniform(MARGIN, SIZE - MARGIN), random.uniform(MARGIN, SIZE - MARGIN)
+
+    goal = draw()
+
+    def drive(now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG001 - has no clock
+        nonlocal goal
+        if math.dist(goal, pose[:2]) < 0.5:
+            goal = draw()
+        x, y = goal[0] - pose.x, goal[1] - pose.y
         cosine, sine = math.cos(pose.theta), math.sin(pose.theta)
-        return self._law.command(cosine * x + sine * y, cosine * y - sine * x)
+        return law.command(cosine * x + sine * y, cosine * y - sine * x)
 
-    def _draw(self) -> tuple[float, float]:
-        low, high = self.margin, SIZE - self.margin
-        return self._random.uniform(low, high), self._random.uniform(low, high)
+    return drive
 
 
 # name -> what makes the leader of a seed
@@ -212,7 +312,7 @@ LEADERS: dict[str, Callable[[int], Leader]] = {
     "circle": lambda _: Periodic(BILLION // 2, circle),
     "square": lambda _: Periodic(TICK_NS, Square().drive),
     "figure8": lambda _: Periodic(TICK_NS, figure_eight),
-    "random": lambda seed: Periodic(BILLION // 10, Wanderer(seed).drive),
+    "random": lambda seed: Periodic(BILLION // 10, wanderer(seed)),
 }
 
 
@@ -234,8 +334,3 @@ def scripted(commands: Iterable[TimedTwist]) -> MakeLeader:
 def _ahead(pose: TurtlePose) -> TurtlePose:
     """Return the place 2 m ahead."""
     return pose._replace(x=math.cos(pose.theta) * 2.0 + pose.x, y=math.sin(pose.theta) * 2.0 + pose.y)
-
-
-def _reached(pose: TurtlePose, goal: TurtlePose) -> bool:
-    near = abs(pose.x - goal.x) < 0.1 and abs(pose.y - goal.y) < 0.1
-    return near and abs(wrapped(pose.theta - goal.theta)) < 0.01
