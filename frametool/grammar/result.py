@@ -154,10 +154,8 @@ def is_locked(pose: Pose, notation: Notation) -> bool:
 def rotation_numbers(pose: Pose, notation: Notation, style: Style) -> Sequence[float]:
     """Return a pose's rotation as the numbers of one notation, in column order."""
     unit = quaternion.unit(*pose.components[3:], floats)
-    numbers: Sequence[float] = notation.from_quaternion(
-        *unit, floats, degrees=style.in_degrees(notation), keep_sign=style.keep_sign
-    )
-    return numbers
+    numbers = notation.from_quaternion(*unit, floats, degrees=style.in_degrees(notation), keep_sign=style.keep_sign)
+    return [number + 0.0 for number in numbers]  # none is -0.0
 
 
 def pose_numbers(pose: Pose, notation: Notation, style: Style) -> tuple[Sequence[str], Sequence[float]]:

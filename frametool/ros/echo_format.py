@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from frametool.documents.json import Verbatim
 from frametool.documents.json import dump as json_dump
 from frametool.documents.yaml_writer import dump, quoted
 from frametool.errors import ValueInvalid
@@ -141,6 +142,8 @@ def _ros2_item(item: Any, style: Style, indent: str) -> Iterator[str]:
 
 
 def _ros2_scalar(value: Any, style: Style) -> str:
+    if isinstance(value, Verbatim):
+        return str(value)
     if not isinstance(value, str):
         return dump(value, style.number).rstrip("\n")
     safe = quoted(value)
@@ -167,6 +170,6 @@ def _ros1_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[
 def _ros1_scalar(value: Any, style: Style) -> str:
     if isinstance(value, bool):
         return str(value)
-    if isinstance(value, str):
+    if isinstance(value, str) and not isinstance(value, Verbatim):
         return json_dump(value)
     return style.number(value) if isinstance(value, float) else str(value)

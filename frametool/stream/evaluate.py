@@ -97,6 +97,7 @@ class Run:
     """The steps of one block; rows are numbered as in the block.
 
     reasons: row -> column and why it is bad; mended: rows whose rotation was off and normalised
+    rounded: what is said of the first of them
     doubted: rows with an angle that looks like degrees, which of the numbers it is, and what is said of it
     """
 
@@ -106,6 +107,7 @@ class Run:
         self.block = block
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
         self.mended: list[int] = []
+        self.rounded: list[RowNote] = []
         self.doubted: list[tuple[int, int, str]] = []
         self.off = 0.0  # how far the worst rotation was from one, of those that are none too far
         self.count = len(block.places)
@@ -263,6 +265,12 @@ class Run:
         found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
         for row, reason in found.reasons.items():
             self._blame(row, names[shape.rotation_at[0]], reason)
+        if found.mended.size and not self.rounded:
+            row = int(found.mended[0])
+            own = [float(column[row]) for column in numbers]
+            _, warned = checked_rotation(shape, own, normalize=self.plan.normalize)
+            place = self._place(row, first + shape.rotation_at[0])
+            self.rounded += [RowNote(place[0], rule, sentence, place[1]) for rule, sentence in warned]
         self.mended += found.mended.tolist()
         self.off = max(self.off, found.off)
         self._doubt(shape, given, first)
@@ -282,9 +290,13 @@ class Run:
 
     def note_of_degrees(self, row: int, number: int, sentence: str) -> RowNote:
         """Return what is worth telling about an angle, with its place."""
-        place_of = self.block.place_of
-        line, column = (self.block.line_of(row), self.plan.names[number]) if place_of is None else place_of(row, number)
+        line, column = self._place(row, number)
         return RowNote(line, DEGREES, sentence, column)
+
+    def _place(self, row: int, number: int) -> tuple[int, str]:
+        """Return line and column of one of a row's numbers."""
+        place_of = self.block.place_of
+        return (self.block.line_of(row), self.plan.names[number]) if place_of is None else place_of(row, number)
 
     def _check_tail(self, numbers: Components, names: Sequence[str], tail: Sequence[float]) -> None:
         """Refuse rows whose last numbers are not what they always are: 0 0 0 1 of a 4x4 matrix."""

@@ -219,7 +219,7 @@ class RecordBlocks:
             faults += [(place, Fault.of(run.block.line_of(row), *run.reasons[row])) for place, row in bad]
             odd += [] if skips else [(place, _null_row(cut, row, text)) for place, row in bad]
             notes += [run.note_of_degrees(*each) for each in run.doubted[:1]]
-            notes += [RowNote.of_rounding(run.block.line_of(row)) for row in sorted(run.mended)[:1]]
+            notes += run.rounded
             notes += [each._replace(line=run.block.line_of(0)) for each in cut.template.notes if len(cut.starts)]
         end = min((place for place, _ in faults), default=None) if stops else None
         groups = [group for run in runs for group in run.groups(end)]

@@ -11,7 +11,7 @@ from frametool.errors import FormatError, FrametoolError
 from frametool.ros.message_stream import NOISE
 from frametool.stream.answers import number_writer, written
 from frametool.stream.faults import SKIP, STOP, Fault
-from frametool.stream.run import DEGREES, Outcome, RowNote, mapped
+from frametool.stream.run import Outcome, RowNote, mapped
 from frametool.stream.splitter import ARRAY, Splitter
 from frametool.stream.template import learn, nulled
 from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks
@@ -154,17 +154,18 @@ def rendered(template: Template, request: Request, line: int) -> Rendered | Faul
     write = number_writer(request.precision, yaml=not template.json)
     text = template.with_numbers([write(number) for number in numbers], locked=locked)
     mended = sum(each.mended for each in answers)
-    return Rendered(text.encode(), mended, _notes(template, line, mended=bool(mended)))
+    return Rendered(text.encode(), mended, _notes(template, line))
 
 
-def _notes(template: Template, line: int, *, mended: bool) -> list[RowNote]:
+def _notes(template: Template, line: int) -> list[RowNote]:
     """Return what is worth telling about a record and its numbers, each with its place."""
-    notes = [each._replace(line=line + template.line) for each in template.notes]
-    notes += [RowNote.of_rounding(line + template.line)] * mended
-    doubted = [note for note in template.own_notes if note.rule == DEGREES]
-    for note, place in zip(doubted, locate_many(template.text, [note.path for note in doubted]), strict=True):
-        notes.append(RowNote(line + place[0] - 1, DEGREES, note.message, str(place[1])))
-    return sorted(notes)
+    own = template.own_notes
+    places = locate_many(template.text, [note.path for note in own])
+    found = [RowNote(line + at - 1, note.rule, note.message, str(column))
+             for note, (at, column) in zip(own, places, strict=True)]  # fmt: skip
+    known = {note.about for note in found}
+    others = [each for each in template.notes if each.about not in known]
+    return sorted(found + [each._replace(line=line + template.line) for each in others])
 
 
 def null_of(record: bytes, *, json: bool) -> bytes:

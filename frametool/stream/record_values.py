@@ -15,7 +15,7 @@ from frametool.documents.document import NOTHING, Node, parse_documents, parse_n
 from frametool.documents.json import JSON_NUMBER, Verbatim
 from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
-from frametool.formats.table import holds_arrays, is_trajectory
+from frametool.formats.table import holds_arrays
 from frametool.formats.trees.tree_reader import tell
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.pose import Pose, inverted
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     Value = Result | dict[str, Any]
 
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
+SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
 MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
@@ -238,28 +239,28 @@ def _header_stamp(record: Record) -> dict[str, int]:
 
 def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: Style) -> Result:
     """Return a pose with its frames and what else its record says."""
-    entry, operation = made.entry, request.operation
+    entry = made.entry
     record, shape = entry.record, entry.record.shape
     pose = Pose.of(made.parts[:7], entry.name, entry.parent)
-    if operation.keeps_position or operation.only_inverts or operation.turns:
-        has_position = shape.whole or shape.unit is not None
-        has_rotation = shape.notation is not None or operation.turns or request.notations
-        pose = pose._replace(
-            position=pose.position if has_position else None, rotation=pose.rotation if has_rotation else None
-        )
+    placed, turned = entry.target.unit is not None or entry.target.whole, bool(entry.target.notations)
+    pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
     extras: dict[str, Any] = dict(zip(request.operation.extras(POSE), made.parts[7:], strict=False))
     if shape.covariance:
         extras["covariance"] = list(made.parts[-COVARIANCE:])
     extras |= _rest(node, unit, record)
-    return Result(pose, _header_stamp(record) | (_with_stamp_ns(extras) if is_trajectory(style.form) else extras))
+    return Result(pose, _header_stamp(record) | _with_stamp_ns(extras, keeps=style.form in SPELLED))
 
 
-def _with_stamp_ns(extras: dict[str, Any]) -> dict[str, Any]:
-    """Put the stamp that a record says under `stamp` or `stamp_ns` where look-ups have theirs; raises ValueInvalid."""
-    said = {key: extras.pop(key, None) for key in ("stamp", "stamp_ns")}
-    if said["stamp_ns"] is not None:
-        return extras | {"stamp_ns": parse_stamp(f"{said['stamp_ns']}ns")}
-    return extras if said["stamp"] is None else extras | {"stamp_ns": parse_stamp(str(said["stamp"]))}
+def _with_stamp_ns(extras: dict[str, Any], *, keeps: bool) -> dict[str, Any]:
+    """Read the stamp that a record says under `stamp_ns`, or `stamp`, unless its form keeps that as it is written.
+
+    Raises ValueInvalid for what is no time.
+    """
+    if "stamp_ns" in extras:
+        return extras | {"stamp_ns": parse_stamp(f"{extras['stamp_ns']}ns")}
+    if keeps or extras.get("stamp") is None:
+        return extras
+    return extras | {"stamp_ns": parse_stamp(str(extras.pop("stamp")))}
 
 
 def _used_keys(record: Record) -> set[str]:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import quaternion, rigid, rotvec, spatial
+from frametool.geometry.representations import notation
 from frametool.geometry.trig import RADIAN
 from frametool.grammar.pose import VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import POINT, POSE, TWIST, VECTOR, WRENCH, pose_of
+from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, VECTOR, WRENCH, Shape, Target, pose_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.gathering import Gathered
-    from frametool.stream.row_layout import Shape
     from frametool.stream.stamp_source import Timed
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
@@ -297,6 +297,55 @@ class Request(NamedTuple):
     def in_order(self) -> bool:
         """Tell whether a row's result depends on the rows before it."""
         return self.unwrap or self.operation.looks_back or self.gathered is not None
+
+    def target(self, shape: Shape) -> Target:
+        """Choose how results of things of a shape are written: as they were read unless told."""
+        kind = self.operation.result_kind(shape.kind)
+        if kind != shape.kind:
+            shape = Shape(kind, shape.unit or 1.0)
+        if not kind:
+            return Target(None, ())
+        if kind in SIX:
+            return Target(None, (), plain=True)
+        if kind != POSE:
+            return Target(1.0 if self.whole and shape.unit else shape.unit, ())
+        there = shape.whole or shape.unit is not None
+        placed = there or self.shifts
+        unit = 1.0 if self.whole and (self.notations or shape.notation is None) else shape.unit or 1.0
+        if self.notations or shape.notation is None:
+            notations = self.notations or (() if self._only_turns_around else (notation("quaternion"),))
+            whole = there and len(notations) == 1 and notations[0].representation.whole is not None
+            written = tuple((each, self.in_degrees(each)) for each in notations)
+            return Target(unit if placed and not whole else None, written, self.keep_sign, whole)
+        first = 3 * (placed and shape.unit is None)  # a position comes in front
+        return Target(
+            None if shape.whole or not placed else unit,
+            ((shape.notation, shape.degrees),),
+            self.keep_sign,
+            shape.whole,
+            radians_at=shape.radians_at,
+            absent=tuple(at + first * (not shape.whole) for at in shape.absent),
+        )
+
+    @property
+    def by_row(self) -> bool:
+        """Tell whether each row has its own pose that moves it."""
+        return self.edge_of is not None or self.timed is not None
+
+    @property
+    def shifts(self) -> bool:
+        """Tell whether things without a position may have one afterwards."""
+        operation = self.operation
+        fixed = (operation.left, *operation.right, operation.fixed)
+        by_row = self.by_row or operation.formula is not None
+        return by_row or any(pose is not None and any(pose[:3]) for pose in fixed)
+
+    @property
+    def _only_turns_around(self) -> bool:
+        """Tell whether things without a rotation have none afterwards."""
+        operation = self.operation
+        bare = operation.left is None and not operation.right and not operation.of and operation.formula is None
+        return bare and not self.by_row
 
     def for_kind(self, kind: str) -> Request:
         """Return what is asked of rows of one kind: how an expression names its result depends on it."""

@@ -41,17 +41,13 @@ class RowNote(NamedTuple):
         remedy = f"give --time-column {quote(column)}, or --at TIME"
         return cls(line, "latest", f"column {column!r} is not looked at, rows move at the latest time; {remedy}")
 
-    @classmethod
-    def of_rounding(cls, line: int) -> RowNote:
-        """Tell that a rotation had to be normalised."""
-        return cls(line, "rounded", "the rotation is off by more than 1e-6 and was normalised")
 
 
 def notes_of(run: Run, block: Block) -> list[RowNote]:
     """Return what is worth telling about the rows of a block, by line."""
     notes = [run.note_of_degrees(*each) for each in run.doubted[:1]]
     notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.lost]
-    notes += [RowNote.of_rounding(block.line_of(row)) for row in sorted(run.mended)[:1]]
+    notes += run.rounded
     if run.plan.shapes and run.plan.shapes[0].notation is UPPER_ROWS and run.off > PROJECTED_IN_SILENCE:
         notes.append(RowNote(block.line_of(0), "projected", projection(run.off)))
     return sorted(notes)

@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.yaml_writer import quoted
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import REPRESENTATIONS
 from frametool.grammar.names import PARENT_KEYS
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, Target
+from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
 from frametool.stream.text_parts import Const, IfLocked, Out
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from frametool.stream.answers import Entry
     from frametool.stream.record import Name, Record
     from frametool.stream.request import Request
+    from frametool.stream.row_layout import Target
     from frametool.stream.text_parts import Piece
 
 MARK = "\0"
@@ -43,31 +44,10 @@ class Edit(NamedTuple):
 
 
 def target_of(record: Record, request: Request) -> Target:
-    """Choose the keys of a result: those of the record, or `--to`; products always write position and rotation."""
-    shape, operation = record.shape, request.operation
-    if shape.kind in SIX:
-        return Target(None, (), plain=True)
-    kind = operation.result_kind(shape.kind)
-    if not kind:
-        return Target(None, ())
-    if kind != shape.kind:
-        shape = Shape(kind, shape.unit or 1.0)
-    if kind != POSE:
-        return Target(shape.unit, ())
-    product = not (operation.keeps_position or operation.only_inverts)
-    placed = shape.whole or shape.unit is not None or product
-    if shape.notation and not request.notations:  # as it was read
-        unit = None if shape.whole or not placed else shape.unit or 1.0
-        first = 3 * (unit is not None and shape.unit is None)  # a position comes in front
-        absent = tuple(first + at for at in shape.absent)
-        read = ((shape.notation, shape.degrees),)
-        return Target(unit, read, request.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
-    forms = request.notations or ((notation("quaternion"),) if product else ())
-    names = [form.representation.name for form in forms]
-    together = sorted(forms, key=lambda form: names.index(form.representation.name))  # two conventions share a key
-    whole = placed and len(forms) == 1 and forms[0].representation.whole is not None
-    unit = (shape.unit or 1.0) if placed and not whole else None
-    return Target(unit, tuple((form, request.in_degrees(form)) for form in together), request.keep_sign, whole)
+    """Choose how the result of a record is written; conventions of Euler angles share a key and stand together."""
+    names = [form.representation.name for form in request.notations]
+    together = sorted(request.notations, key=lambda form: names.index(form.representation.name))
+    return request._replace(notations=tuple(together)).target(record.shape)
 
 
 def null_edits(node: Node) -> list[Edit]:

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.geometry.representations import REPRESENTATIONS
-from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, without_mark
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
 from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape
 from frametool.stream.layout import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
-from frametool.stream.row_layout import POSE, Shape, Target
+from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.table import rename_of
 
 if TYPE_CHECKING:
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from frametool.stream.header import Columns
     from frametool.stream.layout import Column, Layout
     from frametool.stream.request import Request
+    from frametool.stream.row_layout import Target
     from frametool.stream.table import Table
 
 
@@ -37,7 +37,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     shapes = _shapes(poses, request, len(asked))
     request = request.for_kind(shapes[0].kind) if shapes else request
     several = request.operation.moves and len(shapes) > 1
-    targets = tuple(_target([shape], request) for shape in shapes) if several else (_target(shapes, request),)
+    targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *asked)
     frames = _frame_columns(table, request, source)
     stays = not request.poses or (request.operation.moves and request.rename is None)
@@ -131,52 +131,6 @@ def _without_position(pose: PoseColumns, request: Request, table: Table, source:
 def _is_whole(notations: Sequence[Notation]) -> bool:
     """Tell whether a result is written as the numbers of a whole pose."""
     return len(notations) == 1 and notations[0].representation.whole is not None
-
-
-def _target(shapes: Sequence[Shape], request: Request) -> Target:
-    """Choose how results are written: as they were read unless told."""
-    shape = shapes[0] if shapes else Shape(POSE)
-    kind = request.operation.result_kind(shape.kind)
-    if kind != shape.kind:
-        shape = Shape(kind, shape.unit or 1.0)
-    if not kind:
-        return Target(None, ())
-    if shape.kind != POSE:
-        return Target(1.0 if request.whole and shape.unit else shape.unit, ())
-    placed = shape.whole or shape.unit is not None
-    if request.notations or shape.notation is None:
-        notations = request.notations
-        if not notations and not _only_turns_around(request):
-            notations = (parse_notation("quaternion"),)
-        written = tuple((notation, request.in_degrees(notation)) for notation in notations)
-        whole = placed and _is_whole(notations)
-        unit = None if whole or not (placed or _shifts(request)) else 1.0 if request.whole else shape.unit or 1.0
-        return Target(unit, written, request.keep_sign, whole)
-    unit = None if shape.whole or not (placed or _shifts(request)) else shape.unit or 1.0
-    first = len(XYZ) * (unit is not None and shape.unit is None)  # a position comes in front
-    absent = tuple(first + at for at in shape.absent)
-    notation = (shape.notation, shape.degrees)
-    return Target(unit, (notation,), request.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
-
-
-def _only_turns_around(request: Request) -> bool:
-    """Tell whether rows without a rotation have none afterwards."""
-    operation = request.operation
-    bare = operation.left is None and not operation.right and not operation.of and operation.formula is None
-    return bare and not _by_row(request)
-
-
-def _by_row(request: Request) -> bool:
-    """Tell whether each row has its own pose that moves it."""
-    return request.edge_of is not None or request.timed is not None
-
-
-def _shifts(request: Request) -> bool:
-    """Tell whether rows without a position may have one afterwards."""
-    operation = request.operation
-    fixed = (operation.left, *operation.right, operation.fixed)
-    by_row = _by_row(request) or operation.formula is not None
-    return by_row or any(pose is not None and any(pose[:3]) for pose in fixed)
 
 
 def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ...]:

@@ -67,8 +67,11 @@ def _describe(result: Result, style: Style) -> str:
 def _heading(result: Result) -> str:
     """Say in words which frame is seen from which, and when."""
     pose = result.pose
-    if pose.name is None or pose.parent is None:
+    if pose.name is None and pose.parent is None:
         return ""
+    if pose.name is None or pose.parent is None:
+        said = f"a pose seen from {pose.parent}" if pose.name is None else f"the pose of {pose.name}"
+        return f"{printable(said)}\n"
     at, source_at, fixed = (result.extras.get(key) for key in ("stamp_ns", "source_stamp_ns", "fixed"))
     name, parent = printable(pose.name), printable(pose.parent)
     source = name if source_at is None else f"{name} at {format_stamp(source_at)}"

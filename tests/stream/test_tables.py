@@ -140,7 +140,7 @@ def test_rows_with_too_few_numbers_are_told_in_their_words() -> None:
 
 def test_rotations_that_are_none_are_refused_and_nearly_ones_are_told() -> None:
     assert "norm" in flow(b"qx,qy,qz,qw\n0,0,1,1\n", INVERT).told[0]
-    with pytest.warns(match="in:2: the rotation is off by more than 1e-6 and was normalised"):
+    with pytest.warns(match="in:2:qx: quaternion 0 0 0.0005 1.0005 has norm 1.0005"):
         assert flow(b"qx,qy,qz,qw\n0,0,0.0005,1.0005\n", INVERT).status == 0
 
 

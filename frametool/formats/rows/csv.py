@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Result, Style
 
 
+PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
+
+
 def write_poses(results: Iterable[Result], style: Style) -> str:
     """Return a header and one row a result."""
     return _table([_pose_row(result, style) for result in results], style)
@@ -56,7 +59,7 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         if isinstance(value, dict):
             yield from value.items()
         elif isinstance(value, list):
-            yield from zip("xyz", value, strict=False)
+            yield from zip("xyz" if key in PLAIN else [f"{key}_{axis}" for axis in "xyz"], value, strict=False)
         else:
             yield key, value
 
