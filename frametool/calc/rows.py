@@ -10,37 +10,32 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.calc.evaluate import evaluate_line, kept
-from frametool.calc.parser import columns_of, needs_time, walk
+from frametool.calc.evaluate import AXES, PLACED, evaluate_line, once_a_block
+from frametool.calc.parser import RADIAN, CalcError, columns_of, needs_time, reads_row
 from frametool.calc.rules import in_radians
-from frametool.calc.tokens import CalcError
-from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, RADIAN, TREE, TWIST, VECTOR, RowValues, Term, Type
+from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
 from frametool.documents.source import opened
-from frametool.errors import FormatError, FrametoolError
+from frametool.errors import FormatError, FrametoolError, ValueInvalid
 from frametool.geometry.representations import notation
 from frametool.geometry.trig import RADIAN as DEGREES
 from frametool.stream.faults import BadRow
-from frametool.stream.request import Operation, Request
+from frametool.stream.gathering import Gathered
+from frametool.stream.request import Request
 from frametool.stream.row_layout import Target
 from frametool.stream.table_stream import run_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.calc.evaluate import Scope
     from frametool.calc.parser import Line
-    from frametool.calc.scope import Scope
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number
 
-RESULT = "result"
-"""What a number is called that nobody has named."""
-
-NAMES = {TWIST: ("vx", "vy", "vz", "wx", "wy", "wz"), ANGLES: ("roll", "pitch", "yaw"), POINT: tuple("xyz"),
-         VECTOR: tuple("xyz")}  # fmt: skip
-
-
+RESULT = "result"  # the column of a number that nobody has named
+NAMES: dict[str, Sequence[str]] = {ANGLES: ("roll", "pitch", "yaw"), **dict(PLACED.values())}
+# stand for the frames of rows that no expression names: whatever they are called, the result is the same
 SOME, OTHER = "\0some", "\0other"
-"""Stand for the frames of rows that no expression names: whatever they are called, the result is the same."""
 
 
 class Bound(NamedTuple):
@@ -80,9 +75,8 @@ class RowExpressions:
         trees = [line.tree for line in (*bindings, *lines)]
         self.columns = tuple(dict.fromkeys(name for tree in trees for name in columns_of(tree)))
         self.needs_time = any(map(needs_time, trees))
-        self.reads_row = any(branch.kind == "name" and branch.value == "row" for tree in trees for branch in walk(tree))
+        self.reads_row = any(map(reads_row, trees))
         self._bound: dict[Type, Bound] = {}
-        self._plain: dict[str, Bound] = {}
 
     def check(self, kinds: Sequence[str]) -> None:
         """Raise the error of the first of some kinds of rows if the lines suit none of them."""
@@ -129,7 +123,7 @@ class RowExpressions:
     ) -> Components:
         """Return the components of the result and then the extras; of floats raises CalcError where none are."""
         bound = self._plainly(row)
-        values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp)
+        values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp, {})
         if self.kind(row):
             return bound.terms[0][1].at(values)
         numbers = [number for _, term in bound.terms for number in self._numbers(term, values)]
@@ -137,9 +131,7 @@ class RowExpressions:
 
     def _plainly(self, row: str) -> Bound:
         """Return the lines as understood for rows whose frames nobody said."""
-        if row not in self._plain:
-            self._plain[row] = self._for(Type(row))
-        return self._plain[row]
+        return self._for(Type(row))
 
     def _for(self, type_: Type) -> Bound:
         """Understand the lines for rows of a type."""
@@ -159,7 +151,7 @@ class RowExpressions:
     def _bind(self, line: Line, scope: Scope) -> Term:
         term = evaluate_line(line, scope)
         if line.name:
-            scope.names[line.name] = kept(scope.names[line.name])
+            scope.names[line.name] = once_a_block(scope.names[line.name])
             return scope.names[line.name]
         return term
 
@@ -169,11 +161,10 @@ class RowExpressions:
             raise CalcError(f"a {type_.kind} cannot be written beside rows")
         if type_.kind == NUMBER:
             return (f"{own or RESULT}{'_deg' * (self.degrees and type_.unit == RADIAN)}",)
-        names: Sequence[str] = NAMES.get(type_.kind, ())
         if type_.kind == POSE:
-            names = (*("xyz" if self.target.unit is not None else ""), *self.target.names)
-        if type_.kind == ANGLES and self.degrees:
-            names = [f"{name}_deg" for name in names]
+            names: Sequence[str] = (*(AXES if self.target.unit is not None else ()), *self.target.names)
+        else:
+            names = [name + "_deg" * (self.degrees and type_.kind == ANGLES) for name in NAMES[type_.kind]]
         return tuple(f"{own}_{name}" if own else name for name in names)
 
     def _numbers(self, term: Term, row: RowValues) -> Sequence[Number]:
@@ -181,56 +172,21 @@ class RowExpressions:
         type_ = term.type
         if type_.kind == POSE:
             return self.target.written(term.at(row), row.xp)
-        if type_.kind == NUMBER and type_.unit == RADIAN and self.degrees and type_.degrees:
+        is_angle = self.degrees and (type_.kind == ANGLES or type_.unit == RADIAN)
+        if is_angle and type_.degrees:
             return term.at(row)
         numbers = in_radians(term).at(row)
-        if self.degrees and (type_.kind == ANGLES or (type_.kind == NUMBER and type_.unit == RADIAN)):
-            return tuple(number * DEGREES for number in numbers)
-        return numbers
+        return tuple(number * DEGREES for number in numbers) if is_angle else numbers
 
 
 def _row_type(row: str, parent: str | None, name: str | None) -> Type:
     return Type(POSE, parent, name) if row == POSE else Type(row, parent)
 
 
-class _Collector:
-    """An expression over rows that keeps them."""
-
-    columns: tuple[str, ...] = ()
-    reads_row = adds = True
-    needs_time = False
-
-    def __init__(self) -> None:
-        self.kept = ""
-        self.blocks: list[Components] = []
-
-    def kind(self, row: str) -> str:
-        """Write nothing."""
-        self.kept = row
-        return ""
-
-    def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002 - there are none
-        """Write nothing."""
-        return ()
-
-    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
-        """Leave frames as they are."""
-        return parent, name
-
-    def result(
-        self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace  # noqa: ARG002
-    ) -> Components:
-        """Keep the rows of a block."""
-        self.blocks.append(parts)
-        return (0.0,) * 7
-
-
 def poses_of_table(path: str, form: str, *, normalize: bool, degrees: bool) -> Term:
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
-    import numpy as np
-
-    collector = _Collector()
-    request = Request(Operation(moves=True, formula=collector), normalize=normalize, degrees=degrees)
+    gathered = Gathered()
+    request = Request(gathered=gathered, normalize=normalize, degrees=degrees)
     line = 1
     file: Any = opened(path)
     with file as stream:
@@ -239,12 +195,9 @@ def poses_of_table(path: str, form: str, *, normalize: bool, degrees: bool) -> T
                 fault = outcome.faults[0]
                 raise BadRow(fault._replace(line=fault.line + line), fault.reason, source=path)
             line += outcome.lines
-    rows = [
-        np.stack([np.broadcast_to(part, np.broadcast_shapes(*map(np.shape, block))) for part in block], axis=-1)
-        for block in collector.blocks
-    ]
-    if not rows or not sum(map(len, rows)):
-        raise FormatError("no rows in it", source=path)
-    type_ = Type(POSE if collector.kept == POSE else POINT)
-    items = tuple(Term(type_, tuple(row)) for block in rows for row in block.tolist())
-    return Term(Type(LIST), (), items=items)
+    try:
+        rows = zip(*(part.tolist() for part in gathered.transforms.components), strict=True)
+    except ValueInvalid:
+        raise FormatError("no rows in it", source=path) from None
+    type_, size = (Type(POSE), 7) if gathered.turned else (Type(POINT), 3)
+    return Term(Type(LIST), (), items=tuple(Term(type_, row[:size]) for row in rows))

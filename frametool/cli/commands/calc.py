@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.calc.evaluate import evaluate_line, read_line
+from frametool.calc.evaluate import Literals, Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import mentions_row, walk
-from frametool.calc.scope import Literals, Scope
 from frametool.cli.calc_input import Expression, file_named_in
 from frametool.cli.options import (
     FILE,
