@@ -67,7 +67,7 @@ class FollowStep(NamedTuple):
     angular: float
 
 
-def derive_follow(steps: Sequence[FollowStep], plan: DerivationStyle) -> Explanation:
+def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explanation:
     """Derive the commands of followers at one step."""
 
     def write(sheet: Sheet) -> None:
@@ -83,7 +83,7 @@ def derive_follow(steps: Sequence[FollowStep], plan: DerivationStyle) -> Explana
         sheet.result(f"the command of {', '.join(printable(step.follower) for step in steps)}", rows)
 
     number = steps[0].number if steps else 0
-    return explained(f"follow, step {number}", write, plan)
+    return explained(plan, f"follow, step {number}", write)
 
 
 def _seen(sheet: Sheet, step: FollowStep) -> Values:

@@ -1,8 +1,6 @@
-"""Steps of what is done to poses: product, inverse, difference, the way between two, and what moves points.
+"""Steps of what is done to poses: product, inverse, difference, the way between two, a change of axes at both ends.
 
-Steps that move what a record holds into another frame: points, vectors, twists, wrenches, covariances.
-
-Steps of a change of axes at the two ends of a pose: W p B, of `--world-axes` and `--axes`.
+And of what moves the content of a record into another frame: points, vectors, twists, wrenches, covariances.
 """
 
 from __future__ import annotations
@@ -10,9 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.explain.sheet import METRES, RADIANS, Sheet, transposed, upright
-from frametool.explain.steps import length, norm, of_quaternion, to_degrees
-from frametool.explain.to_quaternion import XYZ, XYZW
-from frametool.geometry import rigid
+from frametool.explain.steps import CYCLES, XYZ, XYZW, length, norm, of_quaternion, to_degrees
+from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -31,6 +28,8 @@ ORDER = (
 INVERSE = "The position is not just negated but also turned into the other frame: -R^T t."
 HALF_TURN = "Half a turn apart both ways round are equally short; the sign of b decides, as in tf2."
 VECTOR = "A direction (vector, axis, velocity) is only turned: R v, without + t. A point moves by R p + t."
+ARM = "The velocity and the torque depend on the point they are taken at: the lever arm t comes in."
+MIRROR = "One side alone would leave no rotation: its matrix would have the determinant -1."
 FROM_Q = "R(q) is the matrix of q: r11 = 1 - 2 (y^2 + z^2), r12 = 2 (x y - z w), and so on."
 NEARLY_ZERO = 1e-15
 HAMILTON = {
@@ -41,13 +40,17 @@ HAMILTON = {
 }
 
 
+def _named(prefix: str, numbers: Sequence[float], names: Sequence[str]) -> dict[str, float]:
+    return {f"{prefix}{name}": number for name, number in zip(names, numbers, strict=True)}
+
+
 def product(sheet: Sheet, a: Quaternion, b: Quaternion, *, brief: bool = False) -> Quaternion:
     """Multiply two quaternions; brief: on one line."""
     values = _named("a", a, XYZW) | _named("b", b, XYZW)
     if brief:
-        aside = type(sheet)(sheet.digits, clean=sheet.clean)
+        aside = sheet.aside()
         x, y, z, w = (aside.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
-        sheet.quaternions("q", "a b", (a, b), (x, y, z, w))
+        sheet.quaternions(("a b", "%s·%s"), (r"a\,b", r"%s \cdot %s"), a, b, (x, y, z, w))
         return x, y, z, w
     sheet.say("c = a b (Hamilton: ij = k, ji = -k; not commutative)")
     x, y, z, w = (sheet.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
@@ -69,20 +72,24 @@ def moved(
     sheet: Sheet, pose: Rigid, point: Sequence[float], name: str, formula: tuple[str, str], unit: str
 ) -> Vector:
     """Move a point: turn it, then shift it."""
-    matrix = of_quaternion(sheet, pose[3:])
-    x, y, z = (sheet.inner(row, point, shift) for row, shift in zip(matrix, pose[:3], strict=True))
-    parts: Parts = [matrix, upright(point), "+", upright(pose[:3]), "=", upright((x, y, z))]
-    sheet.grid(name, *formula, parts, unit)
-    return x, y, z
+    return _times(sheet, of_quaternion(sheet, pose[3:]), point, name, formula, unit, shift=pose[:3])
 
 
 def turned(
     sheet: Sheet, q: Quaternion, vector: Sequence[float], name: str, formula: tuple[str, str], unit: str = ""
 ) -> Vector:
     """Turn a vector."""
-    matrix = of_quaternion(sheet, q)
-    x, y, z = (sheet.inner(row, vector) for row in matrix)
-    sheet.grid(name, *formula, [matrix, upright(vector), "=", upright((x, y, z))], unit)
+    return _times(sheet, of_quaternion(sheet, q), vector, name, formula, unit)
+
+
+def _times(
+    sheet: Sheet, matrix: Matrix, vector: Sequence[float], name: str, formula: tuple[str, str], unit: str,
+    shift: Sequence[float] = (),
+) -> Vector:  # fmt: skip
+    """Add a matrix times a vector, and a shift."""
+    x, y, z = (sheet.inner(row, vector, *shift[at : at + 1]) for at, row in enumerate(matrix))
+    more: Parts = ["+", upright(shift)] if shift else []
+    sheet.grid(name, *formula, [matrix, upright(vector), *more, "=", upright((x, y, z))], unit)
     return x, y, z
 
 
@@ -95,15 +102,9 @@ def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
     parts: Parts = ["-", back, upright(pose[:3]), "=", upright((x, y, z))]
     sheet.grid("t'", "-R^T t", r"-R^{\mathsf T}\,t", parts, METRES)
     sheet.caveat(INVERSE)
-    return x, y, z, *conjugate(sheet, pose[3:])
-
-
-def conjugate(sheet: Sheet, q: Quaternion) -> Quaternion:
-    """Turn the axis of a rotation round."""
-    x, y, z, w = q
-    found = (0.0 - x, 0.0 - y, 0.0 - z, w)
-    sheet.say("q* = " + ", ".join(f"{name} {sheet.number(part)}" for name, part in zip(XYZW, found, strict=True)))
-    return found
+    q = quaternion.conjugate(*pose[3:])
+    sheet.say("q* = " + ", ".join(f"{name} {sheet.number(part)}" for name, part in zip(XYZW, q, strict=True)))
+    return x, y, z, *q
 
 
 def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
@@ -116,13 +117,10 @@ def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> 
     values = _named("a", a[:3], XYZ) | _named("b", b[:3], XYZ)
     apart = [sheet.step(values, f"d{name}", f"b{name} - a{name}", METRES) for name in XYZ]
     back = transposed(of_quaternion(sheet, a[3:]))
-    x, y, z = (sheet.inner(row, apart) for row in back)
-    sheet.grid("t", "R(A)^T d", r"R(A)^{\mathsf T}\,d", [back, upright(apart), "=", upright((x, y, z))], METRES)
+    x, y, z = _times(sheet, back, apart, "t", ("R(A)^T d", r"R(A)^{\mathsf T}\,d"), METRES)
     sheet.caveat(INVERSE)
     sheet.say("a = q(A)*, b = q(B); the axis of A turns round: q* = (-x, -y, -z, w).")
-    _, _, _, ax, ay, az, aw = a
-    qx, qy, qz, qw = product(sheet, (0.0 - ax, 0.0 - ay, 0.0 - az, aw), b[3:])
-    return x, y, z, qx, qy, qz, qw
+    return x, y, z, *product(sheet, quaternion.conjugate(*a[3:]), b[3:])
 
 
 def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
@@ -185,13 +183,6 @@ def slerp(sheet: Sheet, a: Quaternion, b: Quaternion, fraction: float) -> Quater
     return x, y, z, w
 
 
-def _named(prefix: str, numbers: Sequence[float], names: Sequence[str]) -> dict[str, float]:
-    return {f"{prefix}{name}": number for name, number in zip(names, numbers, strict=True)}
-
-
-ARM = "The velocity and the torque depend on the point they are taken at: the lever arm t comes in."
-
-
 def point(sheet: Sheet, pose: Rigid, numbers: Sequence[float], target: str, source: str) -> Sequence[float]:
     """Turn, then shift."""
     sheet.heading(f"point_in_{target} = {target}_from_{source} * point_in_{source}")
@@ -214,33 +205,28 @@ def twist(sheet: Sheet, pose: Rigid, numbers: Sequence[float], target: str, sour
     """Turn both vectors; the linear one is then that of the body's point at the target's origin."""
     sheet.heading(f"twist at the origin of {target}, from that at the origin of {source}")
     sheet.say("w' = R w, and v' = R v + t x w': the velocity of the same rigid body, elsewhere.")
-    angular = turned(sheet, pose[3:], numbers[3:], "w'", ("R(q) w", "R(q)\\,w"), "rad/s")
-    linear = turned(sheet, pose[3:], numbers[:3], "u", ("R(q) v", "R(q)\\,v"), "m/s")
-    sheet.caveat(ARM)
-    return *_with_arm(sheet, pose, linear, angular, ("u", "w", "v"), "m/s"), *angular
+    angular, linear = _with_arm(sheet, pose, ("w", numbers[3:], "rad/s"), ("v", numbers[:3], "m/s"))
+    return *linear, *angular
 
 
 def wrench(sheet: Sheet, pose: Rigid, numbers: Sequence[float], target: str, source: str) -> Sequence[float]:
     """Turn both vectors; the torque is then that about the target's origin."""
     sheet.heading(f"wrench about the origin of {target}, from that about the origin of {source}")
     sheet.say("f' = R f, and m' = R m + t x f'.")
-    force = turned(sheet, pose[3:], numbers[:3], "f'", ("R(q) f", "R(q)\\,f"), "N")
-    torque = turned(sheet, pose[3:], numbers[3:], "u", ("R(q) m", "R(q)\\,m"), "Nm")
-    sheet.caveat(ARM)
-    return *force, *_with_arm(sheet, pose, torque, force, ("u", "f", "m"), "Nm")
+    force, torque = _with_arm(sheet, pose, ("f", numbers[:3], "N"), ("m", numbers[3:], "Nm"))
+    return *force, *torque
 
 
 def _with_arm(
-    sheet: Sheet, pose: Rigid, own: Sequence[float], other: Sequence[float], names: tuple[str, str, str], unit: str
-) -> Sequence[float]:
-    """Add own + t x other."""
-    a, b, c = names
-    values = {f"{letter}{axis}": part for letter, vector in ((a, own), ("t", pose[:3]), (b, other))
-              for axis, part in zip(XYZ, vector, strict=True)}  # fmt: skip
-    return [
-        sheet.step(values, f"{c}{i}", f"{a}{i} + t{j}*{b}{k} - t{k}*{b}{j}", unit)
-        for i, j, k in (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y"))
-    ]
+    sheet: Sheet, pose: Rigid, first: tuple[str, Sequence[float], str], second: tuple[str, Sequence[float], str]
+) -> tuple[Sequence[float], Sequence[float]]:
+    """Turn two vectors (letter, numbers, unit), and add t x the first one to the second."""
+    (a, vector, unit), (b, other, other_unit) = first, second
+    free = turned(sheet, pose[3:], vector, f"{a}'", (f"R(q) {a}", rf"R(q)\,{a}"), unit)
+    here = turned(sheet, pose[3:], other, "u", (f"R(q) {b}", rf"R(q)\,{b}"), other_unit)
+    sheet.caveat(ARM)
+    values = _named("u", here, XYZ) | _named("t", pose[:3], XYZ) | _named(a, free, XYZ)
+    return free, [sheet.step(values, f"{b}{i}", f"u{i} + t{j}*{a}{k} - t{k}*{a}{j}", other_unit) for i, j, k in CYCLES]
 
 
 def pose_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
@@ -279,9 +265,6 @@ def _sandwich(sheet: Sheet, a: Matrix, c: Matrix, text: str, latex: str) -> Matr
 
 
 MOVERS: dict[str, Block] = {"point": point, "vector": vector, "twist": twist, "wrench": wrench}
-
-
-MIRROR = "One side alone would leave no rotation: its matrix would have the determinant -1."
 
 
 class OtherAxes(NamedTuple):

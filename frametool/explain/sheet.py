@@ -193,9 +193,8 @@ class Sheet:
         ]
         if texts[1] in (texts[0], digits[name]):
             del texts[1], latex[1]
-        self.items.append(
-            SheetStep(name, [*texts, digits[name]], symbol(name), [*latex, latex_number(digits[name])], unit)
-        )
+        texts, latex = [*texts, digits[name]], [*latex, latex_number(digits[name])]
+        self.items.append(SheetStep(name, texts, symbol(name), latex, unit))
         return value
 
     def grid(self, name: str, text: str, latex: str, parts: Sequence[str | Matrix], unit: str = "") -> None:
@@ -203,23 +202,20 @@ class Sheet:
         shown = [part if isinstance(part, str) else [[self.number(v) for v in row] for row in part] for part in parts]
         self.items.append(MatrixLine(name, text, latex, shown, unit))
 
-    def quaternions(self, name: str, text: str, factors: Sequence[Quaternion], value: Quaternion) -> None:
-        """Add a product of quaternions on one line, each as (x, y, z, w)."""
-        tuples = [f"({', '.join(map(self.number, each))})" for each in (*factors, value)]
-        latex = [latex_tuple(each) for each in tuples]
-        shown = ["·".join(tuples[:-1]), tuples[-1]]
-        self.items.append(SheetStep(name, [text, *shown], symbol(name), [
-            text.replace(" ", r"\,"), r" \cdot ".join(latex[:-1]), latex[-1],
-        ]))  # fmt: skip
+    def quaternions(self, text: tuple[str, str], latex: tuple[str, str], *values: Quaternion) -> None:
+        """Add what two quaternions make, on one line, each as (x, y, z, w).
 
-    def slerped(self, a: Quaternion, b: Quaternion, fraction: float, value: Quaternion) -> None:
-        """Add a way between two quaternions on one line."""
-        texts = [f"({', '.join(map(self.number, each))})" for each in (a, b, value)]
-        shown = f"slerp({texts[0]}, {texts[1]}, {self.number(fraction)})"
-        a_latex, b_latex, value_latex = map(latex_tuple, texts)
-        name = r"\operatorname{slerp}"
-        latex = [f"{name}(a, b, f)", rf"{name}\left({a_latex}, {b_latex}, {latex_number(self.number(fraction))}\right)"]
-        self.items.append(SheetStep("q", ["slerp(a, b, f)", shown, texts[2]], "q", [*latex, value_latex]))
+        text, latex: the formula, and the same with a place for each of the two
+        values: the two, and what they make
+        """
+        *texts, found = (f"({', '.join(map(self.number, each))})" for each in values)
+        *latex_texts, latex_found = map(latex_tuple, (*texts, found))
+        shown, latex_shown = text[1] % tuple(texts), latex[1] % tuple(latex_texts)
+        self.items.append(SheetStep("q", [text[0], shown, found], "q", [latex[0], latex_shown, latex_found]))
+
+    def aside(self) -> Sheet:
+        """Return an empty sheet for steps that are not shown."""
+        return Sheet(self.digits, clean=self.clean)
 
     def chosen(self, values: Values, name: str, value: float, unit: str) -> None:
         """Add a value that is chosen, not derived."""

@@ -129,7 +129,7 @@ def command(
             from frametool.explain.derive import derive_apply
 
             source = pose_source(records[0], stream.given, normalize=normalize, points=True)
-            made = derive_apply(way.explained(), source, plan, kind=kind or "", degrees=deg, normalize=normalize,
+            made = derive_apply(plan, way.explained(), source, kind=kind or "", degrees=deg, normalize=normalize,
                                 counters=way.counters, timeless=at is not None)  # fmt: skip
         except FormatError as error:
             raise usage_if_inline(error) from None

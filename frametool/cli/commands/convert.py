@@ -168,7 +168,7 @@ def command(
 
         written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
         change = _named_change(axes, world, operation) if values else None
-        return explaining.write(derive_convert(written, explaining.plan(output), own=poses[0], change=change), output)
+        return explaining.write(derive_convert(explaining.plan(output), written, own=poses[0], change=change), output)
     output.values(results)
     output.tell_of_lock(poses)
     return 0

@@ -41,7 +41,7 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
         from frametool.explain.derive import derive_interpolate
 
         first, last = all_given((a, b), degrees=deg, normalize=normalize)
-        explaining.write(derive_interpolate(first, last, fractions[0], plan), output)
+        explaining.write(derive_interpolate(plan, first, last, fractions[0]), output)
         return
     pairs = combinations((a, b), degrees=deg, normalize=normalize)
     output.poses([Result(interpolated(first, last, each)) for first, last in pairs for each in fractions])

@@ -37,7 +37,7 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
         from frametool.explain.derive import derive_invert
 
         written = given(pose, stream.given, degrees=deg, normalize=normalize)
-        return explaining.write(derive_invert(written, plan), output)
+        return explaining.write(derive_invert(plan, written), output)
     from frametool.stream.request import Operation, Request
 
     request = Request(

@@ -87,7 +87,7 @@ def command(
 
         arguments = [str(one_argument(each)) for each in (a, b)]
         given_a, given_b = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
-        return explaining.write(derive_relative(given_a, given_b, plan), output)
+        return explaining.write(derive_relative(plan, given_a, given_b), output)
     from frametool.stream.request import Request
 
     if velocity and not consecutive:
