@@ -83,7 +83,7 @@ class RowExpressions:
         problems = []
         for kind in kinds if self.reads_row else ("",):
             try:
-                self._plainly(kind)
+                self._for(Type(kind))
             except FrametoolError as error:
                 problems.append(error)
             else:
@@ -94,16 +94,16 @@ class RowExpressions:
         """Return whether a row of some kind becomes a pose, a point or a vector; "" for numbers alone."""
         if self.adds:
             return ""
-        kind = self._plainly(row).terms[0][1].type.kind
+        kind = self._for(Type(row)).terms[0][1].type.kind
         return kind if kind in (POSE, POINT, VECTOR) else ""
 
     def extras(self, row: str) -> tuple[str, ...]:
         """Name the numbers that come beside a pose or point."""
-        return self._plainly(row).extras
+        return self._for(Type(row)).extras
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         """Return the frames of the result of a row with these; raise CalcError where the expressions do not fit."""
-        known = self._plainly(row).frames
+        known = self._for(Type(row)).frames
         first = parent if parent in known else SOME
         second = name if name in known else SOME if name == parent else OTHER
         try:
@@ -122,16 +122,12 @@ class RowExpressions:
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
     ) -> Components:
         """Return the components of the result and then the extras; of floats raises CalcError where none are."""
-        bound = self._plainly(row)
+        bound = self._for(Type(row))
         values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp, {})
         if self.kind(row):
             return bound.terms[0][1].at(values)
         numbers = [number for _, term in bound.terms for number in self._numbers(term, values)]
         return (*(0.0,) * 7, *numbers)  # a row stays as it is: no pose of ours is written
-
-    def _plainly(self, row: str) -> Bound:
-        """Return the lines as understood for rows whose frames nobody said."""
-        return self._for(Type(row))
 
     def _for(self, type_: Type) -> Bound:
         """Understand the lines for rows of a type."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -94,11 +95,8 @@ def given(
 
     try:
         source = pose_source(one_argument(argument), notation, normalize=normalize)
-        if told:
+        with nullcontext() if told else heard_by(lambda *_: None):
             found = given_poses(source, degrees=degrees, normalize=normalize)
-        else:
-            with heard_by(lambda *_: None):
-                found = given_poses(source, degrees=degrees, normalize=normalize)
     except FormatError as error:
         raise usage_if_inline(error) from None
     if len(found) != 1:

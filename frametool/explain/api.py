@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain.derive import (
-    ByPose,
     ByTree,
     DerivationStyle,
     derive_apply,
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frametool.documents.source import Source
+    from frametool.explain.given import Given
     from frametool.explain.render import Explanation
 
 
@@ -69,13 +69,13 @@ def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind
     if len(operands) not in ((3, 4) if by_tree else (2,)):
         raise ValueInvalid("apply takes TREE TARGET [SOURCE] RECORD, or POSE RECORD")
     degrees = plan.style.degrees
-    way: ByTree | ByPose
+    way: ByTree | Given
     if by_tree:
         tree, target, *source, record = operands
         way = ByTree(tree, target, source[0] if source else None, at_ns)
     else:
         pose, record = operands
-        way = ByPose(given_pose(pose, degrees=degrees))
+        way = given_pose(pose, degrees=degrees)
     return derive_apply(plan, way, _record_source(record, kind), kind=kind, degrees=degrees)
 
 

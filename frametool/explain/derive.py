@@ -349,75 +349,36 @@ class ByTree(NamedTuple):
     source: str | None = None
     at_ns: int | None = None
 
-    def names(self, own: str | None) -> tuple[str, str]:
-        """Return target and source for a record given in a frame."""
-        if own and own.startswith("/") and own not in self.frames.frames:
-            own = own[1:]
-        source = own or self.source
-        if self.source is not None and source != self.source:
-            raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(self.source)}")
-        if source is None:
-            raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
-        return self.target, source
-
-    def components(self, names: tuple[str, str], stamp_ns: int | None) -> Rigid:
-        """Return target_from_source."""
-        return self.frames.lookup(*names, self._time(stamp_ns)).components
-
-    def write(self, sheet: Sheet, names: tuple[str, str], stamp_ns: int | None) -> Rigid:
-        """Add the derivation of target_from_source."""
-        return chain(sheet, self.frames, *names, self._time(stamp_ns))
-
-    def _time(self, stamp_ns: int | None) -> int | None:
-        return stamp_ns if self.at_ns is None else self.at_ns
-
-
-class ByPose(NamedTuple):
-    """Move by a pose as it is written."""
-
-    given: Given
-
-    def names(self, own: str | None) -> tuple[str, str]:
-        """Return target and source; a record's own frame must be that of the pose."""
-        pose = self.given.pose
-        if own and pose.name is not None and own != pose.name:
-            raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(pose.name)}")
-        return pose.parent or "a", own or pose.name or "b"
-
-    def components(self, _names: tuple[str, str], _stamp_ns: int | None) -> Rigid:
-        """Return the pose."""
-        return self.given.pose.components
-
-    def write(self, sheet: Sheet, names: tuple[str, str], _stamp_ns: int | None) -> Rigid:
-        """Add the way from what is written to the pose."""
-        target, source = map(printable, names)
-        sheet.heading("Given")
-        self.given.say(sheet, target, source)
-        return self.given.components(sheet, target, source)
-
 
 def derive_apply(
-    plan: DerivationStyle, way: ByTree | ByPose, source: Source, *, kind: str = "", degrees: bool = False,
+    plan: DerivationStyle, way: ByTree | Given, source: Source, *, kind: str = "", degrees: bool = False,
     normalize: bool = False, counters: bool = True, timeless: bool = False,
 ) -> Explanation:  # fmt: skip
     """Derive where a record is in the target's frame.
 
-    source: text that holds one record.  timeless: the stamp of its header does not matter.
+    way: a lookup, or a pose.  source: text that holds one record.  timeless: the stamp of its header does not matter.
     """
     request = Request(Operation(moves=True), kind=kind, degrees=degrees, normalize=normalize, counters=counters)
     records = [record for _, found in documents(source, request) for record in found]
     if len(records) != 1:
         raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")
     record = records[0]
-    names = way.names(record.parent.text)
-    stamp_ns = None if timeless else record.stamp_ns
-    if isinstance(way, ByTree) and way.frames.latest(*names) is None:
-        stamp_ns = None
-    mover = way.components(names, stamp_ns)
+    names = _target_and_source(way, record.parent.text)
     target, origin = map(printable, names)
+    at_ns = None if timeless else record.stamp_ns
+    if isinstance(way, Given):
+        mover = way.pose.components
+    else:
+        at_ns = None if way.frames.latest(*names) is None else at_ns
+        at_ns = at_ns if way.at_ns is None else way.at_ns
+        mover = way.frames.lookup(*names, at_ns).components
 
     def write(sheet: Sheet) -> None:
-        pose = way.write(sheet, names, stamp_ns)
+        if isinstance(way, Given):
+            _say_given(sheet, [way], [(target, origin)])
+            pose = way.components(sheet, target, origin)
+        else:
+            pose = chain(sheet, way.frames, *names, at_ns)
         sheet.reached(pose[:3])
         check_vector(sheet, pose[:3], mover[:3])
         if record.shape.kind == POSE:
@@ -426,6 +387,21 @@ def derive_apply(
             _move_vectors(sheet, pose, record, mover, (target, origin))
 
     return explained(plan, f"{record.shape.kind} in {target} of a {record.shape.kind} in {origin}", write)
+
+
+def _target_and_source(way: ByTree | Given, own: str | None) -> tuple[str, str]:
+    """Return target and source for a record given in a frame; where it names one, that must be the source."""
+    if isinstance(way, Given):
+        target, source = way.pose.parent or "a", way.pose.name
+    else:
+        target, source = way.target, way.source
+        if own and own.startswith("/") and own not in way.frames.frames:
+            own = own[1:]
+    if own and source is not None and own != source:
+        raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(source)}")
+    if not own and source is None and isinstance(way, ByTree):
+        raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
+    return target, own or source or "b"
 
 
 def _move_vectors(

@@ -48,7 +48,7 @@ TOO_LARGE = "the numbers are too large or too small for a derivation: a step is 
 
 
 class SheetHeading(NamedTuple):
-    """What the next steps are about; they are counted."""
+    """What the next steps are about, with its number."""
 
     text: str
 
@@ -121,6 +121,7 @@ class Sheet:
         self.items: list[Item] = []
         self.reach = 1.0
         self.stretch = 1.0
+        self._headings = 0
         self._about = ""
         self._warned: set[str] = set()
 
@@ -151,12 +152,13 @@ class Sheet:
 
     def heading(self, text: str) -> None:
         """Begin a part."""
-        self.items.append(SheetHeading(f"{self._about}: {text}" if self._about else text))
+        self._headings += 1
+        self.items.append(SheetHeading(f"{self._headings}. {self._about}{text}"))
 
     @contextmanager
     def about(self, what: str) -> Iterator[None]:
         """Name in the headings of a block what they are about."""
-        outer, self._about = self._about, f"{self._about}: {what}" if self._about else what
+        outer, self._about = self._about, f"{self._about}{what}: "
         yield
         self._about = outer
 
