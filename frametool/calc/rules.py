@@ -319,7 +319,12 @@ def _kind_of_sum(a: Type, b: Type, *, adding: bool) -> str:
     return a.kind if a.kind == b.kind else POINT
 
 
-OPERATORS = {"*": times, "/": over, "+": partial(_sum, adding=True), "-": partial(_sum, adding=False)}
+OPERATORS: dict[str, Callable[[Term, Term, Trees], Term]] = {
+    "*": times,
+    "/": over,
+    "+": partial(_sum, adding=True),
+    "-": partial(_sum, adding=False),
+}
 
 
 def negated(term: Term) -> Term:
@@ -374,13 +379,16 @@ def power(base: Term, exponent: Term) -> Term:
 
 def _part_of_motion(*numbers: Number) -> Components:
     *pose, fraction, xp = numbers
-    return rigid.exp(*(fraction * part for part in rigid.log(*unit_pose(*pose, xp), xp)), xp)
+    vx, vy, vz, wx, wy, wz = (fraction * part for part in rigid.log(*unit_pose(*pose, xp), xp))
+    return rigid.exp(vx, vy, vz, wx, wy, wz, xp)
 
 
-def unit_pose(
-    tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, xp: Namespace
-) -> Rigid:  # fmt: skip
-    """Return a pose with its quaternion made unit, which products keep only to some eps."""
+def unit_pose(*parts: Number) -> Rigid:
+    """Return a pose with its quaternion made unit, which products keep only to some eps.
+
+    parts: of the pose, and the namespace
+    """
+    tx, ty, tz, x, y, z, w, xp = parts
     return tx, ty, tz, *quaternion.unit(x, y, z, w, xp)
 
 

@@ -146,7 +146,7 @@ def end(sheet: Sheet, own: Result, plan: DerivationStyle) -> None:
     for each in plan.notations:
         rows += _rotation_rows(own, each, plan.style)
     rows += [row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
-    rows += covariance_rows(own.extras.get("covariance", ()))
+    rows += _rows("covariance", own.extras.get("covariance", ()), 6)
     sheet.result(named, rows)
 
 
@@ -155,19 +155,16 @@ def row(label: str, names: Sequence[str], numbers: Sequence[float], unit: str = 
     return Row(label, [(name, repr(number + 0.0)) for name, number in zip(names, numbers, strict=True)], unit)
 
 
-def covariance_rows(numbers: Sequence[float]) -> list[Row]:
-    """Return a covariance as six rows."""
-    return [row("covariance" * (not at), [""] * 6, numbers[at : at + 6]) for at in range(0, len(numbers), 6)]
+def _rows(label: str, numbers: Sequence[float], size: int) -> list[Row]:
+    """Return a matrix as rows of a size, the label at the first."""
+    return [row(label * (not at), [""] * size, numbers[at : at + size]) for at in range(0, len(numbers), size)]
 
 
 def _rotation_rows(own: Result, form: Notation, style: Style) -> list[Row]:
     """Return the lines of one notation; a matrix has several, and so has an axis with its angle."""
     _, numbers = pose_numbers(own.pose, form, style)
     if form.representation.whole is not None:
-        size = math.isqrt(len(numbers))
-        return [
-            row(form.spec * (not at), [""] * size, numbers[at : at + size]) for at in range(0, len(numbers), size)
-        ]
+        return _rows(form.spec, numbers, math.isqrt(len(numbers)))
     angles = form.representation.angles
     first = angles[0] if angles else len(numbers)
     unit = DEGREES if style.in_degrees(form) else RADIANS
@@ -422,7 +419,7 @@ def _move_vectors(
     ]
     if shape.covariance:
         _check_covariance(sheet, twist_covariance(sheet, pose, covariance), own[len(found) :])
-        rows += covariance_rows(own[len(found) :])
+        rows += _rows("covariance", own[len(found) :], 6)
     sheet.result(f"in {frames[0]}", rows)
 
 

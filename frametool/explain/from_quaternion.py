@@ -52,7 +52,7 @@ def canonical(sheet: Sheet, q: Quaternion, first: float | None = None) -> Quater
     if (_first(q) if first is None else first) >= 0.0:
         return q
     values = dict(zip(XYZW, q, strict=True))
-    x, y, z, w = (sheet.step(values, f"q{name}", f"-{name}") for name in XYZW)
+    x, y, z, w = sheet.each(values, XYZW, "q%", "-%")
     sheet.caveat(COVER)
     return x, y, z, w
 
@@ -125,8 +125,8 @@ def _by_halves(
         sheet.step(values, "h", "sqrt((a**2 + b**2)*(c**2 + d**2))")
         sheet.step(values, "k", f"2*(w*{vj} {plus} {vi}*{vk})")
         sheet.step(values, middle, "atan2(k, h)", RADIANS)
-    a, b, c, d, *q = (values[name] for name in ("a", "b", "c", "d", *XYZW))
-    if kernel.locked(*q, axes):  # the third angle is 0, the first twice that of the pair that is left
+    a, b, c, d, x, y, z, w = (values[name] for name in ("a", "b", "c", "d", *XYZW))
+    if kernel.locked(x, y, z, w, axes):  # the third angle is 0, the first twice that of the pair that is left
         by_difference = "atan2(-2*c*d, c**2 - d**2)" if static else "atan2(2*c*d, c**2 - d**2)"
         by_sum = a * a + b * b > c * c + d * d
         sheet.step(values, first, "atan2(2*a*b, a**2 - b**2)" if by_sum else by_difference, RADIANS)
@@ -178,7 +178,7 @@ def rotvec(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
         return 0.0, 0.0, 0.0
     angles(sheet, values, ["angle"], degrees=degrees)
     suffix, unit = ("_deg", DEGREES) if degrees else ("", RADIANS)
-    return [sheet.step(values, f"r{name}{suffix}", f"v{name}*angle{suffix}", unit) for name in XYZ]
+    return sheet.each(values, XYZ, f"r%{suffix}", f"v%*angle{suffix}", unit)
 
 
 def mrp(sheet: Sheet, q: Quaternion) -> Sequence[float]:
@@ -186,7 +186,7 @@ def mrp(sheet: Sheet, q: Quaternion) -> Sequence[float]:
     sheet.heading("Quaternion to modified Rodrigues parameters")
     sheet.say("p = v tan(angle/4): with w >= 0 the shorter turn, and |p| at most 1.")
     values = dict(zip(XYZW, canonical(sheet, q), strict=True))
-    return [sheet.step(values, f"p{name}", f"{name}/(1 + w)") for name in XYZ]
+    return sheet.each(values, XYZ, "p%", "%/(1 + w)")
 
 
 def six_d(sheet: Sheet, q: Quaternion) -> Sequence[float]:

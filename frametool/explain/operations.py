@@ -5,6 +5,7 @@ And of what moves the content of a record into another frame: points, vectors, t
 
 from __future__ import annotations
 
+from itertools import product as pairs
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.explain.sheet import METRES, RADIANS, Sheet, transposed, upright
@@ -115,7 +116,7 @@ def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> 
               "digits.")  # fmt: skip
     sheet.say("d = tb - ta")
     values = _named("a", a[:3], XYZ) | _named("b", b[:3], XYZ)
-    apart = [sheet.step(values, f"d{name}", f"b{name} - a{name}", METRES) for name in XYZ]
+    apart = sheet.each(values, XYZ, "d%", "b% - a%", METRES)
     back = transposed(of_quaternion(sheet, a[3:]))
     x, y, z = _times(sheet, back, apart, "t", ("R(A)^T d", r"R(A)^{\mathsf T}\,d"), METRES)
     sheet.caveat(INVERSE)
@@ -145,8 +146,8 @@ def line(sheet: Sheet, a: Sequence[float], b: Sequence[float], fraction: float) 
     """Interpolate positions along the line, from the nearer end."""
     sheet.heading("Position: along the straight line")
     values = {"f": fraction} | _named("a", a, XYZ) | _named("b", b, XYZ)
-    nearer = "a{0} + f*(b{0} - a{0})" if fraction < 0.5 else "b{0} - (1 - f)*(b{0} - a{0})"
-    x, y, z = (sheet.step(values, f"t{name}", nearer.format(name), METRES) for name in XYZ)
+    nearer = "a% + f*(b% - a%)" if fraction < 0.5 else "b% - (1 - f)*(b% - a%)"
+    x, y, z = sheet.each(values, XYZ, "t%", nearer, METRES)
     return x, y, z
 
 
@@ -159,15 +160,13 @@ def slerp(sheet: Sheet, a: Quaternion, b: Quaternion, fraction: float) -> Quater
     if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + 0.0 < 0.0:
         sheet.say("dot < 0: the arc to -b, the same rotation, is the shorter one (double cover).")
         other = "n"
-        for name in XYZW:
-            sheet.step(values, f"n{name}", f"-b{name}")
+        sheet.each(values, XYZW, "n%", "-b%")
     else:
         sheet.say("dot >= 0: the arc to b is not longer than that to -b (double cover).")
     if abs(values["dot"]) < NEARLY_ZERO:
         sheet.caveat(HALF_TURN)
-    for letter, sign in (("m", "-"), ("p", "+")):
-        for name in XYZW:
-            sheet.step(values, f"{letter}{name}", f"{other}{name} {sign} a{name}")
+    sheet.each(values, XYZW, "m%", f"{other}% - a%")
+    sheet.each(values, XYZW, "p%", f"{other}% + a%")
     sheet.step(values, "minus", norm([f"m{name}" for name in XYZW]))
     sheet.step(values, "plus", norm([f"p{name}" for name in XYZW]))
     sheet.step(values, "arc", "2*atan2(minus, plus)", RADIANS)
@@ -179,7 +178,7 @@ def slerp(sheet: Sheet, a: Quaternion, b: Quaternion, fraction: float) -> Quater
         sheet.say("The rotations are the same: the weights are those of a straight line.")
         sheet.step(values, "ka", "1 - f")
         sheet.step(values, "kb", "f")
-    x, y, z, w = (sheet.step(values, f"q{name}", f"ka*a{name} + kb*{other}{name}") for name in XYZW)
+    x, y, z, w = sheet.each(values, XYZW, "q%", f"ka*a% + kb*{other}%")
     return x, y, z, w
 
 
@@ -233,15 +232,14 @@ def pose_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequ
     """Turn each 3x3 block C into R C R^T."""
     sheet.heading("The covariance: each 3x3 block C becomes R C R^T")
     turn = of_quaternion(sheet, pose[3:])
-    found = [[0.0] * 6 for _ in range(6)]
-    for top, rows in ((0, "position"), (3, "rotation")):
-        for left, columns in ((0, "position"), (3, "rotation")):
-            block = [list(numbers[6 * (top + i) + left : 6 * (top + i) + left + 3]) for i in range(3)]
-            sheet.say(f"{rows} with {columns}:")
-            made = _sandwich(sheet, turn, block, "R C R^T", r"R\,C\,R^{\mathsf T}")
-            for i, row in enumerate(made):
-                found[top + i][left : left + 3] = row
-    return [entry for row in found for entry in row]
+    found = [0.0] * 36
+    for top, left in pairs((0, 3), repeat=2):
+        sheet.say(f"{'rotation' if top else 'position'} with {'rotation' if left else 'position'}:")
+        places = [slice(at + left, at + left + 3) for at in range(6 * top, 6 * top + 18, 6)]
+        made = _sandwich(sheet, turn, [list(numbers[place]) for place in places], "R C R^T", r"R\,C\,R^{\mathsf T}")
+        for place, row in zip(places, made, strict=True):
+            found[place] = row
+    return found
 
 
 def twist_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:

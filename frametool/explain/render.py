@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain.formula_tree import latex_number
-from frametool.explain.sheet import Caveat, MatrixLine, Sentence, SheetHeading, SheetResult, SheetStep
+from frametool.explain.sheet import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 INDENT = "   "
-INDENTS = {SheetHeading: ("", INDENT), Sentence: (INDENT, INDENT), Caveat: (f"{INDENT}! ", f"{INDENT}  ")}
+INDENTS = {HEADING: ("", INDENT), SENTENCE: (INDENT, INDENT), CAVEAT: (f"{INDENT}! ", f"{INDENT}  ")}
 
 
 def text_of(items: Sequence[Item]) -> str:
     """Return a derivation as text."""
     lines: list[str] = []
-    for kind, group in groupby(items, type):
-        if kind is SheetStep:
-            lines += _steps(list(group))
+    for is_step, group in groupby(items, lambda item: isinstance(item, SheetStep)):
+        if is_step:
+            lines += _steps([item for item in group if isinstance(item, SheetStep)])
         else:
             lines += [line for item in group for line in _lines(item)]
     return "\n".join(lines).lstrip("\n") + "\n"
@@ -36,11 +36,11 @@ def text_of(items: Sequence[Item]) -> str:
 
 def _lines(item: Item) -> list[str]:
     """Return the lines of what is no step."""
-    if isinstance(item, MatrixLine):
-        return _grid(item)
+    if isinstance(item, Words):
+        return [""] * (item.kind == HEADING) + _wrapped(item.text, *INDENTS[item.kind])
     if isinstance(item, SheetResult):
         return ["", *_wrapped(f"Result: {item.text}" if item.text else "Result", "", INDENT), *result_lines(item.rows)]
-    return [""] * isinstance(item, SheetHeading) + _wrapped(item.text, *INDENTS[type(item)])
+    return _grid(item) if isinstance(item, MatrixLine) else []
 
 
 def _wrapped(text: str, first: str, further: str) -> list[str]:
@@ -217,15 +217,16 @@ def _document(explanation: Explanation, markup: Markup) -> str:
     parts = []
     for is_formula, group in groupby(explanation.items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
         if is_formula:
-            parts.append(markup.formulas % " \\\\\n".join(line for item in group for line in _aligned(item)))
+            lines = [line for item in group if not isinstance(item, (Words, SheetResult)) for line in _aligned(item)]
+            parts.append(markup.formulas % " \\\\\n".join(lines))
             continue
         for item in group:
-            text = markup.escape(item.text)
-            if isinstance(item, SheetResult):
+            if isinstance(item, Words):
+                parts.append(markup.words[item.kind] % markup.escape(item.text))
+            elif isinstance(item, SheetResult):
                 lines = [line.removeprefix(INDENT) for line in result_lines(item.rows)]
-                parts.append(markup.result % (f": {text}" if text else "", markup.table(lines)))
-            else:
-                parts.append(markup.words[type(item)] % text)
+                head = f": {markup.escape(item.text)}" if item.text else ""
+                parts.append(markup.result % (head, markup.table(lines)))
     return markup.document % (markup.escape(explanation.title), "\n\n".join(parts))
 
 
@@ -265,7 +266,7 @@ class Markup(NamedTuple):
     """A language with formulas: templates of a document, of its parts and of the result, and how text is escaped."""
 
     document: str
-    words: Mapping[type, str]
+    words: Mapping[str, str]
     formulas: str
     result: str
     escape: Callable[[str], str]
@@ -274,7 +275,7 @@ class Markup(NamedTuple):
 
 MARKDOWN = Markup(
     document="## %s\n\n%s\n",
-    words={SheetHeading: "### %s", Sentence: "%s", Caveat: "> **Note.** %s"},
+    words={HEADING: "### %s", SENTENCE: "%s", CAVEAT: "> **Note.** %s"},
     formulas="$$\n\\begin{aligned}\n%s\n\\end{aligned}\n$$",
     result="**Result**%s\n\n```text\n%s\n```",
     escape=_markdown_text,
@@ -282,7 +283,7 @@ MARKDOWN = Markup(
 )
 LATEX = Markup(
     document=PREAMBLE + "\\section*{%s}\n\n%s\n\\end{document}\n",
-    words={SheetHeading: r"\subsection*{%s}", Sentence: "%s", Caveat: r"\emph{Note.} %s"},
+    words={HEADING: r"\subsection*{%s}", SENTENCE: "%s", CAVEAT: r"\emph{Note.} %s"},
     formulas="\\begin{align*}\n%s\n\\end{align*}",
     result="\\textbf{Result}%s\n\n{\\ttfamily\n%s\n\\par}",
     escape=_latex_text,

@@ -43,25 +43,15 @@ def symbol(name: str) -> str:
 
 
 METRES, RADIANS, DEGREES = "m", "rad", "deg"
+HEADING, SENTENCE, CAVEAT = "heading", "sentence", "caveat"
 DIGITS = 6  # significant ones, unless told
 TOO_LARGE = "the numbers are too large or too small for a derivation: a step is not finite"
 
 
-class SheetHeading(NamedTuple):
-    """What the next steps are about, with its number."""
+class Words(NamedTuple):
+    """What is said: a heading with its number, a sentence, or a caveat, which is what is easily got wrong."""
 
-    text: str
-
-
-class Sentence(NamedTuple):
-    """A line of words."""
-
-    text: str
-
-
-class Caveat(NamedTuple):
-    """What is easily got wrong here."""
-
+    kind: str
     text: str
 
 
@@ -100,7 +90,7 @@ class SheetResult(NamedTuple):
     rows: Sequence[Row]
 
 
-Item: TypeAlias = SheetHeading | Sentence | Caveat | SheetStep | MatrixLine | SheetResult
+Item: TypeAlias = Words | SheetStep | MatrixLine | SheetResult
 
 
 class Sheet:
@@ -153,7 +143,7 @@ class Sheet:
     def heading(self, text: str) -> None:
         """Begin a part."""
         self._headings += 1
-        self.items.append(SheetHeading(f"{self._headings}. {self._about}{text}"))
+        self.items.append(Words(HEADING, f"{self._headings}. {self._about}{text}"))
 
     @contextmanager
     def about(self, what: str) -> Iterator[None]:
@@ -168,13 +158,13 @@ class Sheet:
 
     def say(self, text: str) -> None:
         """Add a sentence."""
-        self.items.append(Sentence(text))
+        self.items.append(Words(SENTENCE, text))
 
     def caveat(self, text: str) -> None:
         """Add a caveat, once a sheet."""
         if text not in self._warned:
             self._warned.add(text)
-            self.items.append(Caveat(text))
+            self.items.append(Words(CAVEAT, text))
 
     def step(self, values: Values, name: str, formula: str, unit: str = "", *, exactly: str = "") -> float:
         """Add a step and keep its value under its name.
@@ -198,6 +188,10 @@ class Sheet:
         texts, latex = [*texts, digits[name]], [*latex, latex_number(digits[name])]
         self.items.append(SheetStep(name, texts, symbol(name), latex, unit))
         return value
+
+    def each(self, values: Values, names: Sequence[str], name: str, formula: str, unit: str = "") -> list[float]:
+        """Add one step for each of some names, which stand in the place of %."""
+        return [self.step(values, name.replace("%", each), formula.replace("%", each), unit) for each in names]
 
     def grid(self, name: str, text: str, latex: str, parts: Sequence[str | Matrix], unit: str = "") -> None:
         """Add matrices side by side; the last one is the value."""

@@ -171,8 +171,7 @@ def _axis_and_angle(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) ->
 def _about_axis(sheet: Sheet, values: Values) -> Quaternion:
     """Add the quaternion of the unit axis vx, vy, vz and `angle`."""
     sine_and_cosine(sheet, values, "angle", "s", "w")
-    for name in XYZ:
-        sheet.step(values, name, f"v{name}*s")
+    sheet.each(values, XYZ, "%", "v%*s")
     sheet.caveat(HALF)
     return _unit(sheet, values)
 
@@ -219,13 +218,11 @@ def six_d(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     sheet.say(GRAM_SCHMIDT)
     direction(sheet, values, ("ax", "ay", "az"), ("ux", "uy", "uz"), "n")
     sheet.step(values, "d", "ux*bx + uy*by + uz*bz")
-    for name in XYZ:
-        sheet.step(values, f"e{name}", f"b{name} - d*u{name}")
+    sheet.each(values, XYZ, "e%", "b% - d*u%")
     direction(sheet, values, ("ex", "ey", "ez"), ("vx", "vy", "vz"), "l")
     if sheet.step(values, "f", "ux*vx + uy*vy + uz*vz"):
         sheet.say("The columns are nearly parallel; what is left along the first is taken out again.")
-        for name in XYZ:
-            sheet.step(values, f"g{name}", f"v{name} - f*u{name}")
+        sheet.each(values, XYZ, "g%", "v% - f*u%")
     second = "g" if "gx" in values else "v"
     for name, a, b in CYCLES:
         sheet.step(values, f"w{name}", f"u{a}*{second}{b} - u{b}*{second}{a}")
@@ -242,8 +239,7 @@ def mrp(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     sheet.heading("Modified Rodrigues parameters to quaternion")
     sheet.say("p = v tan(angle/4), v a unit axis; so |p| = 1 is half a turn.")
     sheet.step(values, "pp", "px**2 + py**2 + pz**2")
-    for name in XYZ:
-        sheet.step(values, name, f"2*p{name}/(1 + pp)")
+    sheet.each(values, XYZ, "%", "2*p%/(1 + pp)")
     sheet.step(values, "w", "(1 - pp)/(1 + pp)")
     return _unit(sheet, values)
 
