@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, Self
 
-from frametool.calc.evaluate import Literals, Scope, evaluate, evaluate_line, read_line
+from frametool.calc.evaluate import Scope, evaluate, evaluate_line, read_line
 from frametool.calc.parser import RADIAN, frame_text
 from frametool.calc.rules import in_radians
 from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, Term, Type, unit_text
@@ -131,11 +131,8 @@ def calc(
     Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`.
     Raises CalcError for frames or units that do not fit, LookupFailed.
     """
-    scope = Scope(
-        tree=tree,
-        names={name: _term(name, value) for name, value in names.items()},
-        literals=Literals(degrees=degrees, normalize=normalize),
-    )
+    terms = {name: _term(name, value) for name, value in names.items()}
+    scope = Scope(tree=tree, names=terms, degrees=degrees, normalize=normalize)
     for name in names:
         read_line(f"{name}=0")  # refuses what has a meaning of its own
     return _result(evaluate_line(read_line(text), scope))

@@ -11,7 +11,7 @@ evaluate("inv(map<-base_link) * (map<-tool)", scope).type      # base_link<-tool
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.calc import rules
 from frametool.calc.functions import FUNCTIONS
@@ -40,35 +40,8 @@ AXES = ("x", "y", "z")
 PLACED = {"point": (POINT, AXES), "vector": (VECTOR, AXES), "twist": (TWIST, ("vx", "vy", "vz", "wx", "wy", "wz"))}
 
 
-class Literals(NamedTuple):
-    """How literals are read: what bare angles are, and whether rotations that are off are accepted."""
-
-    degrees: bool = False
-    normalize: bool = False
-
-    def read(self, text: str) -> Term:
-        """Read one literal; raises CalcError."""
-        reading = Reading(Source(NAME, text), degrees=self.degrees, normalize=self.normalize)
-        try:
-            (document,) = parse_documents(text, NAME)
-            term = _read(document.value, reading)
-        except FormatError as error:
-            raise CalcError(error.message) from None
-        except Misfit as misfit:
-            raise CalcError(str(misfit)) from None
-        for note in reading.notes:
-            warn(note.message)
-        return term
-
-    def of_document(self, value: Any, source: Source) -> Term:
-        """Read a document as a literal; raises FormatError with the place."""
-        try:
-            return _read(value, Reading(source, degrees=self.degrees, normalize=self.normalize))
-        except Misfit as misfit:
-            raise misfit.placed(source, 0) from None
-
-
-def _read(value: Any, reading: Reading) -> Term:
+def literal(value: Any, reading: Reading) -> Term:
+    """Read a pose, or a point, a vector or a twist as results are written; raises Misfit."""
     if type(value) is not dict:
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(value)}")
     key = next((key for key in PLACED if key in value), "")
@@ -94,23 +67,31 @@ class Scope:
 
     names: of values and trees; it grows as lines bind
     row: the type of a row; None outside of streams
+    degrees, normalize: of literals: what bare angles are, and whether rotations that are off are accepted
     seen: the frames of all that was evaluated
     """
 
     def __init__(
-        self, *, tree: Frames | None = None, names: dict[str, Term] | None = None, literals: Literals | None = None,
-        row: Type | None = None,
+        self, *, tree: Frames | None = None, names: dict[str, Term] | None = None, row: Type | None = None,
+        degrees: bool = False, normalize: bool = False,
     ) -> None:  # fmt: skip
         """Begin with a tree and names."""
         self.tree = tree
         self.names = {} if names is None else names
-        self.literals = literals or Literals()
         self.row = row
+        self.degrees = degrees
+        self.normalize = normalize
         self.seen: set[str | None] = {None}
 
     def with_row(self, row: Type) -> Scope:
         """Return the same scope for rows of a type, its names its own."""
-        return Scope(tree=self.tree, names=dict(self.names), literals=self.literals, row=row)
+        return Scope(
+            tree=self.tree, names=dict(self.names), row=row, degrees=self.degrees, normalize=self.normalize
+        )  # fmt: skip
+
+    def reading(self, source: Source) -> Reading:
+        """Return how the literals of a text are read."""
+        return Reading(source, degrees=self.degrees, normalize=self.normalize)
 
     @property
     def trees(self) -> list[tuple[str, Frames]]:
@@ -237,7 +218,17 @@ class _Walk:
         return Term(PLAIN_NUMBER, None, lambda row: (row.cells[name],))
 
     def _pose(self, branch: Branch) -> Term:
-        return self.scope.literals.read(branch.value)
+        reading = self.scope.reading(Source(NAME, branch.value))
+        try:
+            (document,) = parse_documents(branch.value, NAME)
+            term = literal(document.value, reading)
+        except FormatError as error:
+            raise CalcError(error.message) from None
+        except Misfit as misfit:
+            raise CalcError(str(misfit)) from None
+        for note in reading.notes:
+            warn(note.message)
+        return term
 
     def _list(self, branch: Branch) -> Term:
         items = tuple(map(self._value, branch.parts))

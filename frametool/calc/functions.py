@@ -7,20 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from frametool.calc import rules
 from frametool.calc.parser import METRE, RADIAN, CalcError
-from frametool.calc.rules import (
-    PLACED,
-    common,
-    in_radians,
-    inverse,
-    need,
-    one_target,
-    raised,
-    same_frames,
-    scalar,
-    unit_pose,
-    wanted,
-)
 from frametool.calc.values import (
     ANGLES,
     LIST,
@@ -54,7 +42,7 @@ def trigonometric(pick: Callable[[Number, Number], Number]) -> Rule:
     """Return the rule of a function of an angle, made of its sine and cosine; exact at quarter turns in degrees."""
 
     def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
-        angle = scalar(wanted(terms[0]), f"{name}()", angle=True)
+        angle = rules.scalar(rules.wanted(terms[0]), f"{name}()", angle=True)
         halved = trig.half_sincos_deg if angle.type.degrees else trig.half_sincos
         return made(PLAIN_NUMBER, lambda value, xp: (pick(*halved(2.0 * value, xp)),), angle)
 
@@ -68,7 +56,7 @@ def arc(kernel: Callable[..., Number], bound: float | None) -> Rule:
         def check(value: float) -> str:
             return f"{name}() takes -1 .. 1, found {value:g}" if bound is not None and abs(value) > bound else ""
 
-        number = scalar(wanted(terms[0]), f"{name}()")
+        number = rules.scalar(rules.wanted(terms[0]), f"{name}()")
         return made(ANGLE, lambda value, xp: (kernel(value, xp),), number, check=check)
 
     return rule
@@ -98,8 +86,8 @@ def sqrt(name: str, terms: Sequence[Term], _: Trees) -> Term:
     def check(value: float) -> str:
         return f"{name}() takes what is not negative, found {value:g}" if value < 0.0 else ""
 
-    number = in_radians(need(wanted(terms[0]), (NUMBER,), name))
-    type_ = Type(NUMBER, unit=raised(number.type.unit, 0.5))
+    number = rules.in_radians(rules.need(rules.wanted(terms[0]), (NUMBER,), name))
+    type_ = Type(NUMBER, unit=rules.raised(number.type.unit, 0.5))
     return made(type_, lambda value, xp: (xp.sqrt(value),), number, check=check)
 
 
@@ -120,7 +108,7 @@ def of_one(kinds: Sequence[str], type_of: Callable[[Type], Type], kernel: Kernel
     """Return the rule of a function of one pose, point or vector."""
 
     def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
-        term = need(terms[0], kinds, name)
+        term = rules.need(terms[0], kinds, name)
         return made(type_of(term.type), kernel, term)
 
     return rule
@@ -147,29 +135,30 @@ def _interp(name: str, terms: Sequence[Term], trees: Trees) -> Term:
         return tuple(a + f * (b - a) for a, b in zip(numbers[:3], numbers[3:6], strict=True))
 
     a, b, fraction = terms
-    if a.type.kind == b.type.kind and a.type.kind in PLACED:
-        type_ = a.type._replace(target=common(a, b, trees))
-        return arithmetic(type_, line, a, b, scalar(fraction, "a fraction"))
-    type_ = same_frames([need(a, (POSE,), name), need(b, (POSE,), name)], f"{name}()")
-    return made(type_, rigid.interpolate, a, b, scalar(fraction, "a fraction"))
+    if a.type.kind == b.type.kind and a.type.kind in rules.PLACED:
+        type_ = a.type._replace(target=rules.common(a, b, trees))
+        return arithmetic(type_, line, a, b, rules.scalar(fraction, "a fraction"))
+    type_ = rules.same_frames([rules.need(a, (POSE,), name), rules.need(b, (POSE,), name)], f"{name}()")
+    return made(type_, rigid.interpolate, a, b, rules.scalar(fraction, "a fraction"))
 
 
 def _mean(name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    each = terms[0].items if len(terms) == 1 and terms[0].type.kind == LIST else tuple(map(wanted, terms))
+    each = terms[0].items if len(terms) == 1 and terms[0].type.kind == LIST else tuple(map(rules.wanted, terms))
     if not each:
         raise CalcError("mean() of nothing")
     type_ = each[0].type
-    kind = type_.kind if type_.kind in (*PLACED, NUMBER) else POSE
+    kind = type_.kind if type_.kind in (*rules.PLACED, NUMBER) else POSE
     for term in each:
-        need(term, (kind,), name)
+        rules.need(term, (kind,), name)
     if kind == POSE:
-        return made(same_frames(each, f"{name}()"), _mean_pose, *each)
+        return made(rules.same_frames(each, f"{name}()"), _mean_pose, *each)
     for term in each[1:]:
         if kind == NUMBER and term.type.unit != type_.unit:
             raise CalcError(f"mean() of {type_.named} and {term.type.named}")
         if kind != NUMBER:
-            type_ = type_._replace(target=common(Term(type_, text=each[0].text), term, trees))
-    return arithmetic(type_._replace(degrees=False), _mean_parts(1 if kind == NUMBER else 3), *map(in_radians, each))
+            type_ = type_._replace(target=rules.common(Term(type_, text=each[0].text), term, trees))
+    kernel = _mean_parts(1 if kind == NUMBER else 3)
+    return arithmetic(type_._replace(degrees=False), kernel, *map(rules.in_radians, each))
 
 
 def _mean_parts(width: int) -> Kernel:
@@ -198,35 +187,35 @@ def _dist(name: str, terms: Sequence[Term], trees: Trees) -> Term:
         ax, ay, az, bx, by, bz, xp = numbers
         return (quaternion.magnitude(bx - ax, by - ay, bz - az, xp),)
 
-    a, b = (need(each, (POSE, POINT), name) for each in terms)
+    a, b = (rules.need(each, (POSE, POINT), name) for each in terms)
     if a.type.kind != b.type.kind:
         raise CalcError(f"{name}() compares two poses or two points, found {a.type.named} and {b.type.named}")
     if a.type.kind == POSE:
-        one_target(a, b, f"{name}()", trees)
+        rules.one_target(a, b, f"{name}()", trees)
         return made(LENGTH, lambda *numbers: (rigid.distance(*numbers)[0],), a, b)
-    common(a, b, trees)
+    rules.common(a, b, trees)
     return made(LENGTH, points, a, b)
 
 
 def _angle(name: str, terms: Sequence[Term], trees: Trees) -> Term:
     def own(*pose: Number) -> Components:
-        return (rigid.extent(*unit_pose(*pose), pose[-1])[1],)
+        return (rigid.extent(*rules.unit_pose(*pose), pose[-1])[1],)
 
     def poses(*both: Number) -> Components:
         xp = both[-1]
-        return (rigid.distance(*unit_pose(*both[:7], xp), *unit_pose(*both[7:]), xp)[1],)
+        return (rigid.distance(*rules.unit_pose(*both[:7], xp), *rules.unit_pose(*both[7:]), xp)[1],)
 
     if len(terms) == 1:
-        if terms[0].type.kind in PLACED:
+        if terms[0].type.kind in rules.PLACED:
             raise CalcError(f"{name}() takes a pose, two poses or two vectors; found one {terms[0].type.kind}")
-        return made(ANGLE, own, need(terms[0], (POSE,), name))
-    a, b = (need(each, (POSE, VECTOR, POINT), name) for each in terms)
+        return made(ANGLE, own, rules.need(terms[0], (POSE,), name))
+    a, b = (rules.need(each, (POSE, VECTOR, POINT), name) for each in terms)
     if (a.type.kind == POSE) != (b.type.kind == POSE):
         raise CalcError(f"{name}() compares two poses or two vectors, found {a.type.named} and {b.type.named}")
     if a.type.kind == POSE:
-        one_target(a, b, f"{name}()", trees)
+        rules.one_target(a, b, f"{name}()", trees)
         return made(ANGLE, poses, a, b)
-    common(a, b, trees)
+    rules.common(a, b, trees)
     return made(ANGLE, _between_vectors, a, b, check=_no_direction)
 
 
@@ -246,28 +235,28 @@ def _between_vectors(
 
 
 def _cross(name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    a, b = (need(each, PLACED, name) for each in terms)
-    return arithmetic(Type(VECTOR, common(a, b, trees)), quaternion.cross, a, b)
+    a, b = (rules.need(each, rules.PLACED, name) for each in terms)
+    return arithmetic(Type(VECTOR, rules.common(a, b, trees)), quaternion.cross, a, b)
 
 
 def _dot(name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    a, b = (need(each, PLACED, name) for each in terms)
-    common(a, b, trees)
+    a, b = (rules.need(each, rules.PLACED, name) for each in terms)
+    rules.common(a, b, trees)
     return arithmetic(PLAIN_NUMBER, lambda ax, ay, az, bx, by, bz: (ax * bx + ay * by + az * bz,), a, b)
 
 
 def _inv(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    return inverse(need(terms[0], (POSE,), name))
+    return rules.inverse(rules.need(terms[0], (POSE,), name))
 
 
 _POSE = (POSE,)
 _trans = of_one(_POSE, lambda pose: Type(POINT, pose.target), lambda *pose: pose[:3])
 _rot = of_one(_POSE, lambda pose: pose, _without_shift)
-_log = of_one(_POSE, lambda pose: Type(TWIST, pose.target), lambda *pose: rigid.log(*unit_pose(*pose), pose[-1]))
+_log = of_one(_POSE, lambda pose: Type(TWIST, pose.target), lambda *pose: rigid.log(*rules.unit_pose(*pose), pose[-1]))
 _rpy = of_one(_POSE, lambda pose: Type(ANGLES, pose.target),
-              lambda *pose: euler.from_quaternion(*unit_pose(*pose)[3:], "sxyz", pose[-1]))  # fmt: skip
-_norm = of_one(PLACED, lambda _: LENGTH, lambda *vector: (quaternion.magnitude(*vector),))
-_vector = of_one(PLACED, lambda placed: placed._replace(kind=VECTOR), lambda *vector: vector[:3])
+              lambda *pose: euler.from_quaternion(*rules.unit_pose(*pose)[3:], "sxyz", pose[-1]))  # fmt: skip
+_norm = of_one(rules.PLACED, lambda _: LENGTH, lambda *vector: (quaternion.magnitude(*vector),))
+_vector = of_one(rules.PLACED, lambda placed: placed._replace(kind=VECTOR), lambda *vector: vector[:3])
 
 
 FUNCTIONS = {

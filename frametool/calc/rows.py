@@ -53,15 +53,9 @@ class RowExpressions:
     """
 
     def __init__(
-        self,
-        lines: Sequence[Line],
-        bindings: Sequence[Line],
-        scope: Scope,
-        *,
-        notations: tuple[Notation, ...] = (),
-        degrees: bool = False,
-        keep_sign: bool = False,
-    ) -> None:
+        self, lines: Sequence[Line], bindings: Sequence[Line], scope: Scope, *, notations: tuple[Notation, ...] = (),
+        degrees: bool = False, keep_sign: bool = False,
+    ) -> None:  # fmt: skip
         """Keep the lines; how results are written says how poses beside rows are."""
         self.lines = tuple(lines)
         self.bindings = tuple(bindings)

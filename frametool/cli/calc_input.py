@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.calc.api import line_of_value, plain_result
-from frametool.calc.evaluate import PLACED, Scope, evaluate_line, read_line, term_of_pose
+from frametool.calc.evaluate import PLACED, Scope, evaluate_line, literal, read_line, term_of_pose
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import LONGEST, CalcError, frame_text
 from frametool.calc.rules import wanted
@@ -30,6 +30,7 @@ from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, decode, opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 from frametool.formats.table import FORMATS
+from frametool.grammar.readers import Misfit
 from frametool.grammar.result import Result
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
 
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from frametool.calc.evaluate import Literals
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
     from frametool.documents.source import Source
@@ -61,15 +61,15 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
     if path != "-" and not os.path.exists(path) and not re.fullmatch(LIKE_A_FILE, path):
         return None
     read_line(f"{name}=0")  # refuses a name that is taken
-    scope.names[name] = named_file(path, scope.literals)._replace(text=name)
+    scope.names[name] = named_file(path, scope)._replace(text=name)
     return scope.names[name]
 
 
-def named_file(path: str, literals: Literals) -> Term:
+def named_file(path: str, scope: Scope) -> Term:
     """Read a file for a name in expressions; `-` is standard input.  Raises FileProblem, FormatError."""
     if path == "-":
         source = source_of("-")
-        if found := _values(source, literals):
+        if found := _values(source, scope):
             return found
         from frametool.formats.load import load_sources
 
@@ -81,12 +81,12 @@ def named_file(path: str, literals: Literals) -> Term:
     if "rows" in FORMATS[form].reads:
         from frametool.calc.rows import poses_of_table
 
-        return poses_of_table(path, form, normalize=literals.normalize, degrees=literals.degrees)
-    found = _values(source_of(path), literals) if "records" in FORMATS[form].reads else None
+        return poses_of_table(path, form, normalize=scope.normalize, degrees=scope.degrees)
+    found = _values(source_of(path), scope) if "records" in FORMATS[form].reads else None
     return found or Term(Type(TREE), (), tree=load_tree(path, streams=True))
 
 
-def _values(source: Source, literals: Literals) -> Term | None:
+def _values(source: Source, scope: Scope) -> Term | None:
     """Read the poses or points of a document; None for a tree."""
     from frametool.documents.document import parse_documents
     from frametool.stream.record_values import read_poses
@@ -95,8 +95,11 @@ def _values(source: Source, literals: Literals) -> Term | None:
     if any(type(each) is dict and not OF_TREES.isdisjoint(each) for each in documents):
         return None
     if len(documents) == 1 and type(documents[0]) is dict and not PLACED.keys().isdisjoint(documents[0]):
-        return literals.of_document(documents[0], source)
-    poses = read_poses(source, degrees=literals.degrees, normalize=literals.normalize)
+        try:
+            return literal(documents[0], scope.reading(source))
+        except Misfit as misfit:
+            raise misfit.placed(source, 0) from None
+    poses = read_poses(source, degrees=scope.degrees, normalize=scope.normalize)
     if not poses:
         raise FormatError("nothing in it", source=source.name)
     items = tuple(map(term_of_pose, poses))

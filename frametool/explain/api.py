@@ -7,17 +7,8 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, alternatives, shown
-from frametool.explain.derive import (
-    ByTree,
-    DerivationStyle,
-    derive_apply,
-    derive_compose,
-    derive_convert,
-    derive_interpolate,
-    derive_invert,
-    derive_lookup,
-    derive_relative,
-)
+from frametool.explain import derive
+from frametool.explain.derive import ByTree, DerivationStyle
 from frametool.explain.follow import FollowStep, derive_follow
 from frametool.explain.given import given_pose, source_of
 from frametool.explain.sheet import DIGITS
@@ -76,7 +67,7 @@ def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind
     else:
         pose, record = operands
         way = given_pose(pose, degrees=degrees)
-    return derive_apply(plan, way, _record_source(record, kind), kind=kind, degrees=degrees)
+    return derive.apply(plan, way, _record_source(record, kind), kind=kind, degrees=degrees)
 
 
 def _record_source(value: Any, kind: str) -> Source:
@@ -99,12 +90,12 @@ def _follow(plan: DerivationStyle, steps: Any) -> Explanation:
 
 POSES = {"convert": 1, "compose": sys.maxsize, "invert": 1, "relative": 2, "interpolate": 2}  # operands that are poses
 OPERATIONS: dict[str, Callable[..., Explanation]] = {
-    "convert": derive_convert,
-    "compose": derive_compose,
-    "invert": derive_invert,
-    "relative": derive_relative,
-    "interpolate": derive_interpolate,
-    "lookup": derive_lookup,
+    "convert": derive.convert,
+    "compose": derive.compose,
+    "invert": derive.invert,
+    "relative": derive.relative,
+    "interpolate": derive.interpolate,
+    "lookup": derive.lookup,
     "apply": _apply,
     "follow": _follow,
 }

@@ -11,24 +11,13 @@ from functools import reduce
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
+from frametool.explain import operations
 from frametool.explain.chain import MOST_SHOWN, chain
 from frametool.explain.from_quaternion import FROM_QUATERNION
 from frametool.explain.given import Given, frames_of, given_of
-from frametool.explain.operations import (
-    MOVERS,
-    between,
-    compose,
-    extent,
-    inverse,
-    pose_covariance,
-    relative,
-    twist_covariance,
-    with_other_axes,
-)
 from frametool.explain.render import Explanation
 from frametool.explain.sheet import DEGREES, DIGITS, METRES, RADIANS, Row, Sheet
-from frametool.explain.steps import run, run_block
-from frametool.explain.to_quaternion import SHORT
+from frametool.explain.to_quaternion import SHORT, run, run_block
 from frametool.frames.lookups import Frames
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
@@ -172,7 +161,7 @@ def _rotation_rows(own: Result, form: Notation, style: Style) -> list[Row]:
     return [row(form.spec * (at == 0), *part) for at, part in enumerate(each for each in parts if each[1])]
 
 
-def derive_convert(
+def convert(
     plan: DerivationStyle, pose: Given, *, own: Pose | None = None, change: OtherAxes | None = None
 ) -> Explanation:
     """Derive one pose or rotation in the notations asked for.
@@ -205,8 +194,8 @@ def _hub(sheet: Sheet, given: Given, change: OtherAxes | None) -> Rigid:
     x, y, z = given.position
     pose: Rigid = (x, y, z, *q)
     if given.inverse:
-        pose = inverse(sheet, pose, "child", "parent")
-    return pose if change is None else with_other_axes(sheet, pose, change)
+        pose = operations.inverse(sheet, pose, "child", "parent")
+    return pose if change is None else operations.with_other_axes(sheet, pose, change)
 
 
 def _short_way(sheet: Sheet, given: Given, form: Notation, plan: DerivationStyle) -> Sequence[float] | None:
@@ -230,7 +219,7 @@ def _say_given(sheet: Sheet, given: Sequence[Given], labels: Sequence[tuple[str,
         each.say(sheet, target, source)
 
 
-def derive_compose(plan: DerivationStyle, *poses: Given) -> Explanation:
+def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
     """Derive the product of poses."""
     if not poses:
         raise ValueInvalid("compose takes at least one pose")
@@ -248,33 +237,33 @@ def derive_compose(plan: DerivationStyle, *poses: Given) -> Explanation:
             factors = [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
         pose = factors[0]
         for at, factor in enumerate(factors[1:], 1):
-            pose = compose(sheet, pose, factor, (names[0], names[at], names[at + 1]), brief=brief)
+            pose = operations.compose(sheet, pose, factor, (names[0], names[at], names[at + 1]), brief=brief)
         end_with_pose(sheet, pose, own, plan)
 
     return explained(plan, f"{names[0]}_from_{names[-1]}", write)
 
 
-def derive_invert(plan: DerivationStyle, pose: Given) -> Explanation:
+def invert(plan: DerivationStyle, pose: Given) -> Explanation:
     """Derive the inverse of a pose."""
     own = Result(pose_algebra.inverse(pose.pose))
     target, source = frames_of(2, [pose.pose])
 
     def write(sheet: Sheet) -> None:
         _say_given(sheet, [pose], [(target, source)])
-        found = inverse(sheet, pose.components(sheet, target, source), target, source)
+        found = operations.inverse(sheet, pose.components(sheet, target, source), target, source)
         end_with_pose(sheet, found, own, plan)
 
     return explained(plan, f"{source}_from_{target}", write)
 
 
-def derive_relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
+def relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
     """Derive B seen from A, with distance and angle."""
     own = pose_algebra.relative(a.pose, b.pose)
     frames = _three_frames(a, b)
 
     def write(sheet: Sheet) -> None:
-        pose = relative(sheet, *_both(sheet, a, b, frames), frames)
-        found = extent(sheet, pose, frames[1])
+        pose = operations.relative(sheet, *_both(sheet, a, b, frames), frames)
+        found = operations.extent(sheet, pose, frames[1])
         for name, value in zip(pose_algebra.RELATIVE_EXTRAS, found, strict=True):
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
                 raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")
@@ -283,14 +272,14 @@ def derive_relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
     return explained(plan, f"{frames[1]}_from_{frames[2]}", write)
 
 
-def derive_interpolate(plan: DerivationStyle, a: Given, b: Given, fraction: float) -> Explanation:
+def interpolate(plan: DerivationStyle, a: Given, b: Given, fraction: float) -> Explanation:
     """Derive the pose at a fraction of the way from A to B."""
     fraction = float(fraction)
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
     frames = _three_frames(a, b)
 
     def write(sheet: Sheet) -> None:
-        end_with_pose(sheet, between(sheet, *_both(sheet, a, b, frames), fraction), own, plan)
+        end_with_pose(sheet, operations.between(sheet, *_both(sheet, a, b, frames), fraction), own, plan)
 
     return explained(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", write)
 
@@ -308,7 +297,7 @@ def _both(sheet: Sheet, a: Given, b: Given, frames: tuple[str, str, str]) -> tup
     return a.components(sheet, world, first), b.components(sheet, world, second)
 
 
-def derive_lookup(
+def lookup(
     plan: DerivationStyle, tree: Frames, target: str, source: str, *, at_ns: int | None = None,
     source_at_ns: int | None = None, fixed: str | None = None,
 ) -> Explanation:  # fmt: skip
@@ -329,7 +318,7 @@ def derive_lookup(
             with sheet.about("where the source was"):
                 second = chain(sheet, tree, fixed, source, source_at_ns)
             sheet.say("The fixed frame counts as standing between the two times.")
-            pose = compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
+            pose = operations.compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
         end_with_pose(sheet, pose, own, plan)
 
     return explained(plan, f"{printable(target)}_from_{printable(source)}", write)
@@ -347,7 +336,7 @@ class ByTree(NamedTuple):
     at_ns: int | None = None
 
 
-def derive_apply(
+def apply(
     plan: DerivationStyle, way: ByTree | Given, source: Source, *, kind: str = "", degrees: bool = False,
     normalize: bool = False, counters: bool = True, timeless: bool = False,
 ) -> Explanation:  # fmt: skip
@@ -410,7 +399,7 @@ def _move_vectors(
     start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
     own = Operation(moves=True).move(shape, (*start, *covariance), mover)
     sheet.reached(start)
-    found = MOVERS[shape.kind](sheet, pose, start, *frames)
+    found = operations.MOVERS[shape.kind](sheet, pose, start, *frames)
     check_vector(sheet, found, own[: len(found)])
     labels = PARTS.get(shape.kind, (shape.kind,))
     rows = [
@@ -418,7 +407,7 @@ def _move_vectors(
         for at, (label, unit) in enumerate(zip(labels, UNITS[shape.kind], strict=True))
     ]
     if shape.covariance:
-        _check_covariance(sheet, twist_covariance(sheet, pose, covariance), own[len(found) :])
+        _check_covariance(sheet, operations.twist_covariance(sheet, pose, covariance), own[len(found) :])
         rows += _rows("covariance", own[len(found) :], 6)
     sheet.result(f"in {frames[0]}", rows)
 
@@ -432,11 +421,11 @@ def _move_pose(
     own = Result(Pose.of(Operation().pose([given.pose.components], mover, floats), given.pose.name, names[0]))
     sheet.heading("The record")
     given.say(sheet, origin, name)
-    moved = compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
+    moved = operations.compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
     if record.shape.covariance:
         covariance = tuple(record.values[record.shape.own_size :])
         own.extras["covariance"] = Operation().covariance(record.shape, covariance, mover)
-        _check_covariance(sheet, pose_covariance(sheet, pose, covariance), own.extras["covariance"])
+        _check_covariance(sheet, operations.pose_covariance(sheet, pose, covariance), own.extras["covariance"])
     end_with_pose(sheet, moved, own, plan)
 
 

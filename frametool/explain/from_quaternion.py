@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.explain.sheet import DEGREES, RADIANS
-from frametool.explain.steps import COLUMNS, DET, ENTRIES, XYZ, XYZW, angles, direction, rows
+from frametool.explain.sheet import COLUMNS, DEGREES, DET, ENTRIES, RADIANS, XYZ, XYZW, rows
 from frametool.geometry import euler as kernel
 from frametool.geometry import floats
 
@@ -90,7 +89,7 @@ def rpy(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
     sheet.step(values, "pitch", "atan2(-r31, h)", RADIANS)
     sheet.step(values, "yaw", "atan2(r21, r11)", RADIANS)
     sheet.caveat(NOT_ASIN)
-    return angles(sheet, values, names, degrees=degrees)
+    return sheet.angles(values, names, degrees=degrees)
 
 
 def euler(sheet: Sheet, q: Quaternion, *, axes: str, degrees: bool) -> Sequence[float]:
@@ -146,7 +145,7 @@ def _by_halves(
                 f"Beside lock: {first} and {third} each are known only to about {4e-16 / level:.0e} rad, and by so "
                 "much the result may differ; one sum of them is known to all digits."
             )
-    return angles(sheet, values, names, degrees=degrees)
+    return sheet.angles(values, names, degrees=degrees)
 
 
 def axis_angle(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
@@ -156,14 +155,14 @@ def axis_angle(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]
     if not _axis(sheet, values):
         sheet.say("No rotation: the angle is 0, any axis will do, and x is taken.")
         return 1.0, 0.0, 0.0, 0.0
-    return values["vx"], values["vy"], values["vz"], *angles(sheet, values, ["angle"], degrees=degrees)
+    return values["vx"], values["vy"], values["vz"], *sheet.angles(values, ["angle"], degrees=degrees)
 
 
 def _axis(sheet: Sheet, values: Values) -> bool:
     """Add s, the angle and the unit axis; return whether there is one."""
     if not any(values[name] for name in XYZ):
         return False
-    direction(sheet, values, XYZ, ("vx", "vy", "vz"), "s")
+    sheet.direction(values, XYZ, ("vx", "vy", "vz"), "s")
     sheet.step(values, "angle", "2*atan2(s, w)", RADIANS)
     sheet.caveat(NOT_ACOS)
     return True
@@ -176,7 +175,7 @@ def rotvec(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
     if not _axis(sheet, values):
         sheet.say("No rotation: the vector is 0.")
         return 0.0, 0.0, 0.0
-    angles(sheet, values, ["angle"], degrees=degrees)
+    sheet.angles(values, ["angle"], degrees=degrees)
     suffix, unit = ("_deg", DEGREES) if degrees else ("", RADIANS)
     return sheet.each(values, XYZ, f"r%{suffix}", f"v%*angle{suffix}", unit)
 

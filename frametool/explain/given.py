@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, printable
 from frametool.explain.operations import inverse
-from frametool.explain.steps import run_block
-from frametool.explain.to_quaternion import TO_QUATERNION
+from frametool.explain.to_quaternion import TO_QUATERNION, run_block
 from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.stream.record_values import documents, pose_of

@@ -8,8 +8,7 @@ from __future__ import annotations
 from itertools import product as pairs
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.explain.sheet import METRES, RADIANS, Sheet, transposed, upright
-from frametool.explain.steps import CYCLES, XYZ, XYZW, length, norm, of_quaternion, to_degrees
+from frametool.explain.sheet import CYCLES, METRES, RADIANS, XYZ, XYZW, Sheet, norm, transposed, upright
 from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:
@@ -65,22 +64,16 @@ def compose(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str], *, b
     sheet.heading(f"{first}_from_{last} = {first}_from_{middle} @ {middle}_from_{last}")
     if not brief:
         sheet.say(TOUCH)
-    position = moved(sheet, a, b[:3], "t", ("R(a) tb + ta", r"R(a)\,t_b + t_a"), METRES)
+    position = turned(sheet, a[3:], b[:3], "t", ("R(a) tb + ta", r"R(a)\,t_b + t_a"), METRES, shift=a[:3])
     return *position, *product(sheet, a[3:], b[3:], brief=brief)
 
 
-def moved(
-    sheet: Sheet, pose: Rigid, point: Sequence[float], name: str, formula: tuple[str, str], unit: str
-) -> Vector:
-    """Move a point: turn it, then shift it."""
-    return _times(sheet, of_quaternion(sheet, pose[3:]), point, name, formula, unit, shift=pose[:3])
-
-
 def turned(
-    sheet: Sheet, q: Quaternion, vector: Sequence[float], name: str, formula: tuple[str, str], unit: str = ""
-) -> Vector:
-    """Turn a vector."""
-    return _times(sheet, of_quaternion(sheet, q), vector, name, formula, unit)
+    sheet: Sheet, q: Quaternion, vector: Sequence[float], name: str, formula: tuple[str, str], unit: str = "",
+    shift: Sequence[float] = (),
+) -> Vector:  # fmt: skip
+    """Turn a vector, or turn and then shift a point."""
+    return _times(sheet, sheet.matrix(q), vector, name, formula, unit, shift)
 
 
 def _times(
@@ -98,7 +91,7 @@ def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
     """Turn target_from_source around."""
     sheet.heading(f"{source}_from_{target} = inverse of {target}_from_{source}")
     sheet.say("The axis turns round: q* = (-x, -y, -z, w), and its matrix is R^T.")
-    back = transposed(of_quaternion(sheet, pose[3:]))
+    back = transposed(sheet.matrix(pose[3:]))
     x, y, z = (0.0 - sheet.inner(row, pose[:3]) for row in back)
     parts: Parts = ["-", back, upright(pose[:3]), "=", upright((x, y, z))]
     sheet.grid("t'", "-R^T t", r"-R^{\mathsf T}\,t", parts, METRES)
@@ -117,7 +110,7 @@ def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> 
     sheet.say("d = tb - ta")
     values = _named("a", a[:3], XYZ) | _named("b", b[:3], XYZ)
     apart = sheet.each(values, XYZ, "d%", "b% - a%", METRES)
-    back = transposed(of_quaternion(sheet, a[3:]))
+    back = transposed(sheet.matrix(a[3:]))
     x, y, z = _times(sheet, back, apart, "t", ("R(A)^T d", r"R(A)^{\mathsf T}\,d"), METRES)
     sheet.caveat(INVERSE)
     sheet.say("a = q(A)*, b = q(B); the axis of A turns round: q* = (-x, -y, -z, w).")
@@ -128,11 +121,11 @@ def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
     """Measure a transform: distance, angle in radians and in degrees."""
     sheet.heading("How far apart")
     values = _named("t", pose[:3], XYZ) | _named("", pose[3:], XYZW)
-    distance, _, _ = length(sheet, values, ("tx", "ty", "tz"), "d", METRES)
-    length(sheet, values, XYZ, "s")
+    distance, _, _ = sheet.length(values, ("tx", "ty", "tz"), "d", METRES)
+    sheet.length(values, XYZ, "s")
     angle = sheet.step(values, "angle", "2*atan2(s, abs(w))", RADIANS)
     sheet.caveat(f"The distance does not depend on the frame; the position does: it is written in {frame}.")
-    return distance, angle, to_degrees(sheet, values, "angle")[0]
+    return distance, angle, sheet.angles(values, ["angle"], degrees=True)[0]
 
 
 def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
@@ -186,7 +179,7 @@ def point(sheet: Sheet, pose: Rigid, numbers: Sequence[float], target: str, sour
     """Turn, then shift."""
     sheet.heading(f"point_in_{target} = {target}_from_{source} * point_in_{source}")
     sheet.say(FROM_Q)
-    found = moved(sheet, pose, numbers, "p'", ("R(q) p + t", "R(q)\\,p + t"), METRES)
+    found = turned(sheet, pose[3:], numbers, "p'", ("R(q) p + t", r"R(q)\,p + t"), METRES, shift=pose[:3])
     sheet.caveat(VECTOR)
     return found
 
@@ -231,7 +224,7 @@ def _with_arm(
 def pose_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
     """Turn each 3x3 block C into R C R^T."""
     sheet.heading("The covariance: each 3x3 block C becomes R C R^T")
-    turn = of_quaternion(sheet, pose[3:])
+    turn = sheet.matrix(pose[3:])
     found = [0.0] * 36
     for top, left in pairs((0, 3), repeat=2):
         sheet.say(f"{'rotation' if top else 'position'} with {'rotation' if left else 'position'}:")
@@ -246,7 +239,7 @@ def twist_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Seq
     """Turn the 6x6 covariance C into A C A^T."""
     sheet.heading("The covariance of the twist: A C A^T")
     sheet.say("A is what the move does to the six numbers: rows R | t x R, and 0 | R.")
-    turn = of_quaternion(sheet, pose[3:])
+    turn = sheet.matrix(pose[3:])
     tx, ty, tz = pose[:3]
     arm = sheet.product([[0.0, -tz, ty], [tz, 0.0, -tx], [-ty, tx, 0.0]], turn)
     adjoint = [[*turn[i], *arm[i]] for i in range(3)] + [[0.0, 0.0, 0.0, *turn[i]] for i in range(3)]

@@ -1,16 +1,18 @@
 """A derivation while it is written: headings, sentences, steps, matrices, caveats, and the result at its end.
 
-How the names of formulas are written in LaTeX.
+Also the steps that several blocks share, of angles and lengths, and how the names of formulas are written in LaTeX.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid
 from frametool.explain.formula_tree import Value, as_latex, as_text, evaluated, latex_number, parsed
+from frametool.geometry.quaternion import to_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -42,6 +44,15 @@ def symbol(name: str) -> str:
     return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
 
 
+XYZ, XYZW = ("x", "y", "z"), ("x", "y", "z", "w")
+CYCLES = (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y"))
+ENTRIES = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))
+DET = "r11*(r22*r33 - r23*r32) + r12*(r23*r31 - r21*r33) + r13*(r21*r32 - r22*r31)"
+COLUMNS = "Column k is axis k of the source frame, written in the target frame."
+TINY, HUGE = 1e-140, 1e140  # beyond, squares leave the range of a double
+TWO_TURNS = 720.0  # degrees: the half angle inside has turned once
+ROOTS = ("sqrt(0)/2", "sqrt(2)/2", "sqrt(4)/2", "sqrt(2)/2", "sqrt(0)/2", "-sqrt(2)/2", "-sqrt(4)/2", "-sqrt(2)/2")
+EXACT = "Multiples of 90 deg are exact: no rounded pi comes into their sines and cosines."
 METRES, RADIANS, DEGREES = "m", "rad", "deg"
 HEADING, SENTENCE, CAVEAT = "heading", "sentence", "caveat"
 DIGITS = 6  # significant ones, unless told
@@ -232,6 +243,64 @@ class Sheet:
         columns = transposed(b)
         return [[self.inner(row, column) for column in columns] for row in a]
 
+    def take_angle(self, values: Values, name: str, written: float, *, degrees: bool) -> None:
+        """Take an angle as it is written; one in degrees becomes radians."""
+        if not degrees:
+            values[name] = written
+            return
+        values[f"{name}_deg"] = rest = math.fmod(written, TWO_TURNS)
+        if rest != written:
+            self.say(f"{name}: {written!r} deg less whole double turns of 720 deg is {rest!r} deg, exactly.")
+        self.step(values, name, f"{name}_deg*pi/180", RADIANS)
+
+    def sine_and_cosine(self, values: Values, name: str, sine: str, cosine: str, *, half: bool = True) -> None:
+        """Add the cosine and the sine of an angle or of its half; exact where degrees say so."""
+        inside = f"{name}/2" if half else name
+        turn = values.get(f"{name}_deg", 0.0) / (90.0 if half else 45.0)  # the argument, in 45 degrees
+        is_exact = turn != 0.0 and turn == int(turn) and (half or turn % 2 == 0)
+        eighths = int(turn) if is_exact else 0
+        self.step(values, cosine, f"cos({inside})", exactly=ROOTS[(eighths + 2) % 8] if is_exact else "")
+        self.step(values, sine, f"sin({inside})", exactly=ROOTS[eighths % 8] if is_exact else "")
+        if is_exact:
+            self.caveat(EXACT)
+
+    def direction(
+        self, values: Values, given: Sequence[str], unit: Sequence[str], name: str, measure: str = ""
+    ) -> float:
+        """Add the length of a non-zero vector and its direction."""
+        found, divided, by = self.length(values, given, name, measure)
+        for each, part in zip(unit, divided, strict=True):
+            self.step(values, each, f"{part}/{by}")
+        return found
+
+    def length(
+        self, values: Values, given: Sequence[str], name: str, measure: str = ""
+    ) -> tuple[float, Sequence[str], str]:
+        """Add the length of a vector; one whose squares leave the range of a double is scaled first.
+
+        Returns it, and the names of numbers whose quotients are the direction.
+        """
+        most = max(abs(values[each]) for each in given)
+        if most == 0.0 or TINY < most < HUGE:
+            return self.step(values, name, norm(given), measure), given, name
+        self.say("Squares of these numbers leave the range of a double; they are divided by the largest first.")
+        self.step(values, "m", f"max({', '.join(f'abs({each})' for each in given)})", measure)
+        scaled = [f"k{letter}" for letter in "xyzw"[: len(given)]]
+        for each, part in zip(scaled, given, strict=True):
+            self.step(values, each, f"{part}/m")
+        self.step(values, "k", norm(scaled))
+        return self.step(values, name, "m*k", measure), scaled, "k"
+
+    def angles(self, values: Values, names: Sequence[str], *, degrees: bool) -> Sequence[float]:
+        """Return angles, in degrees with the steps to them."""
+        if not degrees:
+            return [values[name] for name in names]
+        return self.each(values, names, "%_deg", "%*180/pi", DEGREES)
+
+    def matrix(self, q: Quaternion) -> Matrix:
+        """Return the matrix of a quaternion as the steps after it take it."""
+        return rows([self.settled(Value(entry, 1.0)) for entry in to_matrix(*q)])
+
     def result(self, text: str, rows: Sequence[Row]) -> None:
         """End with the result."""
         self.items.append(SheetResult(text, rows))
@@ -241,6 +310,16 @@ def latex_tuple(text: str) -> str:
     """Return numbers in parentheses as LaTeX."""
     numbers = r",\ ".join(latex_number(each) for each in text[1:-1].split(", "))
     return rf"\left({numbers}\right)"
+
+
+def norm(names: Sequence[str] = XYZW) -> str:
+    """Return the formula of a length."""
+    return f"sqrt({' + '.join(f'{name}**2' for name in names)})"
+
+
+def rows(entries: Sequence[float]) -> Matrix:
+    """Return nine numbers as three rows."""
+    return [list(entries[at : at + 3]) for at in (0, 3, 6)]
 
 
 def transposed(matrix: Sequence[Sequence[float]]) -> Matrix:

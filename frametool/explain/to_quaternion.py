@@ -5,33 +5,25 @@ A block takes the sheet and the numbers as written, and of `axes`, `degrees` and
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from inspect import signature
+from typing import TYPE_CHECKING, Any
 
-from frametool.explain.sheet import DEGREES, RADIANS
-from frametool.explain.steps import (
-    COLUMNS,
-    CYCLES,
-    DET,
-    ENTRIES,
-    HALF,
-    UNIT,
-    XYZ,
-    XYZW,
-    angles,
-    direction,
-    nearest_rotation,
-    norm,
-    rows,
-    sine_and_cosine,
-    take_angle,
-)
+from frametool.errors import ValueInvalid, shown
+from frametool.explain.sheet import COLUMNS, CYCLES, DEGREES, DET, ENTRIES, RADIANS, XYZ, XYZW, norm, rows
+from frametool.geometry import floats
+from frametool.geometry import matrix as kernel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frametool.explain.sheet import Matrix, Sheet, Values
+    from frametool.geometry.representations import Notation
     from frametool.grammar.readers import Quaternion
 
+UNIT = 8.9e-16  # 4 eps: a length this near 1 is 1
+LAST_STEP = 1e-9  # the convergence is quadratic: what comes after such a step is rounding
+MOST_STEPS = 60
+HALF = "Half the angle stands inside: a quaternion acts twice (q v q*), so w = cos(angle/2)."
 NEAR_HALF_TURN = 1e-3  # of s: below, beside half a turn, the axis loses more digits than the derivation may be off
 NOT_UNIT = "The axis is not a unit vector: it is divided by its length. With a longer axis q would be no rotation."
 SQUARES = (
@@ -54,6 +46,22 @@ RODRIGUES = (
 NOT_ACOS = "atan2(s, tr - 1), not acos((tr - 1)/2): acos loses half the digits near 0 and 180 deg."
 
 
+def run_block(
+    table: Mapping[str, Callable[..., Any]], form: Notation, sheet: Sheet, numbers: Sequence[float], **how: Any
+) -> Any:  # fmt: skip
+    """Run the block of a notation; raises ValueInvalid for a representation without one."""
+    name = form.representation.name
+    if name not in table:
+        raise ValueInvalid(f"there is no derivation of {shown(name)}; derived are {', '.join(table)}")
+    return run(table[name], sheet, numbers, axes=form.bound_axes(), **how)
+
+
+def run(block: Callable[..., Any], sheet: Sheet, numbers: Sequence[float], **how: Any) -> Any:
+    """Run a block with what it names of axes and units."""
+    names = signature(block).parameters
+    return block(sheet, numbers, **{name: value for name, value in how.items() if name in names})
+
+
 def quaternion(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     """Take x, y, z, w: named or scalar last."""
     return _as_given(sheet, numbers, "x, y, z, w: the scalar w stands last.")
@@ -74,7 +82,7 @@ def _as_given(sheet: Sheet, numbers: Sequence[float], order: str) -> Quaternion:
     if abs(sum(part * part for part in numbers) - 1.0) <= UNIT:
         sheet.step(values, "norm", norm())
         return _four(values, XYZW)
-    direction(sheet, values, XYZW, ("qx", "qy", "qz", "qw"), "norm")
+    sheet.direction(values, XYZW, ("qx", "qy", "qz", "qw"), "norm")
     sheet.caveat("The norm is not 1: every part is divided by it, which keeps the axis and the angle.")
     return _four(values, ("qx", "qy", "qz", "qw"))
 
@@ -86,7 +94,7 @@ def rpy(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
     sheet.say("q = qz(yaw) qy(pitch) qx(roll): what is done first stands rightmost.")
     values = _roll_pitch_yaw(sheet, numbers, degrees=degrees)
     for name in ("roll", "pitch", "yaw"):
-        sine_and_cosine(sheet, values, name, f"s{name[0]}", f"c{name[0]}")
+        sheet.sine_and_cosine(values, name, f"s{name[0]}", f"c{name[0]}")
     sheet.caveat(HALF)
     sheet.step(values, "x", "sr*cp*cy - cr*sp*sy")
     sheet.step(values, "y", "cr*sp*cy + sr*cp*sy")
@@ -98,7 +106,7 @@ def rpy(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
 def _roll_pitch_yaw(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Values:
     values: Values = {}
     for name, written in zip(("roll", "pitch", "yaw"), numbers, strict=True):
-        take_angle(sheet, values, name, written, degrees=degrees)
+        sheet.take_angle(values, name, written, degrees=degrees)
     return values
 
 
@@ -109,7 +117,7 @@ def euler(sheet: Sheet, numbers: Sequence[float], *, axes: str, degrees: bool) -
     outermost = _introduce(sheet, values, numbers, axes, degrees=degrees)
     sheet.say(f"q = {' '.join(f'q{axes[at]}(a{at})' for at in outermost)}")
     for at in (1, 2, 3):
-        sine_and_cosine(sheet, values, f"a{at}", f"s{at}", f"c{at}")
+        sheet.sine_and_cosine(values, f"a{at}", f"s{at}", f"c{at}")
     sheet.caveat(HALF)
     first, second, third = outermost
     sheet.say(f"p = q{axes[first]} q{axes[second]}, then q = p q{axes[third]}; only these parts are not 0:")
@@ -130,7 +138,7 @@ def _introduce(sheet: Sheet, values: Values, numbers: Sequence[float], axes: str
     way = "right to left: what is done first stands rightmost" if fixed else "left to right, in the order of the turns"
     sheet.say(f"{axes}: a1, a2, a3 about {kind} {', then '.join(order)}. The factors stand {way}.")
     for at, written in enumerate(numbers, 1):
-        take_angle(sheet, values, f"a{at}", written, degrees=degrees)
+        sheet.take_angle(values, f"a{at}", written, degrees=degrees)
     return (3, 2, 1) if fixed else (1, 2, 3)
 
 
@@ -161,16 +169,16 @@ def axis_angle(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quat
 def _axis_and_angle(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Values:
     """Add the unit axis vx, vy, vz, and take the angle."""
     values = dict(zip(("ax", "ay", "az"), numbers, strict=False))
-    length = direction(sheet, values, ("ax", "ay", "az"), ("vx", "vy", "vz"), "n")
+    length = sheet.direction(values, ("ax", "ay", "az"), ("vx", "vy", "vz"), "n")
     if abs(length - 1.0) > UNIT:
         sheet.caveat(NOT_UNIT)
-    take_angle(sheet, values, "angle", numbers[3], degrees=degrees)
+    sheet.take_angle(values, "angle", numbers[3], degrees=degrees)
     return values
 
 
 def _about_axis(sheet: Sheet, values: Values) -> Quaternion:
     """Add the quaternion of the unit axis vx, vy, vz and `angle`."""
-    sine_and_cosine(sheet, values, "angle", "s", "w")
+    sheet.sine_and_cosine(values, "angle", "s", "w")
     sheet.each(values, XYZ, "%", "v%*s")
     sheet.caveat(HALF)
     return _unit(sheet, values)
@@ -186,9 +194,9 @@ def rotvec(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaterni
     if not any(numbers):
         sheet.say("The vector is 0: no rotation, x 0, y 0, z 0, w 1, and no axis.")
         return 0.0, 0.0, 0.0, 1.0
-    length = direction(sheet, values, names, ("vx", "vy", "vz"), f"angle{unit}",
+    length = sheet.direction(values, names, ("vx", "vy", "vz"), f"angle{unit}",
                        DEGREES if degrees else RADIANS)  # fmt: skip
-    take_angle(sheet, values, "angle", length, degrees=degrees)
+    sheet.take_angle(values, "angle", length, degrees=degrees)
     return _about_axis(sheet, values)
 
 
@@ -216,10 +224,10 @@ def six_d(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     values = dict(zip(("ax", "ay", "az", "bx", "by", "bz"), numbers, strict=True))
     sheet.heading("Two columns to a matrix")
     sheet.say(GRAM_SCHMIDT)
-    direction(sheet, values, ("ax", "ay", "az"), ("ux", "uy", "uz"), "n")
+    sheet.direction(values, ("ax", "ay", "az"), ("ux", "uy", "uz"), "n")
     sheet.step(values, "d", "ux*bx + uy*by + uz*bz")
     sheet.each(values, XYZ, "e%", "b% - d*u%")
-    direction(sheet, values, ("ex", "ey", "ez"), ("vx", "vy", "vz"), "l")
+    sheet.direction(values, ("ex", "ey", "ez"), ("vx", "vy", "vz"), "l")
     if sheet.step(values, "f", "ux*vx + uy*vy + uz*vz"):
         sheet.say("The columns are nearly parallel; what is left along the first is taken out again.")
         sheet.each(values, XYZ, "g%", "v% - f*u%")
@@ -288,7 +296,7 @@ def rpy_to_matrix(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> S
 def _product(sheet: Sheet, values: Values, factors: list[tuple[str, str, str]]) -> Sequence[float]:
     """Add the product of turns about axes (axis, name of the angle, its letter), outermost first."""
     for _, name, letter in reversed(factors):
-        sine_and_cosine(sheet, values, name, f"s{letter}", f"c{letter}", half=False)
+        sheet.sine_and_cosine(values, name, f"s{letter}", f"c{letter}", half=False)
     matrices = [_elementary(axis, values[f"s{letter}"], values[f"c{letter}"]) for axis, _, letter in factors]
     texts = [f"R{axis}({name})" for axis, name, _ in factors]
     latex = [rf"R_{axis}(\mathrm{{{name}}})" for axis, name, _ in factors]
@@ -316,7 +324,7 @@ def axis_angle_to_matrix(sheet: Sheet, numbers: Sequence[float], *, degrees: boo
     sheet.heading("Axis and angle to matrix (Rodrigues)")
     sheet.say("R = c 1 + k v v^T + s (v x ..), v a unit axis, k = 1 - c.")
     values = _axis_and_angle(sheet, numbers, degrees=degrees)
-    sine_and_cosine(sheet, values, "angle", "s", "c", half=False)
+    sheet.sine_and_cosine(values, "angle", "s", "c", half=False)
     sheet.step(values, "k", "1 - c")
     found = [sheet.step(values, name, formula) for name, formula in zip(ENTRIES, RODRIGUES, strict=True)]
     sheet.grid("R", "", "", [rows(found)])
@@ -341,10 +349,33 @@ def matrix_to_axis_angle(
     if not (values["dx"] or values["dy"] or values["dz"]):
         sheet.say("No rotation: the angle is 0, any axis will do, and x is taken.")
         return 1.0, 0.0, 0.0, 0.0
-    direction(sheet, values, ("dx", "dy", "dz"), ("vx", "vy", "vz"), "s")
+    sheet.direction(values, ("dx", "dy", "dz"), ("vx", "vy", "vz"), "s")
     sheet.step(values, "angle", "atan2(s, tr - 1)", RADIANS)
     sheet.caveat(NOT_ACOS)
-    return values["vx"], values["vy"], values["vz"], *angles(sheet, values, ["angle"], degrees=wanted_degrees)
+    return values["vx"], values["vy"], values["vz"], *sheet.angles(values, ["angle"], degrees=wanted_degrees)
+
+
+def nearest_rotation(sheet: Sheet, entries: Sequence[float]) -> Sequence[float]:
+    """Return the rotation nearest to a matrix, with the steps to it; what is one already stays as it is."""
+    off = kernel.defect(*kernel.nine(entries), floats)
+    if off <= kernel.ORTHONORMAL:
+        return entries
+    sheet.heading("The nearest rotation")
+    sheet.say(f"The rows are orthonormal only to {off:.1e}. Newton's way to the nearest rotation (Higham 1986): the "
+              "mean of M and of its inverse transposed, again and again; each step doubles the right digits.")
+    here = rows(kernel.balanced(*kernel.nine(entries), floats))
+    if here != rows(entries):
+        sheet.say("M is divided by a power of two first; its rotation stays.")
+    for count in range(1, MOST_STEPS + 1):
+        there = rows(kernel.newton(*kernel.nine(part for row in here for part in row)))
+        other = [[2.0 * b - a for a, b in zip(*pair, strict=True)] for pair in zip(here, there, strict=True)]
+        name, latex = f"M{count - 1 or ''}", r"\tfrac{1}{2}\left(M + M^{-\mathsf{T}}\right)"
+        sheet.grid(f"M{count}", f"1/2 ({name} + {name}^-T)", latex, ["1/2·(", here, "+", other, ")", "=", there])
+        step = max(abs(a - b) for pair in zip(here, there, strict=True) for a, b in zip(*pair, strict=True))
+        here = there
+        if step < LAST_STEP:
+            break
+    return [part for row in here for part in row]
 
 
 SHORT: dict[tuple[str, str], Callable[..., Sequence[float] | None]] = {

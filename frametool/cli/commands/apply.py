@@ -127,10 +127,10 @@ def command(
         if rest in ((), ("-",)) or len(records) != 1 or frame_column is not None:
             raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
         try:
-            from frametool.explain.derive import derive_apply
+            from frametool.explain import derive
 
             source = pose_source(records[0], stream.given, normalize=normalize, points=True)
-            made = derive_apply(plan, way.explained(), source, kind=kind or "", degrees=deg, normalize=normalize,
+            made = derive.apply(plan, way.explained(), source, kind=kind or "", degrees=deg, normalize=normalize,
                                 counters=way.counters, timeless=at is not None)  # fmt: skip
         except FormatError as error:
             raise usage_if_inline(error) from None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.calc.evaluate import Literals, Scope, evaluate_line, read_line
+from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import mentions_row, walk
 from frametool.cli.calc_input import Expression, file_named_in
@@ -85,7 +85,7 @@ def command(
     """
     stream = Stream(options)
     output = Output("points", deg=deg, **options)
-    scope = Scope(literals=Literals(degrees=deg, normalize=normalize))
+    scope = Scope(degrees=deg, normalize=normalize)
     given = list(_given(arguments, expressions, scope))
     lines = [read_line(text) for text, _ in given]
     scope.tree = _tree(trees, lines)
