@@ -243,18 +243,16 @@ class _Walk:
     def _call(self, branch: Branch) -> Term:
         name = branch.value
         if name not in FUNCTIONS:
-            raise CalcError(f"unknown function {shown(name)}{self._near_function(name)}")
+            hint = did_you_mean(name, FUNCTIONS) or f"; functions: {' '.join(FUNCTIONS)}"
+            if name in self.scope.names:
+                hint = f"; {name} is a value, poses are joined by *"
+            raise CalcError(f"unknown function {shown(name)}{hint}")
         row = FUNCTIONS[name]
         if not row.least <= len(branch.parts) <= row.most:
             count = f"{len(branch.parts)} value{'s' * (len(branch.parts) != 1)}"
             raise CalcError(f"{name}() takes {row.takes}; found {count}")
         read = self.term if name == "mean" and len(branch.parts) == 1 else self._value
         return row.rule(name, [read(part) for part in branch.parts], self.scope.trees)
-
-    def _near_function(self, name: str) -> str:
-        if name in self.scope.names:
-            return f"; {name} is a value, poses are joined by *"
-        return did_you_mean(name, FUNCTIONS) or f"; functions: {' '.join(FUNCTIONS)}"
 
     def _chain(self, branch: Branch) -> Term:
         left = self._value(branch.parts[0])

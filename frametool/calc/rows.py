@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from frametool.calc.parser import Line
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number
+    from frametool.grammar.result import Style
 
 RESULT = "result"  # the column of a number that nobody has named
 NAMES: dict[str, Sequence[str]] = {ANGLES: ("roll", "pitch", "yaw"), **dict(PLACED.values())}
@@ -53,18 +54,17 @@ class RowExpressions:
     """
 
     def __init__(
-        self, lines: Sequence[Line], bindings: Sequence[Line], scope: Scope, *, notations: tuple[Notation, ...] = (),
-        degrees: bool = False, keep_sign: bool = False,
-    ) -> None:  # fmt: skip
+        self, lines: Sequence[Line], bindings: Sequence[Line], scope: Scope, notations: tuple[Notation, ...], style: Style
+    ) -> None:
         """Keep the lines; how results are written says how poses beside rows are."""
         self.lines = tuple(lines)
         self.bindings = tuple(bindings)
         self.scope = scope
-        self.degrees = degrees
+        self.degrees = style.degrees
         forms = notations or (notation("quaternion"),)
         whole = len(forms) == 1 and forms[0].representation.whole is not None
-        written = tuple((form, form.in_degrees(degrees)) for form in forms)
-        self.target = Target(None if whole else 1.0, written, keep_sign, whole)
+        written = tuple((form, style.in_degrees(form)) for form in forms)
+        self.target = Target(None if whole else 1.0, written, style.keep_sign, whole)
         self.adds = all(line.name for line in lines)
         trees = [line.tree for line in (*bindings, *lines)]
         self.columns = tuple(dict.fromkeys(name for tree in trees for name in columns_of(tree)))

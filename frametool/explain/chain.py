@@ -36,9 +36,7 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
         sheet.heading(f"{to}_from_{of}")
         sheet.say("A frame seen from itself: the identity, x 0, y 0, z 0, w 1 and no shift.")
         return IDENTITY
-    latest_ns = frames.latest(target, source)
-    if at_ns is None and latest_ns is not None:
-        at_ns = latest_ns
+    at_ns = frames.latest(target, source) if at_ns is None else at_ns
     down, up = frames.between(target, source, at_ns)
     tracks = {track.child: track for track in frames.way(target, source, at_ns)}
     sheet.heading("The way through the tree")
@@ -86,8 +84,7 @@ def _sentence(first: list[tuple[str, str]], second: list[tuple[str, str]]) -> st
 def _formula(first: list[tuple[str, str]], second: list[tuple[str, str]]) -> str:
     """Write the product of stored edges."""
     left, right = (" @ ".join(f"{parent}_from_{child}" for parent, child in each) for each in (first, second))
-    inverted = [f"({left})^-1"] if left else []
-    return " @ ".join([*inverted, *([right] if right else [])])
+    return " @ ".join(filter(None, [left and f"({left})^-1", right]))
 
 
 def _say_time(sheet: Sheet, moving: Sequence[MovingTrack], at_ns: int) -> None:

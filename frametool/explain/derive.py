@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
 from frametool.explain import operations
 from frametool.explain.chain import MOST_SHOWN, chain
-from frametool.explain.from_quaternion import FROM_QUATERNION
+from frametool.explain.from_quaternion import blocks_of, run
 from frametool.explain.given import Given, frames_of, given_of
 from frametool.explain.render import Explanation
 from frametool.explain.sheet import DEGREES, DIGITS, METRES, RADIANS, Row, Sheet
-from frametool.explain.to_quaternion import SHORT, run, run_block
+from frametool.explain.to_quaternion import SHORT
 from frametool.frames.lookups import Frames
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
@@ -92,9 +92,8 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
 
 def written(sheet: Sheet, q: Quaternion, form: Notation, plan: DerivationStyle) -> Sequence[float]:
     """Add the way from the quaternion to a notation; return its numbers."""
-    numbers: Sequence[float] = run_block(
-        FROM_QUATERNION, form, sheet, q, degrees=plan.style.in_degrees(form), keep_sign=plan.style.keep_sign
-    )
+    block, style = blocks_of(form).from_quaternion, plan.style
+    numbers: Sequence[float] = run(block, sheet, q, form, degrees=style.in_degrees(form), keep_sign=style.keep_sign)
     return numbers
 
 
@@ -205,10 +204,10 @@ def _short_way(sheet: Sheet, given: Given, form: Notation, plan: DerivationStyle
     way = SHORT.get((given.notation.representation.name, form.representation.name))
     if way is None:
         return None
+    wanted = plan.style.in_degrees(form)
     numbers: Sequence[float] | None = run(
-        way, sheet, given.numbers, axes=given.notation.bound_axes(), degrees=given.degrees,
-        wanted_degrees=plan.style.in_degrees(form),
-    )  # fmt: skip
+        way, sheet, given.numbers, given.notation, degrees=given.degrees, wanted_degrees=wanted
+    )
     return numbers
 
 

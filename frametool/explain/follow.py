@@ -75,15 +75,12 @@ def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explana
         for step in steps:
             _law(sheet, step, _seen(sheet, step))
             label = f"{printable(step.follower)} " if len(steps) > 1 else ""
-            rows += [
-                row(f"{label}linear_x", [""], [step.linear], "m/s"),
-                row(f"{label}angular_z", [""], [step.angular], "rad/s"),
-                row(f"{label}distance", [""], [step.distance], METRES),
-            ]
+            command = {"linear_x": (step.linear, "m/s"), "angular_z": (step.angular, "rad/s")}
+            for name, (value, unit) in (command | {"distance": (step.distance, METRES)}).items():
+                rows.append(row(label + name, [""], [value], unit))
         sheet.result(f"the command of {', '.join(printable(step.follower) for step in steps)}", rows)
 
-    number = steps[0].number if steps else 0
-    return explained(plan, f"follow, step {number}", write)
+    return explained(plan, f"follow, step {steps[0].number}", write)
 
 
 def _seen(sheet: Sheet, step: FollowStep) -> Values:

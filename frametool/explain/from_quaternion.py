@@ -1,12 +1,15 @@
-"""From the quaternion to each representation: one block a representation, and the table of them.
+"""From the quaternion to each representation: one block a representation, and the table of the blocks of both ways.
 
-A block takes the sheet and the quaternion, and of `axes`, `degrees` and `keep_sign` what it names.
+A block takes the sheet, the quaternion, and what it names of `axes`, `degrees` and `keep_sign`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from inspect import signature
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool.errors import ValueInvalid, shown
+from frametool.explain import to_quaternion
 from frametool.explain.sheet import COLUMNS, DEGREES, DET, ENTRIES, RADIANS, XYZ, XYZW, rows
 from frametool.geometry import euler as kernel
 from frametool.geometry import floats
@@ -15,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.explain.sheet import Sheet, Values
+    from frametool.geometry.representations import Notation
     from frametool.grammar.readers import Quaternion
 
 NEAR_LOCK = 1e-3  # of h: below, the entries of the matrix lose more digits than the derivation may be off
@@ -197,15 +201,36 @@ def six_d(sheet: Sheet, q: Quaternion) -> Sequence[float]:
     return found
 
 
-FROM_QUATERNION: dict[str, Callable[..., Sequence[float]]] = {
-    "quaternion": quaternion,
-    "xyzw": quaternion,
-    "wxyz": wxyz,
-    "rpy": rpy,
-    "euler": euler,
-    "axis_angle": axis_angle,
-    "rotvec": rotvec,
-    "matrix": matrix,
-    "mrp": mrp,
-    "six_d": six_d,
+class Blocks(NamedTuple):
+    """The ways of a representation: from its numbers to the quaternion, and back."""
+
+    to_quaternion: Callable[..., Quaternion]
+    from_quaternion: Callable[..., Sequence[float]]
+
+
+BLOCKS = {
+    "quaternion": Blocks(to_quaternion.quaternion, quaternion),
+    "xyzw": Blocks(to_quaternion.quaternion, quaternion),
+    "wxyz": Blocks(to_quaternion.wxyz, wxyz),
+    "rpy": Blocks(to_quaternion.rpy, rpy),
+    "euler": Blocks(to_quaternion.euler, euler),
+    "axis_angle": Blocks(to_quaternion.axis_angle, axis_angle),
+    "rotvec": Blocks(to_quaternion.rotvec, rotvec),
+    "matrix": Blocks(to_quaternion.matrix, matrix),
+    "mrp": Blocks(to_quaternion.mrp, mrp),
+    "six_d": Blocks(to_quaternion.six_d, six_d),
 }
+
+
+def blocks_of(form: Notation) -> Blocks:
+    """Return the blocks of a notation; raises ValueInvalid for a representation without them."""
+    name = form.representation.name
+    if name not in BLOCKS:
+        raise ValueInvalid(f"there is no derivation of {shown(name)}; derived are {', '.join(BLOCKS)}")
+    return BLOCKS[name]
+
+
+def run(block: Callable[..., Any], sheet: Sheet, numbers: Sequence[float], form: Notation, **how: bool) -> Any:
+    """Run a block with what it names of the axes and units of a notation."""
+    known = {"axes": form.bound_axes(), **how}
+    return block(sheet, numbers, **{name: known[name] for name in signature(block).parameters if name in known})

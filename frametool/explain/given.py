@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, printable
+from frametool.explain.from_quaternion import blocks_of, run
 from frametool.explain.operations import inverse
-from frametool.explain.to_quaternion import TO_QUATERNION, run_block
 from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.stream.record_values import documents, pose_of
@@ -52,12 +52,14 @@ class Given(NamedTuple):
             sheet.heading("The rotation")
             sheet.say("None is given: the identity, x 0, y 0, z 0, w 1.")
             return IDENTITY
-        q: Quaternion = run_block(TO_QUATERNION, self.notation, sheet, self.numbers, degrees=self.degrees)
+        block = blocks_of(self.notation).to_quaternion
+        q: Quaternion = run(block, sheet, self.numbers, self.notation, degrees=self.degrees)
         return q
 
     def components(self, sheet: Sheet, target: str, source: str) -> Rigid:
         """Add the way from the numbers as written to target_from_source."""
-        if self.is_plain:
+        name = self.notation.representation.name if self.notation else ""
+        if not name or (name in PLAIN and abs(sum(x * x for x in self.numbers) - 1.0) <= 1e-12):
             qx, qy, qz, qw = self.numbers or IDENTITY
         else:
             with sheet.about(self._named(target, source)):
@@ -73,27 +75,16 @@ class Given(NamedTuple):
         """Return the inverse: what is written stays, the pose and its frames are turned around."""
         return self._replace(pose=pose_algebra.inverse(self.pose), inverse=not self.inverse)
 
-    @property
-    def is_plain(self) -> bool:
-        """Return whether the rotation is written as a unit quaternion, or not at all."""
-        if self.notation is None:
-            return True
-        return self.notation.representation.name in PLAIN and abs(sum(x * x for x in self.numbers) - 1.0) <= 1e-12
-
     def say(self, sheet: Sheet, target: str, source: str) -> None:
         """List the pose of target_from_source as it is written."""
         sheet.reached(self.position)
-        more = f"; its inverse is {target}_from_{source}" if self.inverse else ""
-        sheet.say(f"{self._named(target, source)}: {self._line(sheet)}{more}")
-
-    def _line(self, sheet: Sheet) -> str:
-        position = f"xyz {sheet.numbers(self.position)} m"
-        if self.notation is None:
-            return position
-        name, axes = self.notation.representation.name, self.notation.axes
-        if self.notation.representation.angles:
-            name += ("_deg" if self.degrees else "_rad") + (f":{axes}" if axes else "")
-        return f"{position}, {'xyzw' if name == 'quaternion' else name} {sheet.numbers(self.numbers)}"
+        line = f"{self._named(target, source)}: xyz {sheet.numbers(self.position)} m"
+        if self.notation is not None:
+            name, axes = self.notation.representation.name, self.notation.axes
+            if self.notation.representation.angles:
+                name += ("_deg" if self.degrees else "_rad") + (f":{axes}" if axes else "")
+            line += f", {'xyzw' if name == 'quaternion' else name} {sheet.numbers(self.numbers)}"
+        sheet.say(line + (f"; its inverse is {target}_from_{source}" if self.inverse else ""))
 
 
 def given_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Given]:

@@ -1,23 +1,20 @@
 """From each representation to the quaternion, one block a representation; and the ways of textbooks that pass it by.
 
-A block takes the sheet and the numbers as written, and of `axes`, `degrees` and `wanted_degrees` what it names.
+A block takes the sheet, the numbers as written, and what it names of their axes and units.
 """
 
 from __future__ import annotations
 
-from inspect import signature
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from frametool.errors import ValueInvalid, shown
 from frametool.explain.sheet import COLUMNS, CYCLES, DEGREES, DET, ENTRIES, RADIANS, XYZ, XYZW, norm, rows
 from frametool.geometry import floats
 from frametool.geometry import matrix as kernel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.explain.sheet import Matrix, Sheet, Values
-    from frametool.geometry.representations import Notation
     from frametool.grammar.readers import Quaternion
 
 UNIT = 8.9e-16  # 4 eps: a length this near 1 is 1
@@ -44,22 +41,6 @@ RODRIGUES = (
     "vz*vx*k - vy*s", "vz*vy*k + vx*s", "c + vz**2*k",
 )  # fmt: skip
 NOT_ACOS = "atan2(s, tr - 1), not acos((tr - 1)/2): acos loses half the digits near 0 and 180 deg."
-
-
-def run_block(
-    table: Mapping[str, Callable[..., Any]], form: Notation, sheet: Sheet, numbers: Sequence[float], **how: Any
-) -> Any:  # fmt: skip
-    """Run the block of a notation; raises ValueInvalid for a representation without one."""
-    name = form.representation.name
-    if name not in table:
-        raise ValueInvalid(f"there is no derivation of {shown(name)}; derived are {', '.join(table)}")
-    return run(table[name], sheet, numbers, axes=form.bound_axes(), **how)
-
-
-def run(block: Callable[..., Any], sheet: Sheet, numbers: Sequence[float], **how: Any) -> Any:
-    """Run a block with what it names of axes and units."""
-    names = signature(block).parameters
-    return block(sheet, numbers, **{name: value for name, value in how.items() if name in names})
 
 
 def quaternion(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
@@ -261,20 +242,6 @@ def _unit(sheet: Sheet, values: Values) -> Quaternion:
 def _four(values: Values, names: Sequence[str]) -> Quaternion:
     x, y, z, w = (values[name] for name in names)
     return x, y, z, w
-
-
-TO_QUATERNION: dict[str, Callable[..., Quaternion]] = {
-    "quaternion": quaternion,
-    "xyzw": quaternion,
-    "wxyz": wxyz,
-    "rpy": rpy,
-    "euler": euler,
-    "axis_angle": axis_angle,
-    "rotvec": rotvec,
-    "matrix": matrix,
-    "mrp": mrp,
-    "six_d": six_d,
-}
 
 
 def euler_to_matrix(sheet: Sheet, numbers: Sequence[float], *, axes: str, degrees: bool) -> Sequence[float]:
