@@ -159,7 +159,8 @@ def _term(name: str, value: Any) -> Term:
     elif isinstance(value, Rotation):
         found = Term(Type(POSE), (0.0, 0.0, 0.0, *value.components))
     elif isinstance(value, Measure):
-        found = Term(_type_of(value), (float(value),))
+        unit = re.sub(r"[a-z]+", r"1\g<0>", value.unit) or "1"  # m/s as 1m/1s
+        found = Term(evaluate(unit, Scope()).type, (float(value),))
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
         found = Term(PLAIN_NUMBER, (parse_number(repr(float(value))),))  # refuses what is not finite
     elif isinstance(value, (list, tuple)) and value and isinstance(value[0], (Transform, Framed)):
@@ -167,13 +168,6 @@ def _term(name: str, value: Any) -> Term:
     else:
         found = _of_numbers(name, value)
     return found._replace(text=name, atomic=True)
-
-
-def _type_of(value: Measure) -> Type:
-    """Return the type of a number with a unit."""
-    if not value.unit:
-        return PLAIN_NUMBER
-    return evaluate(re.sub(r"[a-z]+", r"1\g<0>", value.unit), Scope()).type
 
 
 def _of_numbers(name: str, value: Any) -> Term:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.calc import rules
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, parse_line
+from frametool.calc.parser import ATOMS, PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, parse_line
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
@@ -163,7 +163,7 @@ class _Walk:
         except FrametoolError as error:
             raise placed(error, branch.at) from None
         self.scope.seen.update((found.type.target, found.type.source))
-        return found._replace(text=self.text[branch.start : branch.end], atomic=branch.is_atom)
+        return found._replace(text=self.text[branch.start : branch.end], atomic=branch.kind in ATOMS)
 
     def _value(self, branch: Branch) -> Term:
         """Return what is one value, neither a tree nor a list."""
@@ -234,9 +234,8 @@ class _Walk:
         items = tuple(map(self._value, branch.parts))
         if all(item.type.kind == NUMBER for item in items):
             return rules.list_of_numbers(items)
-        kinds = {item.type.kind for item in items}
-        if len(kinds) > 1:
-            other = next(item for item in items if item.type.kind != items[0].type.kind)
+        other = next((item for item in items if item.type.kind != items[0].type.kind), None)
+        if other is not None:
             raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and {other.type.named}")
         return Term(Type(LIST), (), items=items)
 

@@ -114,10 +114,6 @@ def of_one(kinds: Sequence[str], type_of: Callable[[Type], Type], kernel: Kernel
     return rule
 
 
-def _without_shift(*pose: Number) -> Components:
-    return *(0.0 * part for part in pose[:3]), *pose[3:7]
-
-
 def _exp(name: str, terms: Sequence[Term], _: Trees) -> Term:
     def check(*numbers: float) -> str:
         rigid.check_twist(*numbers)
@@ -251,7 +247,7 @@ def _inv(name: str, terms: Sequence[Term], _: Trees) -> Term:
 
 _POSE = (POSE,)
 _trans = of_one(_POSE, lambda pose: Type(POINT, pose.target), lambda *pose: pose[:3])
-_rot = of_one(_POSE, lambda pose: pose, _without_shift)
+_rot = of_one(_POSE, lambda pose: pose, lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))
 _log = of_one(_POSE, lambda pose: Type(TWIST, pose.target), lambda *pose: rigid.log(*rules.unit_pose(*pose), pose[-1]))
 _rpy = of_one(_POSE, lambda pose: Type(ANGLES, pose.target),
               lambda *pose: euler.from_quaternion(*rules.unit_pose(*pose)[3:], "sxyz", pose[-1]))  # fmt: skip

@@ -36,7 +36,7 @@ UNITS: dict[str, tuple[float, float, Dimension]] = {
     "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
 }  # fmt: skip
 TIME_UNITS = {"s": "", "ms": "e-3", "us": "e-6", "ns": "ns"}
-ATOMS = frozenset(("number", "lookup", "name", "column", "call", "pose", "list"))
+ATOMS = frozenset(("number", "lookup", "name", "column", "call", "pose", "list"))  # need no brackets anywhere
 ARROW = "<-"
 LOOKUP = "a look-up is written TARGET<-SOURCE"
 HINTS = {
@@ -205,11 +205,6 @@ class Branch(NamedTuple):
     def of(cls, kind: str, at: int, start: int, end: int, value: Any = None, parts: tuple[Branch, ...] = ()) -> Branch:
         """Return a part without brackets around it."""
         return cls(kind, at, start, end, start, end, value, parts)
-
-    @property
-    def is_atom(self) -> bool:
-        """Tell whether it needs no brackets wherever it stands."""
-        return self.kind in ATOMS
 
 
 class Line(NamedTuple):

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from frametool.calc.evaluate import Scope
     from frametool.calc.parser import Line
-    from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number
     from frametool.grammar.result import Style
 
@@ -53,15 +52,13 @@ class RowExpressions:
     bindings: lines that only bind names which the others use
     """
 
-    def __init__(
-        self, lines: Sequence[Line], bindings: Sequence[Line], scope: Scope, notations: tuple[Notation, ...], style: Style
-    ) -> None:
+    def __init__(self, lines: Sequence[Line], bindings: Sequence[Line], scope: Scope, style: Style) -> None:
         """Keep the lines; how results are written says how poses beside rows are."""
         self.lines = tuple(lines)
         self.bindings = tuple(bindings)
         self.scope = scope
         self.degrees = style.degrees
-        forms = notations or (notation("quaternion"),)
+        forms = style.notations or (notation("quaternion"),)
         whole = len(forms) == 1 and forms[0].representation.whole is not None
         written = tuple((form, style.in_degrees(form)) for form in forms)
         self.target = Target(None if whole else 1.0, written, style.keep_sign, whole)
@@ -141,8 +138,7 @@ class RowExpressions:
     def _bind(self, line: Line, scope: Scope) -> Term:
         term = evaluate_line(line, scope)
         if line.name:
-            scope.names[line.name] = once_a_block(scope.names[line.name])
-            return scope.names[line.name]
+            term = scope.names[line.name] = once_a_block(scope.names[line.name])
         return term
 
     def _names(self, own: str, type_: Type) -> tuple[str, ...]:

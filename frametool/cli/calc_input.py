@@ -159,8 +159,7 @@ class Completer:
     def _tree_before(self, before: str) -> Any:
         """Return the tree whose bracket is open right before a word."""
         name = before[:-1].rstrip().rpartition(" ")[2] if before.endswith("[") else ""
-        bare = name.lstrip("()[]{},*^@+=-/")
-        term = self.scope.names.get(bare)
+        term = self.scope.names.get(name.lstrip("()[]{},*^@+=-/"))
         return None if term is None else term.tree
 
 
@@ -234,47 +233,26 @@ def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
 
     Ends at the first error, or with --on-error skip goes on behind it, and then returns 3.
     """
-    pipe = PipedExpressions(stream, scope)
-    is_table = output.style.form == "csv"
-    output.pieces(value_texts(pipe.values(), output.style) if is_table else _parted(pipe, output.style))
-    return pipe.finish()
+    bad, count = stream.policy("stdin"), 0
 
-
-def _parted(pipe: PipedExpressions, style: Style) -> Iterator[str]:
-    """Yield the texts of values as they come, and what stands between them."""
-    is_first = True
-    for term in pipe.values():
-        text = "".join(value_texts([term], style))
-        if not is_first and (style.form == "yaml" or (style.form == "text" and text.count("\n") > 1)):
-            yield "---\n" if style.form == "yaml" else "\n"
-        yield text
-        is_first = False
-
-
-class PipedExpressions:
-    """The lines of standard input, evaluated one after the other."""
-
-    def __init__(self, stream: Stream, scope: Scope) -> None:
-        """Take how bad lines are treated from the stream's options."""
-        self.scope = scope
-        self.bad = stream.policy("stdin")
-        self.count = 0
-
-    def values(self) -> Iterator[Term]:
-        """Yield the values that are shown."""
+    def values() -> Iterator[Term]:
+        nonlocal count
         last: Term | None = None
         for number, text in enumerate(_piped_lines(), 1):
             if not text.strip() or text.lstrip().startswith("#"):
                 continue
-            self.count += 1
+            count += 1
             last = None
             try:
                 line = read_line(text)
-                term = evaluate_line(line, self.scope)
+                term = evaluate_line(line, scope)
             except FrametoolError as error:
-                if self.bad.on_error == STOP:
+                if bad.on_error == STOP:
                     raise
-                self._skip(error, number)
+                bad.count += 1
+                if bad.count <= bad.most:
+                    snippet = getattr(error, "snippet", "")
+                    bad.tell(FormatError(f"{error} (line skipped)", source="stdin", line=number, snippet=snippet))
                 continue
             if line.name:
                 last = term
@@ -283,20 +261,24 @@ class PipedExpressions:
         if last is not None:
             yield last
 
-    def _skip(self, error: FrametoolError, number: int) -> None:
-        """Report a bad line."""
-        self.bad.count += 1
-        if self.bad.count <= self.bad.most:
-            snippet = getattr(error, "snippet", "")
-            self.bad.tell(FormatError(f"{error} (line skipped)", source="stdin", line=number, snippet=snippet))
+    texts = value_texts if output.style.form == "csv" else _parted
+    output.pieces(texts(values(), output.style))
+    if not bad.count:
+        return 0
+    message = f"stdin: {bad.count} of {count} lines skipped"
+    bad.tell(RowsSkipped(message, source="stdin", bad=bad.count, rows=count))
+    return ROWS_SKIPPED
 
-    def finish(self) -> int:
-        """Report how many lines were skipped; return the exit status."""
-        if not self.bad.count:
-            return 0
-        message = f"stdin: {self.bad.count} of {self.count} lines skipped"
-        self.bad.tell(RowsSkipped(message, source="stdin", bad=self.bad.count, rows=self.count))
-        return ROWS_SKIPPED
+
+def _parted(terms: Iterable[Term], style: Style) -> Iterator[str]:
+    """Yield the texts of values as they come, and what stands between them."""
+    is_first = True
+    for term in terms:
+        text = "".join(value_texts([term], style))
+        if not is_first and (style.form == "yaml" or (style.form == "text" and text.count("\n") > 1)):
+            yield "---\n" if style.form == "yaml" else "\n"
+        yield text
+        is_first = False
 
 
 def _piped_lines() -> Iterator[str]:
@@ -363,7 +345,8 @@ def _readline(scope: Scope) -> Iterator[None]:
     except ImportError:
         yield
         return
-    path = history_path()
+    state = os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state")  # as the XDG base directories
+    path = os.path.join(state, "frametool_history")
     readline.set_completer_delims(BETWEEN_WORDS)
     readline.set_completer(Completer(scope, readline))
     is_editline = "libedit" in (readline.__doc__ or "")
@@ -378,9 +361,3 @@ def _readline(scope: Scope) -> Iterator[None]:
         with suppress(OSError):
             os.makedirs(os.path.dirname(path), mode=0o700, exist_ok=True)
             readline.write_history_file(path)
-
-
-def history_path() -> str:
-    """Return the file of the history, as the XDG base directories have it."""
-    state = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
-    return os.path.join(state, "frametool_history")

@@ -389,9 +389,7 @@ def _target_and_source(way: ByTree | Given, own: str | None) -> tuple[str, str]:
     return target, own or source or "b"
 
 
-def _move_vectors(
-    sheet: Sheet, pose: Rigid, record: Record, mover: Rigid, frames: tuple[str, str]
-) -> None:
+def _move_vectors(sheet: Sheet, pose: Rigid, record: Record, mover: Rigid, frames: tuple[str, str]) -> None:
     """Move a point, a vector, a twist or a wrench, and end with the result."""
     shape = record.shape
     numbers, covariance = record.values[: shape.own_size], record.values[shape.own_size :]

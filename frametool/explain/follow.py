@@ -170,6 +170,5 @@ def _compare(step: FollowStep, distance: float, linear: float, angular: float) -
     for found, own, gain in zip(
         (distance, linear, angular), (step.distance, step.linear, step.angular), (1.0, *step.gains), strict=True
     ):
-        slack = near * max(1.0, abs(gain))
-        if not abs(found - own) <= slack:
+        if not abs(found - own) <= near * max(1.0, abs(gain)):
             raise DerivationWrong(f"the derivation of {step.follower} gives {found!r}, not {own!r}; {REPORT}")

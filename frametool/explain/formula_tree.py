@@ -124,7 +124,8 @@ def as_text(
         if latex and isinstance(node.op, ast.Pow):
             text = f"{first}^{{{second}}}"
         elif latex and isinstance(node.op, ast.Mult):
-            text = f"{first} {_times(first, second)} {second}"
+            is_dot = first[-1].isdigit() or second[0].isdigit() or second.startswith(r"\left(-")  # beside a number
+            text = rf"{first} \cdot {second}" if is_dot else rf"{first} \, {second}"
         loose = binds < outer
     if not loose:
         return text
@@ -153,8 +154,3 @@ def _call(name: str, arguments: Iterable[str], *, latex: bool) -> str:
         return rf"\left\lvert {inside} \right\rvert"
     operator = r"\operatorname{atan2}" if name == "atan2" else rf"\{name}"
     return rf"{operator}\left({inside}\right)"
-
-
-def _times(first: str, second: str) -> str:
-    """Choose the sign of a product: a dot where a number stands beside it, else a thin space."""
-    return r"\cdot" if first[-1].isdigit() or second[0].isdigit() or second.startswith(r"\left(-") else r"\,"

@@ -35,10 +35,7 @@ NOT_ACOS = "2 atan2(s, w), not 2 acos(w): acos loses half the digits near no rot
 
 def quaternion(sheet: Sheet, q: Quaternion, *, keep_sign: bool) -> Sequence[float]:
     """Choose the sign; the order is x, y, z, w."""
-    if keep_sign or _first(q) >= 0.0:
-        return q
-    sheet.heading("The quaternion with w >= 0")
-    return canonical(sheet, q)
+    return q if keep_sign else canonical(sheet, q, heading="The quaternion with w >= 0")
 
 
 def wxyz(sheet: Sheet, q: Quaternion, *, keep_sign: bool) -> Sequence[float]:
@@ -50,19 +47,16 @@ def wxyz(sheet: Sheet, q: Quaternion, *, keep_sign: bool) -> Sequence[float]:
     return w, x, y, z
 
 
-def canonical(sheet: Sheet, q: Quaternion, first: float | None = None) -> Quaternion:
+def canonical(sheet: Sheet, q: Quaternion, *, first: float | None = None, heading: str = "") -> Quaternion:
     """Return q or -q, with steps if the sign is turned; `first` decides it, else w or the first that is not 0."""
-    if (_first(q) if first is None else first) >= 0.0:
+    x, y, z, w = q
+    if (w or x or y or z if first is None else first) >= 0.0:
         return q
-    values = dict(zip(XYZW, q, strict=True))
-    x, y, z, w = sheet.each(values, XYZW, "q%", "-%")
+    if heading:
+        sheet.heading(heading)
+    x, y, z, w = sheet.each(dict(zip(XYZW, q, strict=True)), XYZW, "q%", "-%")
     sheet.caveat(COVER)
     return x, y, z, w
-
-
-def _first(q: Quaternion) -> float:
-    x, y, z, w = q
-    return w or x or y or z
 
 
 def matrix(sheet: Sheet, q: Quaternion) -> Sequence[float]:
@@ -175,7 +169,7 @@ def _axis(sheet: Sheet, values: Values) -> bool:
 def rotvec(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
     """Multiply the axis with the angle."""
     sheet.heading("Quaternion to rotation vector")
-    values = dict(zip(XYZW, canonical(sheet, q, q[3]), strict=True))
+    values = dict(zip(XYZW, canonical(sheet, q, first=q[3]), strict=True))
     if not _axis(sheet, values):
         sheet.say("No rotation: the vector is 0.")
         return 0.0, 0.0, 0.0

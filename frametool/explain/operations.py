@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Quaternion, Vector
     Parts = list[str | Matrix]
-    Block = Callable[[Sheet, Rigid, Sequence[float], str, str], Sequence[float]]
 
 TOUCH = "Frames that touch cancel. The second position is first turned into the first frame, then the first is added."
 ORDER = (
@@ -47,14 +46,14 @@ def _named(prefix: str, numbers: Sequence[float], names: Sequence[str]) -> dict[
 def product(sheet: Sheet, a: Quaternion, b: Quaternion, *, brief: bool = False) -> Quaternion:
     """Multiply two quaternions; brief: on one line."""
     values = _named("a", a, XYZW) | _named("b", b, XYZW)
+    if not brief:
+        sheet.say("c = a b (Hamilton: ij = k, ji = -k; not commutative)")
+    steps = sheet.aside() if brief else sheet
+    x, y, z, w = (steps.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
     if brief:
-        aside = sheet.aside()
-        x, y, z, w = (aside.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
         sheet.quaternions(("a b", "%s·%s"), (r"a\,b", r"%s \cdot %s"), a, b, (x, y, z, w))
-        return x, y, z, w
-    sheet.say("c = a b (Hamilton: ij = k, ji = -k; not commutative)")
-    x, y, z, w = (sheet.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
-    sheet.caveat(ORDER)
+    else:
+        sheet.caveat(ORDER)
     return x, y, z, w
 
 
@@ -255,7 +254,7 @@ def _sandwich(sheet: Sheet, a: Matrix, c: Matrix, text: str, latex: str) -> Matr
     return found
 
 
-MOVERS: dict[str, Block] = {"point": point, "vector": vector, "twist": twist, "wrench": wrench}
+MOVERS: dict[str, Callable[..., Sequence[float]]] = {"point": point, "vector": vector, "twist": twist, "wrench": wrench}
 
 
 class OtherAxes(NamedTuple):

@@ -92,8 +92,7 @@ def command(
     if not lines:
         return _without_expression(stream, output, scope)
     if stream.path is not None or any(mentions_row(line.tree) for line in lines):
-        flags = [is_option for _, is_option in given]
-        formula = _over_rows(lines, flags, scope, output)
+        formula = _over_rows(lines, [is_option for _, is_option in given], scope, output)
         formula.check((kind,) if kind else ("pose", "point", "vector"))
         request = _request(formula, kind or "", time_column, degrees=deg, normalize=normalize)
         return stream.run(request, output)
@@ -147,7 +146,7 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
     if twice := next((name for name in names if name and names.count(name) > 1), ""):
         raise click.UsageError(f"-e {twice}= is given twice")
     bindings = [line for line in lines if line not in results]
-    return RowExpressions(results, bindings, scope, output.notations, output.style)
+    return RowExpressions(results, bindings, scope, output.style)
 
 
 def _request(formula: RowExpressions, kind: str, time_column: str | None, *, degrees: bool, normalize: bool) -> Request:
