@@ -48,7 +48,7 @@ class Measure(float):
 class Framed:
     """A value with its frames: a pose `target<-source`, or a point, vector, twist or angles seen in `target`.
 
-    kind: pose, point, vector, twist, angles, list.  A frame that nobody said is None.
+    kind: pose, point, vector, twist, angles, list.  A frame that is not known is None.
     """
 
     __slots__ = ("_term",)
@@ -201,7 +201,7 @@ def plain_result(term: Term, style: Style) -> Any:
 
 
 def angle_in(term: Term, *, degrees: bool) -> float:
-    """Return an angle in degrees or radians; what was given in degrees comes out as it was."""
+    """Return an angle in degrees or radians; one in degrees comes out as it was written."""
     if degrees and term.type.degrees:
         return float(term.at(None)[0])
     radians = float(in_radians(term).at(None)[0])

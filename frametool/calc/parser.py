@@ -62,7 +62,7 @@ class CalcError(FrametoolError):
     """
 
     def __init__(self, message: str, at: int | None = None) -> None:
-        """Keep the place beside the message."""
+        """Keep the place with the message."""
         super().__init__(message)
         self.at = at
         self.snippet = ""
@@ -189,7 +189,7 @@ class Branch(NamedTuple):
     kind: number, lookup, name, column, call, pose, list, chain, sign, power, as, in
     at: the place that a message about it points to
     start, end: where its text stands; left, right: with the brackets around it
-    value: what it says beside its parts, by kind; parts: those in order
+    value: what it holds apart from its parts, by kind; parts: those in order
     """
 
     kind: str
@@ -351,7 +351,7 @@ class _Parser:
         return Branch.of("power", token.start, base.left, exponent.right, None, (base, exponent))
 
     def named(self) -> Branch:
-        """Read a value and the frames it is said to have."""
+        """Read a value and the frames that `as` or `in` gives it."""
         branch, before = self.atom(), self.depth
         while self.next.kind == "name" and self.next.text in ("as", "in"):
             word = self.take()

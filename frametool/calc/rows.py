@@ -47,13 +47,13 @@ class Bound(NamedTuple):
 
 
 class RowExpressions:
-    """Lines whose results replace rows (one without a name) or stand beside them (all named); a `Formula` of streams.
+    """Lines whose results replace rows (one without a name) or are added to them (all named); a `Formula` of streams.
 
     bindings: lines that only bind names which the others use
     """
 
     def __init__(self, lines: Sequence[Line], bindings: Sequence[Line], scope: Scope, style: Style) -> None:
-        """Keep the lines; how results are written says how poses beside rows are."""
+        """Keep the lines; the style says how poses in columns of their own are written."""
         self.lines = tuple(lines)
         self.bindings = tuple(bindings)
         self.scope = scope
@@ -118,7 +118,7 @@ class RowExpressions:
         if self.kind(row):
             return bound.terms[0][1].at(values)
         numbers = [number for _, term in bound.terms for number in self._numbers(term, values)]
-        return (*(0.0,) * 7, *numbers)  # a row stays as it is: no pose of ours is written
+        return (*(0.0,) * 7, *numbers)  # a row stays as it is: its own pose is not replaced
 
     def _for(self, type_: Type) -> Bound:
         """Understand the lines for rows of a type."""

@@ -1,6 +1,6 @@
 """The values of expressions: what kind they are, in which frames and units, and their numbers, or what computes them.
 
-A frame that nobody said is None, shown as `?`, and meets any.  Numbers are components, floats or arrays of one shape.
+A frame that is not known is None, shown as `?`, and meets any.  Numbers are components, floats or arrays of one shape.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ LONGEST_PATH = 4096
 def file_named_in(text: str, scope: Scope) -> Term | None:
     """Bind the name of `NAME=FILE` to what the file holds, and return it; None for everything else.
 
-    What looks like a file and is none is refused as one.
+    What looks like the name of a file is read as one, and refused if there is none.
     """
     head, equals, tail = text.partition("=")
     name, path = head.strip(), tail.strip()

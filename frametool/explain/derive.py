@@ -69,7 +69,7 @@ class DerivationStyle(NamedTuple):
 
 
 def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None]) -> Explanation:
-    """Write a derivation; where setting noise to 0 leads too far away, as beside singular numbers, without that."""
+    """Write a derivation; where setting noise to 0 leads too far away, as near singular numbers, without that."""
     for clean in dict.fromkeys((plan.digits is not None, False)):
         sheet = Sheet(plan.digits, clean=clean, every=plan.every)
         try:
@@ -98,7 +98,7 @@ def written(sheet: Sheet, q: Quaternion, form: Notation, plan: DerivationStyle) 
 
 
 def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle) -> None:
-    """Compare numbers of a notation with the result's, as rotations: so also beside lock; say what it is of a pose.
+    """Compare numbers of a notation with the result's as rotations, also near lock; say how a pose is written in it.
 
     Raises DerivationWrong.
     """
@@ -211,10 +211,10 @@ def _short_way(sheet: Sheet, given: Given, form: Notation, plan: DerivationStyle
     return numbers
 
 
-def _say_given(sheet: Sheet, given: Sequence[Given], labels: Sequence[tuple[str, str]]) -> None:
+def _say_given(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, str]]) -> None:
     """List the poses as they are written."""
     sheet.heading("Given")
-    for each, (target, source) in zip(given, labels, strict=True):
+    for each, (target, source) in zip(poses, labels, strict=True):
         each.say(sheet, target, source)
 
 
@@ -375,7 +375,7 @@ def apply(
 
 
 def _target_and_source(way: ByTree | Given, own: str | None) -> tuple[str, str]:
-    """Return target and source for a record given in a frame; where it names one, that must be the source."""
+    """Return target and source for a record; where it names its own frame, that must be the source."""
     if isinstance(way, Given):
         target, source = way.pose.parent or "a", way.pose.name
     else:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     Leaf = Callable[[str], str]
 
 NOISE = 2e-15  # of the largest term: what the rounding of a few terms leaves where they cancel
-FAR = 16.0  # radians: a larger angle is as it was given, no multiple of a rounded pi
+FAR = 16.0  # radians: a larger angle is as it was written, no multiple of a rounded pi
 SUM, PRODUCT, SIGN, POWER = 1, 2, 3, 4  # how tightly an operator binds
 BINDS = {ast.Add: SUM, ast.Sub: SUM, ast.Mult: PRODUCT, ast.Div: PRODUCT, ast.Pow: POWER}
 TEXT = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: "·", ast.Div: "/", ast.Pow: "^"}
@@ -124,7 +124,7 @@ def as_text(
         if latex and isinstance(node.op, ast.Pow):
             text = f"{first}^{{{second}}}"
         elif latex and isinstance(node.op, ast.Mult):
-            is_dot = first[-1].isdigit() or second[0].isdigit() or second.startswith(r"\left(-")  # beside a number
+            is_dot = first[-1].isdigit() or second[0].isdigit() or second.startswith(r"\left(-")  # next to a number
             text = rf"{first} \cdot {second}" if is_dot else rf"{first} \, {second}"
         loose = binds < outer
     if not loose:

@@ -101,7 +101,7 @@ def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
 
 
 def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
-    """Compare two poses: `frames` are the one both are given in, that of a and that of b."""
+    """Compare two poses: `frames` are the one both are seen from, that of a and that of b."""
     world, first, second = frames
     sheet.heading(f"{first}_from_{second} = ({world}_from_{first})^-1 @ {world}_from_{second}")
     sheet.say("inverse, then compose: R^T tb + (-R^T ta) = R^T (tb - ta); subtracted first, near poses keep their "

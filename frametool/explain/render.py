@@ -35,7 +35,7 @@ def text_of(items: Sequence[Item]) -> str:
 
 
 def _lines(item: Item) -> list[str]:
-    """Return the lines of what is no step."""
+    """Return the lines of words, of matrices or of the result."""
     if isinstance(item, Words):
         return [""] * (item.kind == HEADING) + _wrapped(item.text, *INDENTS[item.kind])
     if isinstance(item, SheetResult):

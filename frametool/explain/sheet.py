@@ -55,12 +55,12 @@ ROOTS = ("sqrt(0)/2", "sqrt(2)/2", "sqrt(4)/2", "sqrt(2)/2", "sqrt(0)/2", "-sqrt
 EXACT = "Multiples of 90 deg are exact: no rounded pi comes into their sines and cosines."
 METRES, RADIANS, DEGREES = "m", "rad", "deg"
 HEADING, SENTENCE, CAVEAT = "heading", "sentence", "caveat"
-DIGITS = 6  # significant ones, unless told
+DIGITS = 6  # significant ones, unless another count is asked for
 TOO_LARGE = "the numbers are too large or too small for a derivation: a step is not finite"
 
 
 class Words(NamedTuple):
-    """What is said: a heading with its number, a sentence, or a caveat, which is what is easily got wrong."""
+    """A line of words: a heading with its number, a sentence, or a caveat, which is what is easily got wrong."""
 
     kind: str
     text: str
@@ -265,28 +265,28 @@ class Sheet:
             self.caveat(EXACT)
 
     def direction(
-        self, values: Values, given: Sequence[str], unit: Sequence[str], name: str, measure: str = ""
+        self, values: Values, names: Sequence[str], parts: Sequence[str], name: str, measure: str = ""
     ) -> float:
         """Add the length of a non-zero vector and its direction."""
-        found, divided, by = self.length(values, given, name, measure)
-        for each, part in zip(unit, divided, strict=True):
+        found, divided, by = self.length(values, names, name, measure)
+        for each, part in zip(parts, divided, strict=True):
             self.step(values, each, f"{part}/{by}")
         return found
 
     def length(
-        self, values: Values, given: Sequence[str], name: str, measure: str = ""
+        self, values: Values, names: Sequence[str], name: str, measure: str = ""
     ) -> tuple[float, Sequence[str], str]:
         """Add the length of a vector; one whose squares leave the range of a double is scaled first.
 
         Returns it, and the names of numbers whose quotients are the direction.
         """
-        most = max(abs(values[each]) for each in given)
+        most = max(abs(values[each]) for each in names)
         if most == 0.0 or TINY < most < HUGE:
-            return self.step(values, name, norm(given), measure), given, name
+            return self.step(values, name, norm(names), measure), names, name
         self.say("Squares of these numbers leave the range of a double; they are divided by the largest first.")
-        self.step(values, "m", f"max({', '.join(f'abs({each})' for each in given)})", measure)
-        scaled = [f"k{letter}" for letter in "xyzw"[: len(given)]]
-        for each, part in zip(scaled, given, strict=True):
+        self.step(values, "m", f"max({', '.join(f'abs({each})' for each in names)})", measure)
+        scaled = [f"k{letter}" for letter in "xyzw"[: len(names)]]
+        for each, part in zip(scaled, names, strict=True):
             self.step(values, each, f"{part}/m")
         self.step(values, "k", norm(scaled))
         return self.step(values, name, "m*k", measure), scaled, "k"

@@ -21,7 +21,7 @@ UNIT = 8.9e-16  # 4 eps: a length this near 1 is 1
 LAST_STEP = 1e-9  # the convergence is quadratic: what comes after such a step is rounding
 MOST_STEPS = 60
 HALF = "Half the angle stands inside: a quaternion acts twice (q v q*), so w = cos(angle/2)."
-NEAR_HALF_TURN = 1e-3  # of s: below, beside half a turn, the axis loses more digits than the derivation may be off
+NEAR_HALF_TURN = 1e-3  # of s: below, near half a turn, the axis loses more digits than the derivation may be off
 NOT_UNIT = "The axis is not a unit vector: it is divided by its length. With a longer axis q would be no rotation."
 SQUARES = (
     "ww, xx, yy, zz are four times the squares of w, x, y, z. The largest is taken: nothing is then divided by a "
@@ -183,12 +183,12 @@ def rotvec(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaterni
 
 def matrix(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     """Take the largest of the four squares (Shepperd 1978)."""
-    values = dict(zip(ENTRIES, nearest_rotation(sheet, numbers), strict=True))
+    return _shepperd(sheet, nearest_rotation(sheet, numbers))
+
+
+def _shepperd(sheet: Sheet, entries: Sequence[float]) -> Quaternion:
+    values = dict(zip(ENTRIES, entries, strict=True))
     sheet.heading("Matrix to quaternion")
-    return _shepperd(sheet, values)
-
-
-def _shepperd(sheet: Sheet, values: Values) -> Quaternion:
     sheet.say(SQUARES)
     squares = {name: sheet.step(values, name * 2, formula) for name, formula in SHEPPERD.items()}
     large = max(squares, key=squares.__getitem__)
@@ -217,9 +217,7 @@ def six_d(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
         sheet.step(values, f"w{name}", f"u{a}*{second}{b} - u{b}*{second}{a}")
     columns = [[values[f"{letter}{name}"] for name in XYZ] for letter in ("u", second, "w")]
     sheet.grid("R", "(u v w)", r"(u\ v\ w)", [[list(row) for row in zip(*columns, strict=True)]])
-    sheet.heading("Matrix to quaternion")
-    entries = [part for row in zip(*columns, strict=True) for part in row]
-    return _shepperd(sheet, dict(zip(ENTRIES, entries, strict=True)))
+    return _shepperd(sheet, [part for row in zip(*columns, strict=True) for part in row])
 
 
 def mrp(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
@@ -303,7 +301,7 @@ def axis_angle_to_matrix(sheet: Sheet, numbers: Sequence[float], *, degrees: boo
 def matrix_to_axis_angle(
     sheet: Sheet, numbers: Sequence[float], *, wanted_degrees: bool
 ) -> Sequence[float] | None:  # fmt: skip
-    """Read the angle off the trace and the axis off the differences; None beside half a turn, where both vanish."""
+    """Read the angle off the trace and the axis off the differences; None near half a turn, where both vanish."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = numbers
     if r11 + r22 + r33 < 1.0 and max(abs(r32 - r23), abs(r13 - r31), abs(r21 - r12)) < NEAR_HALF_TURN:
         return None

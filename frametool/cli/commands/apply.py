@@ -262,7 +262,7 @@ def _way_by_pose(argument: str, given: Notation | None, *, degrees: bool, normal
         return pose.components
 
     def explained() -> Given:
-        return given_as_written(source, given, degrees=degrees, normalize=normalize, told=False)
+        return given_as_written(source, given, degrees=degrees, normalize=normalize, warned=True)
 
     return Way(pose.parent, from_frame, None, lambda _own: False, explained, has_source=True)
 

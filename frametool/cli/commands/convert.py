@@ -166,7 +166,7 @@ def command(
             raise click.UsageError(f"--explain derives one pose, found {len(results)}")
         from frametool.explain import derive
 
-        written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
+        written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, warned=True)
         change = _named_change(axes, world, operation) if values else None
         return explaining.write(derive.convert(explaining.plan(output), written, own=poses[0], change=change), output)
     output.values(results)
