@@ -8,24 +8,10 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, Self
 
-from frametool.calc.evaluate import evaluate_line, read_line
+from frametool.calc.evaluate import Scope, evaluate, evaluate_line, read_line
+from frametool.calc.parser import RADIAN, frame_text
 from frametool.calc.rules import in_radians
-from frametool.calc.scope import Scope
-from frametool.calc.tokens import CalcError, frame_text
-from frametool.calc.values import (
-    ANGLES,
-    LIST,
-    NUMBER,
-    PLAIN_NUMBER,
-    POINT,
-    POSE,
-    RADIAN,
-    TREE,
-    TWIST,
-    Term,
-    Type,
-    unit_text,
-)
+from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, Term, Type, unit_text
 from frametool.errors import ValueInvalid, printable, shown
 from frametool.frames.lookups import Frames
 from frametool.geometry.rotation import Rotation
@@ -62,7 +48,7 @@ class Measure(float):
 class Framed:
     """A value with its frames: a pose `target<-source`, or a point, vector, twist or angles seen in `target`.
 
-    kind: pose, point, vector, twist, angles, list.  A frame that nobody said is None.
+    kind: pose, point, vector, twist, angles, list.  A frame that is not known is None.
     """
 
     __slots__ = ("_term",)
@@ -145,13 +131,8 @@ def calc(
     Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`.
     Raises CalcError for frames or units that do not fit, LookupFailed.
     """
-    from frametool.calc.scope import Literals
-
-    scope = Scope(
-        tree=tree,
-        names={name: _term(name, value) for name, value in names.items()},
-        literals=Literals(degrees=degrees, normalize=normalize),
-    )
+    terms = {name: _term(name, value) for name, value in names.items()}
+    scope = Scope(tree=tree, names=terms, degrees=degrees, normalize=normalize)
     for name in names:
         read_line(f"{name}=0")  # refuses what has a meaning of its own
     return _result(evaluate_line(read_line(text), scope))
@@ -178,23 +159,15 @@ def _term(name: str, value: Any) -> Term:
     elif isinstance(value, Rotation):
         found = Term(Type(POSE), (0.0, 0.0, 0.0, *value.components))
     elif isinstance(value, Measure):
-        found = Term(_type_of(value), (float(value),))
+        unit = re.sub(r"[a-z]+", r"1\g<0>", value.unit) or "1"  # m/s as 1m/1s
+        found = Term(evaluate(unit, Scope()).type, (float(value),))
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
         found = Term(PLAIN_NUMBER, (parse_number(repr(float(value))),))  # refuses what is not finite
     elif isinstance(value, (list, tuple)) and value and isinstance(value[0], (Transform, Framed)):
         found = Term(Type(LIST), (), items=tuple(_term(name, each) for each in value))
     else:
         found = _of_numbers(name, value)
-    return found.written(name, atomic=True)
-
-
-def _type_of(value: Measure) -> Type:
-    """Return the type of a number with a unit."""
-    from frametool.calc.evaluate import evaluate
-
-    if not value.unit:
-        return PLAIN_NUMBER
-    return evaluate(re.sub(r"[a-z]+", r"1\g<0>", value.unit), Scope()).type
+    return found._replace(text=name, atomic=True)
 
 
 def _of_numbers(name: str, value: Any) -> Term:
@@ -214,34 +187,21 @@ def _of_numbers(name: str, value: Any) -> Term:
     return Term(PLAIN_NUMBER, (float(array) if array.ndim == 0 else array,))
 
 
-def plain_results(term: Term, style: Style) -> Iterator[Any]:
-    """Yield a value as results: a pose as a Result, a number bare, all else a mapping; of a list each item."""
-    type_ = term.type
-    if type_.kind == TREE:
-        raise CalcError(f"{term.text} is a tree; ask it: {term.text}[TARGET<-SOURCE]")
-    if type_.kind == LIST:
-        for item in term.items:
-            yield from plain_results(item, style)
-        return
-    numbers = term.at(None)
+def plain_result(term: Term, style: Style) -> Any:
+    """Return one value as a result: a pose as a Result, a number bare, all else as a mapping."""
+    type_, numbers = term.type, term.at(None)
+    frame = {} if type_.target is None else {"frame": type_.target}
     if type_.kind == POSE:
-        yield Result(Pose.of(numbers, type_.source, type_.target))
-    elif type_.kind == NUMBER:
-        yield angle_in(term, degrees=style.degrees) if type_.unit == RADIAN else numbers[0]
-    elif type_.kind == ANGLES:
-        degrees = style.degrees
-        angles = [each * DEGREES for each in numbers] if degrees else list(numbers)
-        yield _in_frame(term) | {"rpy_deg" if degrees else "rpy": angles}
-    else:
-        yield _in_frame(term) | {type_.kind: list(numbers)}
-
-
-def _in_frame(term: Term) -> dict[str, Any]:
-    return {} if term.type.target is None else {"frame": term.type.target}
+        return Result(Pose.of(numbers, type_.source, type_.target))
+    if type_.kind == NUMBER:
+        return angle_in(term, degrees=style.degrees) if type_.unit == RADIAN else numbers[0]
+    if type_.kind == ANGLES:
+        return frame | ({"rpy_deg": [each * DEGREES for each in numbers]} if style.degrees else {"rpy": list(numbers)})
+    return frame | {type_.kind: list(numbers)}
 
 
 def angle_in(term: Term, *, degrees: bool) -> float:
-    """Return an angle in degrees or radians; what was given in degrees comes out as it was."""
+    """Return an angle in degrees or radians; one in degrees comes out as it was written."""
     if degrees and term.type.degrees:
         return float(term.at(None)[0])
     radians = float(in_radians(term).at(None)[0])
@@ -250,20 +210,17 @@ def angle_in(term: Term, *, degrees: bool) -> float:
 
 def line_of_value(term: Term, style: Style) -> str:
     """Return a value other than a pose or a point on a line, for a person."""
+
+    def text(*values: float) -> str:
+        return "  ".join(style.number(value + 0.0) for value in values)
+
     type_, numbers = term.type, term.at(None)
     frame = "" if type_.target is None else f" in {printable(type_.target)}"
     if type_.kind == NUMBER and type_.unit == RADIAN:
-        radians, degrees = (_text(angle_in(term, degrees=each), style) for each in (False, True))
+        radians, degrees = (text(angle_in(term, degrees=each)) for each in (False, True))
         return f"{degrees} deg  ({radians} rad)\n" if style.degrees else f"{radians} rad  ({degrees} deg)\n"
     if type_.kind == NUMBER:
-        return f"{_text(numbers[0], style)} {unit_text(type_.unit)}".rstrip() + "\n"
+        return f"{text(numbers[0])} {unit_text(type_.unit)}".rstrip() + "\n"
     if type_.kind == ANGLES:
-        radians, degrees = ("  ".join(_text(each * unit, style) for each in numbers) for unit in (1.0, DEGREES))
-        return f"rpy  {radians}  rad{frame}\n     {degrees}  deg\n"
-    assert type_.kind == TWIST  # noqa: S101 - all other kinds are written elsewhere
-    linear, angular = ("  ".join(_text(each, style) for each in part) for part in (numbers[:3], numbers[3:]))
-    return f"linear  {linear}  m\nangular  {angular}  rad{frame}\n"
-
-
-def _text(value: float, style: Style) -> str:
-    return style.number(value + 0.0)
+        return f"rpy  {text(*numbers)}  rad{frame}\n     {text(*(each * DEGREES for each in numbers))}  deg\n"
+    return f"linear  {text(*numbers[:3])}  m\nangular  {text(*numbers[3:])}  rad{frame}\n"  # a twist

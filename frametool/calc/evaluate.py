@@ -1,22 +1,28 @@
 """From an expression to its value: each part is understood once, in order; what depends on a row is computed later.
 
+What an expression may name stands in its scope; a literal in braces is a pose in the grammar that files share, or a
+point, a vector or a twist as results are written.
+
 scope = Scope(tree=frametool.load("robot.yaml"))
 evaluate("inv(map<-base_link) * (map<-tool)", scope).type      # base_link<-tool
+{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}    {name: tool, parent: wrist, xyz: [0, 0, 0.1]}
+{frame: map, point: [1, 2, 3]}           {twist: [1, 0, 0, 0, 0, 0.5]}
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from frametool.calc import rules
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.parser import RESERVED, column_name, parse_line
-from frametool.calc.rules import wanted
-from frametool.calc.scope import Scope, pointed
-from frametool.calc.tokens import CalcError, NoTree
-from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POSE, UNITS, Term, Type
-from frametool.errors import FrametoolError, did_you_mean, shown, warn
+from frametool.calc.parser import ATOMS, PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, parse_line
+from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type
+from frametool.documents.document import parse_documents
+from frametool.documents.source import Source
+from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
+from frametool.grammar.pose import read_pose
+from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, slash_note, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,9 +31,97 @@ if TYPE_CHECKING:
     from frametool.calc.values import RowValues
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
+    from frametool.grammar.pose import Pose
 
 TAKEN = frozenset(FUNCTIONS)
 PI = 3.141592653589793
+NAME = "literal"
+AXES = ("x", "y", "z")
+PLACED = {"point": (POINT, AXES), "vector": (VECTOR, AXES), "twist": (TWIST, ("vx", "vy", "vz", "wx", "wy", "wz"))}
+
+
+def literal(value: Any, reading: Reading) -> Term:
+    """Read a pose, or a point, a vector or a twist as results are written; raises Misfit."""
+    if type(value) is not dict:
+        raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(value)}")
+    key = next((key for key in PLACED if key in value), "")
+    if not key:
+        return term_of_pose(read_pose(value, reading))
+    if unknown := [each for each in value if each not in (key, "frame")]:
+        hint = did_you_mean(unknown[0], ("frame",))
+        raise Misfit(f"unknown key {shown(unknown[0])} beside {key}{hint}; expected frame", (unknown[0],), key=True)
+    type_, names = PLACED[key]
+    frame = value.get("frame")
+    if frame is not None and (type(frame) is not str or not frame):
+        raise Misfit(f"frame must be a frame's name, found {kind(frame)}", ("frame",))
+    return Term(Type(type_, frame), within((key,), read_numbers, value[key], names))
+
+
+def term_of_pose(pose: Pose) -> Term:
+    """Return the value of a pose that names its frames or not."""
+    return Term(Type(POSE, pose.parent, pose.name), pose.components)
+
+
+class Scope:
+    """What an expression may name: values, trees, the tree of bare look-ups, the row of a stream.
+
+    names: of values and trees; it grows as lines bind
+    row: the type of a row; None outside of streams
+    degrees, normalize: of literals: what bare angles are, and whether rotations that are off are accepted
+    seen: the frames of all that was evaluated
+    """
+
+    def __init__(
+        self, *, tree: Frames | None = None, names: dict[str, Term] | None = None, row: Type | None = None,
+        degrees: bool = False, normalize: bool = False,
+    ) -> None:  # fmt: skip
+        """Begin with a tree and names."""
+        self.tree = tree
+        self.names = {} if names is None else names
+        self.row = row
+        self.degrees = degrees
+        self.normalize = normalize
+        self.seen: set[str | None] = {None}
+
+    def with_row(self, row: Type) -> Scope:
+        """Return the same scope for rows of a type, its names its own."""
+        return Scope(
+            tree=self.tree, names=dict(self.names), row=row, degrees=self.degrees, normalize=self.normalize
+        )  # fmt: skip
+
+    def reading(self, source: Source) -> Reading:
+        """Return how the literals of a text are read."""
+        return Reading(source, degrees=self.degrees, normalize=self.normalize)
+
+    @property
+    def trees(self) -> list[tuple[str, Frames]]:
+        """Return the trees by the names that look-ups in them have; the tree of bare ones first."""
+        named = [(name, term.tree) for name, term in self.names.items() if term.tree is not None]
+        return [("", self.tree), *named] if self.tree is not None else named
+
+
+def pointed(error: FrametoolError, text: str) -> FrametoolError:
+    """Add the expression with a caret to an error that says its place."""
+    at = getattr(error, "at", None)
+    if at is not None and not getattr(error, "snippet", ""):
+        from frametool.documents.source import line_of, places_of, pointer
+
+        if at < len(text):
+            ((row, column),) = places_of(f"{text}.", [at])
+        else:  # behind the last character that shows
+            lines = text.rstrip().splitlines() or [""]
+            row, column = len(lines), len(lines[-1]) + 1
+        error.fields = {**error.fields, "column": column}
+        lines = pointer(line_of(text, row), column).split("\n")
+        error.snippet = "\n".join(f"  {each}" for each in lines)  # type: ignore[attr-defined]
+    return error
+
+
+def placed(error: FrametoolError, at: int) -> FrametoolError:
+    """Say where in the expression an error is, unless it says so."""
+    if getattr(error, "at", None) is None:
+        error.at = at  # type: ignore[attr-defined]
+    return error
 
 
 def evaluate(text: str, scope: Scope) -> Term:
@@ -50,8 +144,8 @@ def evaluate_line(line: Line, scope: Scope) -> Term:
     except FrametoolError as error:
         raise pointed(error, line.text) from None
     if line.name:
-        scope.names[line.name] = term.written(line.name, atomic=True)
-    scope.names["ans"] = term.written("ans", atomic=True)
+        scope.names[line.name] = term._replace(text=line.name, atomic=True)
+    scope.names["ans"] = term._replace(text="ans", atomic=True)
     return term
 
 
@@ -67,20 +161,17 @@ class _Walk:
         try:
             found: Term = getattr(self, f"_{branch.kind}")(branch)
         except FrametoolError as error:
-            if getattr(error, "at", None) is None:
-                error.at = branch.at  # type: ignore[attr-defined]
-            raise
+            raise placed(error, branch.at) from None
         self.scope.seen.update((found.type.target, found.type.source))
-        return found.written(self.text[branch.start : branch.end], atomic=branch.is_atom)
+        return found._replace(text=self.text[branch.start : branch.end], atomic=branch.kind in ATOMS)
 
     def _value(self, branch: Branch) -> Term:
         """Return what is one value, neither a tree nor a list."""
         term = self.term(branch)
         try:
-            return wanted(term)
+            return rules.wanted(term)
         except CalcError as error:
-            error.at = branch.at
-            raise
+            raise placed(error, branch.at) from None
 
     def _number(self, branch: Branch) -> Term:
         text, unit = branch.value
@@ -89,21 +180,15 @@ class _Walk:
                 raise CalcError(f"{shown(unit)} is no unit; write {text} * {unit}")
             raise CalcError(f"unknown unit {shown(unit)}{did_you_mean(unit, UNITS) or ';'} units: {' '.join(UNITS)}")
         value = float(text)
-        if value == float("inf"):
-            raise CalcError(f"{shown(text)} is not finite")
-        if not unit:
-            return Term(PLAIN_NUMBER, (value,))
-        times, below, dimension = UNITS[unit]
+        times, below, dimension = UNITS[unit] if unit else (1.0, 1.0, PLAIN)
         if value * times == float("inf"):
-            raise CalcError(f"{shown(text + unit)} is not finite")
+            raise CalcError(f"{shown(text if value == float('inf') else text + unit)} is not finite")
         return Term(Type(NUMBER, unit=dimension, degrees=unit == "deg"), (value * times / below,))
 
     def _name(self, branch: Branch) -> Term:
         name, scope = branch.value, self.scope
         if name == "row":
-            if scope.row is None:
-                raise CalcError("row is known in streams only: -i FILE, or standard input")
-            return Term(scope.row, None, lambda row: row.parts)
+            return Term(self._row("row"), None, lambda row: row.parts)
         if name == "pi":
             return Term(PLAIN_NUMBER, (PI,))
         if name in scope.names:
@@ -121,29 +206,46 @@ class _Walk:
             raise CalcError(f"{name} is a function: {name}({FUNCTIONS[name].takes})")
         raise CalcError(f"unknown name {shown(name)}{hint}")
 
-    def _column(self, branch: Branch) -> Term:
+    def _row(self, what: str) -> Type:
+        """Return the type of a row."""
         if self.scope.row is None:
-            raise CalcError("row is known in streams only: -i FILE, or standard input")
+            raise CalcError(f"{what} is known in streams only: -i FILE, or standard input")
+        return self.scope.row
+
+    def _column(self, branch: Branch) -> Term:
+        self._row("row")
         name = column_name(branch.value)
         return Term(PLAIN_NUMBER, None, lambda row: (row.cells[name],))
 
     def _pose(self, branch: Branch) -> Term:
-        return self.scope.literals.read(branch.value)
+        reading = self.scope.reading(Source(NAME, branch.value))
+        try:
+            (document,) = parse_documents(branch.value, NAME)
+            term = literal(document.value, reading)
+        except FormatError as error:
+            raise CalcError(error.message) from None
+        except Misfit as misfit:
+            raise CalcError(str(misfit)) from None
+        for note in reading.notes:
+            warn(note.message)
+        return term
 
     def _list(self, branch: Branch) -> Term:
         items = tuple(map(self._value, branch.parts))
         if all(item.type.kind == NUMBER for item in items):
             return rules.list_of_numbers(items)
-        kinds = {item.type.kind for item in items}
-        if len(kinds) > 1:
-            other = next(item for item in items if item.type.kind != items[0].type.kind)
+        other = next((item for item in items if item.type.kind != items[0].type.kind), None)
+        if other is not None:
             raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and {other.type.named}")
         return Term(Type(LIST), (), items=items)
 
     def _call(self, branch: Branch) -> Term:
         name = branch.value
         if name not in FUNCTIONS:
-            raise CalcError(f"unknown function {shown(name)}{self._near_function(name)}")
+            hint = did_you_mean(name, FUNCTIONS) or f"; functions: {' '.join(FUNCTIONS)}"
+            if name in self.scope.names:
+                hint = f"; {name} is a value, poses are joined by *"
+            raise CalcError(f"unknown function {shown(name)}{hint}")
         row = FUNCTIONS[name]
         if not row.least <= len(branch.parts) <= row.most:
             count = f"{len(branch.parts)} value{'s' * (len(branch.parts) != 1)}"
@@ -151,37 +253,23 @@ class _Walk:
         read = self.term if name == "mean" and len(branch.parts) == 1 else self._value
         return row.rule(name, [read(part) for part in branch.parts], self.scope.trees)
 
-    def _near_function(self, name: str) -> str:
-        if name in self.scope.names:
-            return f"; {name} is a value, poses are joined by *"
-        return did_you_mean(name, FUNCTIONS) or f"; functions: {' '.join(FUNCTIONS)}"
-
     def _chain(self, branch: Branch) -> Term:
         left = self._value(branch.parts[0])
         for (operator, at), part in zip(branch.value, branch.parts[1:], strict=True):
             right = self._value(part)
             try:
-                found = self._joined(operator, left, right)
+                found = rules.OPERATORS[operator](left, right, self.scope.trees)
             except FrametoolError as error:
-                if getattr(error, "at", None) is None:
-                    error.at = at  # type: ignore[attr-defined]
-                raise
-            left = found.written(self.text[branch.left : part.right], atomic=False)
+                raise placed(error, at) from None
+            left = found._replace(text=self.text[branch.left : part.right], atomic=False)
         return left
-
-    def _joined(self, operator: str, left: Term, right: Term) -> Term:
-        if operator == "/":
-            return rules.over(left, right)
-        rule = {"*": rules.times, "+": rules.add, "-": rules.subtract}[operator]
-        return rule(left, right, self.scope.trees)
 
     def _sign(self, branch: Branch) -> Term:
         below = self._value(branch.parts[0])
         return rules.negated(below) if branch.value == "-" else rules.unsigned(below)
 
     def _power(self, branch: Branch) -> Term:
-        base, exponent = map(self._value, branch.parts)
-        return rules.power(base, exponent)
+        return rules.power(*map(self._value, branch.parts))
 
     def _as(self, branch: Branch) -> Term:
         target, source = map(self._bare, branch.value)
@@ -195,8 +283,6 @@ class _Walk:
         trees = [tree] if tree is not None else [each for _, each in self.scope.trees]
         if len(name) < 2 or not name.startswith("/") or any(name in each.frames for each in trees):
             return name
-        from frametool.grammar.readers import slash_note
-
         warn(slash_note(name))
         return name[1:]
 
@@ -206,8 +292,7 @@ class _Walk:
         target, source = (self._bare(each, tree) for each in frames)
         type_ = Type(POSE, target, source)
         if when == "row":
-            if self.scope.row is None:
-                raise CalcError("@ row is known in streams only: -i FILE, or standard input")
+            self._row("@ row")
             tree.latest(target, source)  # raises what is wrong at all times
             return Term(type_, None, _at_row(tree, target, source))
         return Term(type_, tree.lookup_components(target, source, None if when == "latest" else when))
@@ -243,16 +328,15 @@ def _at_row(tree: Frames, target: str, source: str) -> Callable[[RowValues], Com
     return compute
 
 
-def kept(term: Term) -> Term:
+def once_a_block(term: Term) -> Term:
     """Return the same value, computed once for each block however often it is named."""
-    if term.parts is not None or term.compute is None:
-        return term
     compute = term.compute
+    if term.parts is not None or compute is None:
+        return term
 
     def once(row: RowValues) -> Components:
-        if id(compute) not in row.kept:
-            row.kept[id(compute)] = compute(row)
-        return row.kept[id(compute)]
+        if id(compute) not in row.bound:
+            row.bound[id(compute)] = compute(row)
+        return row.bound[id(compute)]
 
-    return Term(term.type, None, once, items=term.items, text=term.text, atomic=term.atomic)
-
+    return term._replace(compute=once)

@@ -5,36 +5,22 @@ Functions of numbers: sines and their kin, roots; angles in degrees keep right a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.calc.rules import (
-    PLACED,
-    common,
-    in_radians,
-    inverse,
-    need,
-    one_target,
-    plain_angle,
-    plain_number,
-    same_frames,
-    wanted,
-    with_unit,
-)
-from frametool.calc.tokens import CalcError
+from frametool.calc import rules
+from frametool.calc.parser import METRE, RADIAN, CalcError
 from frametool.calc.values import (
     ANGLES,
     LIST,
-    METRE,
     NUMBER,
-    PLAIN,
     PLAIN_NUMBER,
     POINT,
     POSE,
-    RADIAN,
     TWIST,
     VECTOR,
     Term,
     Type,
+    arithmetic,
     made,
 )
 from frametool.geometry import euler, quaternion, rigid, trig
@@ -43,36 +29,35 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.calc.rules import Trees
+    from frametool.calc.values import Kernel
     from frametool.geometry.types import Components, Namespace, Number
 
-def _sincos(angle: Number, xp: Namespace, *, degrees: bool) -> Components:
-    """Return sine and cosine; exact at whole quarter turns in degrees."""
-    found: Components = (trig.half_sincos_deg if degrees else trig.half_sincos)(2.0 * angle, xp)
-    return found
+    Rule = Callable[[str, Sequence[Term], Trees], Term]
+
+MANY = 1 << 16
+LENGTH, ANGLE = Type(NUMBER, unit=METRE), Type(NUMBER, unit=RADIAN)
 
 
-def trigonometric(pick: Callable[[Number, Number], Number]) -> Callable[[str, Sequence[Term], Trees], Term]:
-    """Return the rule of a function of an angle, made of its sine and cosine."""
+def trigonometric(pick: Callable[[Number, Number], Number]) -> Rule:
+    """Return the rule of a function of an angle, made of its sine and cosine; exact at quarter turns in degrees."""
+
     def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
-        angle = plain_angle(wanted(terms[0]), f"{name}()")
-        degrees = angle.type.degrees
-
-        def kernel(value: Number, xp: Namespace) -> Components:
-            return (pick(*_sincos(value, xp, degrees=degrees)),)
-
-        return made(PLAIN_NUMBER, kernel, angle)
+        angle = rules.scalar(rules.wanted(terms[0]), f"{name}()", angle=True)
+        halved = trig.half_sincos_deg if angle.type.degrees else trig.half_sincos
+        return made(PLAIN_NUMBER, lambda value, xp: (pick(*halved(2.0 * value, xp)),), angle)
 
     return rule
 
 
-def arc(kernel: Callable[..., Number], bound: float | None) -> Callable[[str, Sequence[Term], Trees], Term]:
+def arc(kernel: Callable[..., Number], bound: float | None) -> Rule:
     """Return the rule of a function whose value is an angle; `bound` is the largest number it takes."""
+
     def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
         def check(value: float) -> str:
             return f"{name}() takes -1 .. 1, found {value:g}" if bound is not None and abs(value) > bound else ""
 
-        number = plain_number(wanted(terms[0]), f"{name}()")
-        return made(Type(NUMBER, unit=RADIAN), lambda value, xp: (kernel(value, xp),), number, check=check)
+        number = rules.scalar(rules.wanted(terms[0]), f"{name}()")
+        return made(ANGLE, lambda value, xp: (kernel(value, xp),), number, check=check)
 
     return rule
 
@@ -97,72 +82,41 @@ def arctangent(value: Number, xp: Namespace) -> Number:
 
 def sqrt(name: str, terms: Sequence[Term], _: Trees) -> Term:
     """Take the square root of a number and of its unit."""
+
     def check(value: float) -> str:
         return f"{name}() takes what is not negative, found {value:g}" if value < 0.0 else ""
 
-    number = in_radians(need(wanted(terms[0]), (NUMBER,), name))
-    unit = number.type.unit
-    type_ = Type(NUMBER, unit=(unit[0] / 2.0, unit[1] / 2.0, unit[2] / 2.0)) if unit != PLAIN else PLAIN_NUMBER
+    number = rules.in_radians(rules.need(rules.wanted(terms[0]), (NUMBER,), name))
+    type_ = Type(NUMBER, unit=rules.raised(number.type.unit, 0.5))
     return made(type_, lambda value, xp: (xp.sqrt(value),), number, check=check)
 
 
-MANY = 1 << 16
-
-
-class Builtin:
+class Builtin(NamedTuple):
     """A function: how many values it takes, in words what and what for, and its rule.
 
     rule: from its name, its values and the trees there are to the result
     """
 
-    __slots__ = ("gives", "least", "most", "rule", "takes")
-
-    def __init__(
-        self, least: int, most: int, takes: str, gives: str, rule: Callable[[str, Sequence[Term], Trees], Term]
-    ) -> None:
-        """Keep all of it."""
-        self.least = least
-        self.most = most
-        self.takes = takes
-        self.gives = gives
-        self.rule = rule
+    least: int
+    most: int
+    takes: str
+    gives: str
+    rule: Rule
 
 
-def _inv(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    return inverse(need(terms[0], (POSE,), name))
+def of_one(kinds: Sequence[str], type_of: Callable[[Type], Type], kernel: Kernel) -> Rule:
+    """Return the rule of a function of one pose, point or vector."""
 
+    def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
+        term = rules.need(terms[0], kinds, name)
+        return made(type_of(term.type), kernel, term)
 
-def _trans(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    pose = need(terms[0], (POSE,), name)
-    return made(Type(POINT, pose.type.target), lambda *parts: parts[:3], pose, functions=False)
-
-
-def _rot(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    pose = need(terms[0], (POSE,), name)
-    return made(pose.type, lambda *parts: (*[0.0 * part for part in parts[:3]], *parts[3:]), pose, functions=False)
-
-
-def _rpy(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    def angles(*parts: Number) -> Components:
-        *pose, xp = parts
-        return euler.from_quaternion(*with_unit(pose, xp)[3:], "sxyz", xp)
-
-    pose = need(terms[0], (POSE,), name)
-    return made(Type(ANGLES, pose.type.target), angles, pose)
-
-
-def _log(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    def twist(*parts: Number) -> Components:
-        *pose, xp = parts
-        return rigid.log(*with_unit(pose, xp), xp)
-
-    pose = need(terms[0], (POSE,), name)
-    return made(Type(TWIST, pose.type.target), twist, pose)
+    return rule
 
 
 def _exp(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    def check(*twist: float) -> str:
-        rigid.check_twist(*twist)
+    def check(*numbers: float) -> str:
+        rigid.check_twist(*numbers)
         return ""
 
     twist = terms[0]
@@ -171,45 +125,39 @@ def _exp(name: str, terms: Sequence[Term], _: Trees) -> Term:
     return made(Type(POSE, twist.type.target), rigid.exp, twist, check=check)
 
 
-def _interp(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    a, b, fraction = terms
-    if a.type.kind == b.type.kind and a.type.kind in PLACED:
-        return _between_points(name, terms, _)
-    type_ = same_frames([need(a, (POSE,), name), need(b, (POSE,), name)], f"{name}()")
-    return made(type_, rigid.interpolate, a, b, plain_number(fraction, "a fraction"))
-
-
-def _between_points(_name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    def line(*parts: Number) -> Components:
-        f = parts[6]
-        return tuple(a + f * (b - a) for a, b in zip(parts[:3], parts[3:6], strict=True))
+def _interp(name: str, terms: Sequence[Term], trees: Trees) -> Term:
+    def line(*numbers: Number) -> Components:
+        f = numbers[6]
+        return tuple(a + f * (b - a) for a, b in zip(numbers[:3], numbers[3:6], strict=True))
 
     a, b, fraction = terms
-    type_ = a.type._replace(target=common(a, b, trees))
-    return made(type_, line, a, b, plain_number(fraction, "a fraction"), functions=False)
+    if a.type.kind == b.type.kind and a.type.kind in rules.PLACED:
+        type_ = a.type._replace(target=rules.common(a, b, trees))
+        return arithmetic(type_, line, a, b, rules.scalar(fraction, "a fraction"))
+    type_ = rules.same_frames([rules.need(a, (POSE,), name), rules.need(b, (POSE,), name)], f"{name}()")
+    return made(type_, rigid.interpolate, a, b, rules.scalar(fraction, "a fraction"))
 
 
 def _mean(name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    each = terms[0].items if len(terms) == 1 and terms[0].type.kind == LIST else tuple(map(wanted, terms))
+    each = terms[0].items if len(terms) == 1 and terms[0].type.kind == LIST else tuple(map(rules.wanted, terms))
     if not each:
         raise CalcError("mean() of nothing")
-    for term in each:
-        need(term, (each[0].type.kind,) if each[0].type.kind in (*PLACED, NUMBER, POSE) else (POSE,), name)
-    kind = each[0].type.kind
-    if kind == POSE:
-        return made(same_frames(each, f"{name}()"), _mean_pose, *each)
     type_ = each[0].type
+    kind = type_.kind if type_.kind in (*rules.PLACED, NUMBER) else POSE
+    for term in each:
+        rules.need(term, (kind,), name)
+    if kind == POSE:
+        return made(rules.same_frames(each, f"{name}()"), _mean_pose, *each)
     for term in each[1:]:
         if kind == NUMBER and term.type.unit != type_.unit:
             raise CalcError(f"mean() of {type_.named} and {term.type.named}")
         if kind != NUMBER:
-            type_ = type_._replace(target=common(Term(type_, text=each[0].text), term, trees))
-    if kind == NUMBER:
-        return made(type_._replace(degrees=False), _mean_parts(1), *map(in_radians, each), functions=False)
-    return made(type_, _mean_parts(3), *each, functions=False)
+            type_ = type_._replace(target=rules.common(Term(type_, text=each[0].text), term, trees))
+    kernel = _mean_parts(1 if kind == NUMBER else 3)
+    return arithmetic(type_._replace(degrees=False), kernel, *map(rules.in_radians, each))
 
 
-def _mean_parts(width: int) -> Callable[..., Components]:
+def _mean_parts(width: int) -> Kernel:
     def mean(*parts: Number) -> Components:
         count = len(parts) // width
         return tuple(sum(parts[at + width :: width], parts[at]) / count for at in range(width))
@@ -231,45 +179,40 @@ def _mean_pose(*parts: Number) -> Components:
 
 
 def _dist(name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    def poses(*parts: Number) -> Components:
-        return (rigid.distance(*parts)[0],)
-
-    def points(*parts: Number) -> Components:
-        ax, ay, az, bx, by, bz, xp = parts
+    def points(*numbers: Number) -> Components:
+        ax, ay, az, bx, by, bz, xp = numbers
         return (quaternion.magnitude(bx - ax, by - ay, bz - az, xp),)
 
-    a, b = (need(each, (POSE, POINT), name) for each in terms)
+    a, b = (rules.need(each, (POSE, POINT), name) for each in terms)
     if a.type.kind != b.type.kind:
         raise CalcError(f"{name}() compares two poses or two points, found {a.type.named} and {b.type.named}")
     if a.type.kind == POSE:
-        one_target(a, b, f"{name}()", trees)
-        return made(Type(NUMBER, unit=METRE), poses, a, b)
-    common(a, b, trees)
-    return made(Type(NUMBER, unit=METRE), points, a, b)
+        rules.one_target(a, b, f"{name}()", trees)
+        return made(LENGTH, lambda *numbers: (rigid.distance(*numbers)[0],), a, b)
+    rules.common(a, b, trees)
+    return made(LENGTH, points, a, b)
 
 
 def _angle(name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    def own(*parts: Number) -> Components:
-        *pose, xp = parts
-        return (rigid.extent(*with_unit(pose, xp), xp)[1],)
+    def own(*pose: Number) -> Components:
+        return (rigid.extent(*rules.unit_pose(*pose), pose[-1])[1],)
 
-    def poses(*parts: Number) -> Components:
-        *both, xp = parts
-        return (rigid.distance(*with_unit(both[:7], xp), *with_unit(both[7:], xp), xp)[1],)
+    def poses(*both: Number) -> Components:
+        xp = both[-1]
+        return (rigid.distance(*rules.unit_pose(*both[:7], xp), *rules.unit_pose(*both[7:]), xp)[1],)
 
-    type_ = Type(NUMBER, unit=RADIAN)
     if len(terms) == 1:
-        if terms[0].type.kind in PLACED:
+        if terms[0].type.kind in rules.PLACED:
             raise CalcError(f"{name}() takes a pose, two poses or two vectors; found one {terms[0].type.kind}")
-        return made(type_, own, need(terms[0], (POSE,), name))
-    a, b = (need(each, (POSE, VECTOR, POINT), name) for each in terms)
+        return made(ANGLE, own, rules.need(terms[0], (POSE,), name))
+    a, b = (rules.need(each, (POSE, VECTOR, POINT), name) for each in terms)
     if (a.type.kind == POSE) != (b.type.kind == POSE):
         raise CalcError(f"{name}() compares two poses or two vectors, found {a.type.named} and {b.type.named}")
     if a.type.kind == POSE:
-        one_target(a, b, f"{name}()", trees)
-        return made(type_, poses, a, b)
-    common(a, b, trees)
-    return made(type_, _between_vectors, a, b, check=_no_direction)
+        rules.one_target(a, b, f"{name}()", trees)
+        return made(ANGLE, poses, a, b)
+    rules.common(a, b, trees)
+    return made(ANGLE, _between_vectors, a, b, check=_no_direction)
 
 
 def _no_direction(*parts: float) -> str:
@@ -287,31 +230,29 @@ def _between_vectors(
     return (2.0 * trig.incline(apart, along, xp),)
 
 
-def _norm(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    def length(*parts: Number) -> Components:
-        x, y, z, xp = parts
-        return (quaternion.magnitude(x, y, z, xp),)
-
-    return made(Type(NUMBER, unit=METRE), length, need(terms[0], PLACED, name))
-
-
 def _cross(name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    a, b = (need(each, PLACED, name) for each in terms)
-    return made(Type(VECTOR, common(a, b, trees)), quaternion.cross, a, b, functions=False)
+    a, b = (rules.need(each, rules.PLACED, name) for each in terms)
+    return arithmetic(Type(VECTOR, rules.common(a, b, trees)), quaternion.cross, a, b)
 
 
 def _dot(name: str, terms: Sequence[Term], trees: Trees) -> Term:
-    def dot(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Components:
-        return (ax * bx + ay * by + az * bz,)
-
-    a, b = (need(each, PLACED, name) for each in terms)
-    common(a, b, trees)
-    return made(PLAIN_NUMBER, dot, a, b, functions=False)
+    a, b = (rules.need(each, rules.PLACED, name) for each in terms)
+    rules.common(a, b, trees)
+    return arithmetic(PLAIN_NUMBER, lambda ax, ay, az, bx, by, bz: (ax * bx + ay * by + az * bz,), a, b)
 
 
-def _vector(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    given = need(terms[0], PLACED, name)
-    return given.typed(given.type._replace(kind=VECTOR))
+def _inv(name: str, terms: Sequence[Term], _: Trees) -> Term:
+    return rules.inverse(rules.need(terms[0], (POSE,), name))
+
+
+_POSE = (POSE,)
+_trans = of_one(_POSE, lambda pose: Type(POINT, pose.target), lambda *pose: pose[:3])
+_rot = of_one(_POSE, lambda pose: pose, lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))
+_log = of_one(_POSE, lambda pose: Type(TWIST, pose.target), lambda *pose: rigid.log(*rules.unit_pose(*pose), pose[-1]))
+_rpy = of_one(_POSE, lambda pose: Type(ANGLES, pose.target),
+              lambda *pose: euler.from_quaternion(*rules.unit_pose(*pose)[3:], "sxyz", pose[-1]))  # fmt: skip
+_norm = of_one(rules.PLACED, lambda _: LENGTH, lambda *vector: (quaternion.magnitude(*vector),))
+_vector = of_one(rules.PLACED, lambda placed: placed._replace(kind=VECTOR), lambda *vector: vector[:3])
 
 
 FUNCTIONS = {

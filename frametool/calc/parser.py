@@ -1,4 +1,7 @@
-"""An expression as a small tree, by precedence climbing; knows the grammar, neither frames nor numbers.
+"""An expression as a small tree: its words, each with its place, and their grammar, by precedence climbing.
+
+Knows neither frames nor numbers.  A look-up such as `map<-base_link` is one word: a frame's name may hold `/`, `:`, `.`
+and `-`.
 
 sum     = product {("+" | "-") product}        product = factor {("*" | "/") factor}
 factor  = {"-" | "+"} power                    power   = named ["^" factor]
@@ -9,22 +12,175 @@ atom    = NUMBER[UNIT] | LOOKUP ["@" time] | NAME "[" LOOKUP ["@" time] "]" | NA
 
 from __future__ import annotations
 
+import re
 from typing import Any, NamedTuple
 
-from frametool.calc.tokens import CalcError, Token, tokens_of
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import FrametoolError, ValueInvalid, shown
+from frametool.text.numbers import odd_characters
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
-DEEPEST = 100
-"""Most levels of brackets, signs and exponents within one another."""
+    Dimension = tuple[float, float, float]  # exponents of metre, radian and second
 
+LONGEST = 1 << 16  # characters of an expression
+DEEPEST = 100  # levels of brackets, signs and exponents within one another
 RESERVED = ("row", "as", "in", "ans", "pi")
-SUM, PRODUCT = ("+", "-"), ("*", "/")
+PLAIN: Dimension = (0.0, 0.0, 0.0)
+METRE, RADIAN, SECOND = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+# how many of the base unit, as a multiple or a divisor: dividing rounds once, so that 100mm is 0.1m
+UNITS: dict[str, tuple[float, float, Dimension]] = {
+    "m": (1.0, 1.0, METRE), "mm": (1.0, 1e3, METRE), "cm": (1.0, 1e2, METRE), "km": (1e3, 1.0, METRE),
+    "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
+    "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
+}  # fmt: skip
 TIME_UNITS = {"s": "", "ms": "e-3", "us": "e-6", "ns": "ns"}
-ATOMS = frozenset(("number", "lookup", "name", "column", "call", "pose", "list"))
+ATOMS = frozenset(("number", "lookup", "name", "column", "call", "pose", "list"))  # need no brackets anywhere
+ARROW = "<-"
+LOOKUP = "a look-up is written TARGET<-SOURCE"
+HINTS = {
+    "}": "a { before it is missing", '"': 'a quote is not closed: "name"', "<": LOOKUP, ">": LOOKUP,
+    ".": "a number has a digit behind its point, a column is row.NAME",
+    ";": "write one expression a line", "~": "the inverse is inv(..)", "'": 'names with blanks stand in "',
+}  # fmt: skip
+
+_BLANKS = re.compile(r"\s*+")
+_NUMBER = re.compile(r"((?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+)(\w*+)")
+_NAME = re.compile(r"(?!\d)\w++")
+_FRAME = re.compile(r'"[^"\n]*+"|/?+([^\W\d][\w/:.-]*+)')
+_COLUMN = r'\s*+\.\s*+(?:"[^"\n]*"|\w++(?:\.\w++)*+)'
+_BRACES = r"""(?s)(?<=[{\[,: \t\r\n])(?:"(?:[^"\\]|\\.)*+"|'[^']*+'|(?P<unclosed>["']))|[{}]"""
+_OPERATORS = "-+*/^@()[],="
+
+
+class CalcError(FrametoolError):
+    """Report an expression that cannot be read, whose frames or units do not fit, or that has no value.
+
+    at: the place in the expression, from 0; None where the whole is meant
+    snippet: the expression with a caret below the place
+    """
+
+    def __init__(self, message: str, at: int | None = None) -> None:
+        """Keep the place with the message."""
+        super().__init__(message)
+        self.at = at
+        self.snippet = ""
+
+
+class NoTree(CalcError):
+    """Report a look-up where no tree was given."""
+
+    exit_code = 2
+
+
+class Token(NamedTuple):
+    """A word: its kind, its text and where it stands.
+
+    kind: lookup, number, name, column, text (in quotes), frame (behind `in`), pose (in braces), op, end
+    unit: what stands close behind a number; frames: target and source of a look-up
+    """
+
+    kind: str
+    text: str
+    start: int
+    end: int
+    unit: str = ""
+    frames: tuple[str, ...] = ()
+
+
+def tokens_of(text: str) -> list[Token]:
+    """Split an expression into words; the last one is the end.  Behind `in` stands a frame."""
+    if len(text) > LONGEST:
+        raise CalcError(f"an expression of {len(text)} characters; the most are {LONGEST}")
+    tokens: list[Token] = []
+    at, before = _behind_blanks(text, 0), ""
+    while at < len(text):
+        tokens.append(_word(text, at, before))
+        at, before = _behind_blanks(text, tokens[-1].end), tokens[-1].text
+    return [*tokens, Token("end", "", at, at)]
+
+
+def _behind_blanks(text: str, at: int) -> int:
+    found = _BLANKS.match(text, at)
+    return found.end() if found else at
+
+
+def _word(text: str, at: int, before: str) -> Token:
+    """Read the word at a place."""
+    first = text[at]
+    if first == "{":
+        close = closing_brace(text, at)
+        return Token("pose", text[at:close], at, close)
+    if (frame := _behind_frame(text, at)) > at:
+        if before == "in":
+            return Token("frame", text[at:frame], at, frame)
+        if (lookup := _lookup(text, at, frame)) is not None:
+            return lookup
+        if first == '"':
+            return Token("text", text[at:frame], at, frame)
+    if number := _NUMBER.match(text, at):
+        return Token("number", number[1], at, number.end(), number[2])
+    if name := _NAME.match(text, at):
+        column = re.compile(_COLUMN).match(text, name.end()) if name[0] == "row" else None
+        if column is not None:
+            return Token("column", text[at : column.end()], at, column.end())
+        return Token("name", name[0], at, name.end())
+    if first in _OPERATORS:
+        return Token("op", first, at, at + 1)
+    if odd := odd_characters(first):
+        raise CalcError(f"unexpected {odd}", at)
+    raise CalcError(f"unexpected {shown(first)}" + (f"; {HINTS[first]}" if first in HINTS else ""), at)
+
+
+def _behind_frame(text: str, at: int) -> int:
+    """Return the end of the frame's name at a place; the place itself where there is none.
+
+    Within quotes anything; else letters, digits and _ / : . -, but a dash before an arrow does not belong to the name.
+    """
+    found = _FRAME.match(text, at)
+    if found is None:
+        return at
+    name = found[1]
+    if name is None:
+        return found.end()
+    if not (name[0].isalpha() or name[0] == "_"):
+        return at
+    dashes = len(name) - len(name.rstrip("-")) if text[found.end() : found.end() + 1] in ("<", ">") else 0
+    return found.end() - dashes
+
+
+def _lookup(text: str, begin: int, end: int) -> Token | None:
+    """Read a look-up whose target was found."""
+    arrow = _behind_blanks(text, end)
+    if not text.startswith(ARROW, arrow):
+        return None
+    second = _behind_blanks(text, arrow + len(ARROW))
+    last = _behind_frame(text, second)
+    if last == second:
+        raise CalcError("a frame is missing behind <-: TARGET<-SOURCE", second)
+    frames = tuple(each[1:-1] if each.startswith('"') else each for each in (text[begin:end], text[second:last]))
+    return Token("lookup", text[begin:last], begin, last, frames=frames)
+
+
+def closing_brace(text: str, at: int) -> int:
+    """Return the place behind the brace that closes the one at a place; braces within quotes do not count."""
+    depth = 0
+    for found in re.compile(_BRACES).finditer(text, at):
+        if found["unclosed"]:
+            break
+        depth += (found[0] == "{") - (found[0] == "}")
+        if not depth:
+            return found.end()
+    raise CalcError("a { is not closed", at)
+
+
+def frame_text(name: str | None) -> str:
+    """Write a frame's name as an expression has it; a name that is not known is `?`."""
+    if name is None:
+        return "?"
+    plain = name and not name.startswith(('"', "/", "-")) and not name.endswith("-")
+    return name if plain and _behind_frame(name, 0) == len(name) else f'"{name}"'
 
 
 class Branch(NamedTuple):
@@ -33,7 +189,7 @@ class Branch(NamedTuple):
     kind: number, lookup, name, column, call, pose, list, chain, sign, power, as, in
     at: the place that a message about it points to
     start, end: where its text stands; left, right: with the brackets around it
-    value: what it says beside its parts, by kind; parts: those in order
+    value: what it holds apart from its parts, by kind; parts: those in order
     """
 
     kind: str
@@ -45,22 +201,18 @@ class Branch(NamedTuple):
     value: Any = None
     parts: tuple[Branch, ...] = ()
 
-    @property
-    def is_atom(self) -> bool:
-        """Tell whether it needs no brackets wherever it stands."""
-        return self.kind in ATOMS
+    @classmethod
+    def of(cls, kind: str, at: int, start: int, end: int, value: Any = None, parts: tuple[Branch, ...] = ()) -> Branch:
+        """Return a part without brackets around it."""
+        return cls(kind, at, start, end, start, end, value, parts)
 
 
-class Line:
+class Line(NamedTuple):
     """A line: the name it binds, if it does, and its expression with the whole text it stands in."""
 
-    __slots__ = ("name", "text", "tree")
-
-    def __init__(self, name: str, tree: Branch, text: str) -> None:
-        """Keep all of it."""
-        self.name = name
-        self.tree = tree
-        self.text = text
+    name: str
+    tree: Branch
+    text: str
 
 
 def parse_line(text: str, taken: frozenset[str] = frozenset()) -> Line:
@@ -72,7 +224,7 @@ def parse_line(text: str, taken: frozenset[str] = frozenset()) -> Line:
     if name in RESERVED or name in taken:
         message = f"{shown(name)} has a meaning of its own and cannot be bound; take another name"
         raise CalcError(message, head.index(name))
-    return Line(name, _Parser(text, len(head) + 1).whole(), text)
+    return Line(name, _Parser(" " * (len(head) + 1) + text[len(head) + 1 :]).whole(), text)
 
 
 def walk(tree: Branch) -> Iterator[Branch]:
@@ -89,33 +241,31 @@ def columns_of(tree: Branch) -> list[str]:
     return list(dict.fromkeys(column_name(branch.value) for branch in walk(tree) if branch.kind == "column"))
 
 
-def needs_time(tree: Branch) -> bool:
-    """Tell whether an expression looks up at the time of the row."""
-    return any(branch.kind == "lookup" and branch.value[2] == "row" for branch in walk(tree))
-
-
 def column_name(text: str) -> str:
     """Return the column of `row.COLUMN`."""
     return text.partition(".")[2].strip().strip('"')
 
 
+def needs_time(tree: Branch) -> bool:
+    """Tell whether an expression looks up at the time of the row."""
+    return any(branch.kind == "lookup" and branch.value[2] == "row" for branch in walk(tree))
+
+
+def reads_row(tree: Branch) -> bool:
+    """Tell whether an expression reads the row's own pose, point or vector."""
+    return any(branch.kind == "name" and branch.value == "row" for branch in walk(tree))
+
+
 def mentions_row(tree: Branch) -> bool:
     """Tell whether an expression needs rows: `row`, `row.COLUMN`, `@ row`."""
-    return any(
-        branch.kind == "column"
-        or (branch.kind == "name" and branch.value == "row")
-        or (branch.kind == "lookup" and branch.value[2] == "row")
-        for branch in walk(tree)
-    )
+    return reads_row(tree) or bool(columns_of(tree)) or needs_time(tree)
 
 
 class _Parser:
     """Reads the words of one expression; levels within one another are counted."""
 
-    def __init__(self, text: str, begin: int = 0) -> None:
-        """Split the text from `begin`."""
-        blank = " " * begin + text[begin:] if begin else text
-        self.tokens = tokens_of(blank)
+    def __init__(self, text: str) -> None:
+        self.tokens = tokens_of(text)
         self.index = 0
         self.depth = 0
 
@@ -124,33 +274,29 @@ class _Parser:
         return self.tokens[self.index]
 
     def take(self) -> Token:
-        token = self.tokens[self.index]
+        token = self.next
         self.index += token.kind != "end"
         return token
 
     def has(self, *texts: str) -> bool:
-        token = self.tokens[self.index]
-        return token.kind == "op" and token.text in texts
+        return self.next.kind == "op" and self.next.text in texts
 
-    def expect(self, text: str, why: str = "") -> Token:
+    def expect(self, text: str) -> Token:
         """Take an operator, or say that it is missing."""
         if self.has(text):
             return self.take()
         found = f", found {shown(self.next.text)}" if self.next.kind != "end" else " here"
-        raise CalcError(f"expected {text!r}{found}{why or self._hint()}", self.next.start)
+        raise CalcError(f"expected {text!r}{found}{self._hint()}", self.next.start)
 
     def whole(self) -> Branch:
         """Read all of the text."""
         tree = self.sum()
         if self.next.kind != "end":
-            token = self.next
-            raise CalcError(f"unexpected {shown(token.text)}{self._hint()}", token.start)
+            raise CalcError(f"unexpected {shown(self.next.text)}{self._hint()}", self.next.start)
         return tree
 
     def _hint(self) -> str:
         """Say what may be meant by a word that does not go on with what was read."""
-        from frametool.calc.values import UNITS
-
         token, before = self.next, self.tokens[self.index - 1] if self.index else None
         if before is not None and before.kind == "number" and not before.unit and token.text in UNITS:
             return f"; a unit stands close to its number: {before.text}{token.text}"
@@ -166,20 +312,22 @@ class _Parser:
             raise CalcError(f"nested deeper than {DEEPEST} levels", at)
 
     def sum(self) -> Branch:
-        """Read terms joined by + and -."""
-        return self._chain(SUM)
+        """Read products joined by + and -."""
+        return self._chain(("+", "-"), self.product)
 
-    def _chain(self, operators: tuple[str, ...]) -> Branch:
-        first = self._chain(PRODUCT) if operators is SUM else self.factor()
-        parts, joined = [first], []
+    def product(self) -> Branch:
+        """Read factors joined by * and /."""
+        return self._chain(("*", "/"), self.factor)
+
+    def _chain(self, operators: tuple[str, str], part: Callable[[], Branch]) -> Branch:
+        parts, joined = [part()], []
         while self.has(*operators):
             token = self.take()
             joined.append((token.text, token.start))
-            parts.append(self._chain(PRODUCT) if operators is SUM else self.factor())
+            parts.append(part())
         if not joined:
-            return first
-        left, right = first.left, parts[-1].right
-        return Branch("chain", joined[0][1], left, right, left, right, tuple(joined), tuple(parts))
+            return parts[0]
+        return Branch.of("chain", joined[0][1], parts[0].left, parts[-1].right, tuple(joined), tuple(parts))
 
     def factor(self) -> Branch:
         """Read signs and what they stand before."""
@@ -189,7 +337,7 @@ class _Parser:
         self._deeper(token.start)
         below = self.factor()
         self.depth -= 1
-        return Branch("sign", token.start, token.start, below.right, token.start, below.right, token.text, (below,))
+        return Branch.of("sign", token.start, token.start, below.right, token.text, (below,))
 
     def power(self) -> Branch:
         """Read a value and its exponent."""
@@ -200,11 +348,10 @@ class _Parser:
         self._deeper(token.start)
         exponent = self.factor()
         self.depth -= 1
-        left, right = base.left, exponent.right
-        return Branch("power", token.start, left, right, left, right, None, (base, exponent))
+        return Branch.of("power", token.start, base.left, exponent.right, None, (base, exponent))
 
     def named(self) -> Branch:
-        """Read a value and the frames it is said to have."""
+        """Read a value and the frames that `as` or `in` gives it."""
         branch, before = self.atom(), self.depth
         while self.next.kind == "name" and self.next.text in ("as", "in"):
             word = self.take()
@@ -214,42 +361,40 @@ class _Parser:
                 raise CalcError("as names both frames: .. as TARGET<-SOURCE", token.start)
             if word.text == "in" and token.kind != "frame":
                 raise CalcError("in names one frame: .. in FRAME", token.start)
-            value, end = token.frames or token.text, token.end
-            branch = Branch(word.text, word.start, branch.left, end, branch.left, end, value, (branch,))
+            value = token.frames or token.text
+            branch = Branch.of(word.text, word.start, branch.left, token.end, value, (branch,))
         self.depth = before
         return branch
 
     def atom(self) -> Branch:
         """Read one value."""
         token = self.take()
-        start, end = token.start, token.end
-        if token.kind == "op" and token.text == "(":
+        kind, text, start, end = token[:4]
+        if kind == "op" and text == "(":
             self._deeper(start)
             inside = self.sum()
             close = self.expect(")")
             self.depth -= 1
             return inside._replace(left=start, right=close.end)
-        if token.kind == "op" and token.text == "[":
+        if kind == "op" and text == "[":
             parts, end = self._items("]", start)
-            return Branch("list", start, start, end, start, end, None, parts)
-        if token.kind == "number":
-            return Branch("number", start, start, end, start, end, (token.text, token.unit))
-        if token.kind == "lookup":
+            return Branch.of("list", start, start, end, None, parts)
+        if kind == "number":
+            return Branch.of(kind, start, start, end, (text, token.unit))
+        if kind == "lookup":
             return self._lookup(token, start, "")
-        if token.kind in ("column", "pose"):
-            return Branch(token.kind, start, start, end, start, end, token.text)
-        if token.kind == "name" and self.has("("):
+        if kind == "name" and self.has("("):
             self.take()
             parts, end = self._items(")", start)
-            return Branch("call", start, start, end, start, end, token.text, parts)
-        if token.kind == "name" and self.has("["):
+            return Branch.of("call", start, start, end, text, parts)
+        if kind == "name" and self.has("["):
             return self._asked(token)
-        if token.kind == "name" and token.text not in ("as", "in"):
-            return Branch("name", start, start, end, start, end, token.text)
-        if token.kind == "end":
+        if kind in ("column", "pose") or (kind == "name" and text not in ("as", "in")):
+            return Branch.of(kind, start, start, end, text)
+        if kind == "end":
             raise CalcError("something is missing here", start)
-        hint = "; a frame is asked for as TARGET<-SOURCE" if token.kind == "text" else ""
-        raise CalcError(f"unexpected {shown(token.text)}{hint}", start)
+        hint = "; a frame is asked for as TARGET<-SOURCE" if kind == "text" else ""
+        raise CalcError(f"unexpected {shown(text)}{hint}", start)
 
     def _items(self, close: str, start: int) -> tuple[tuple[Branch, ...], int]:
         """Read values between commas up to a bracket; return them and where it ends."""
@@ -280,7 +425,7 @@ class _Parser:
         if self.has("@"):
             self.take()
             when, end = self._time()
-        return Branch("lookup", token.start, start, end, start, end, (token.frames, tree, when))
+        return Branch.of("lookup", token.start, start, end, (token.frames, tree, when))
 
     def _time(self) -> tuple[int | str, int]:
         """Read a time as nanoseconds, never through a float, or one of the words."""

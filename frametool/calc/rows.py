@@ -10,37 +10,32 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.calc.evaluate import evaluate_line, kept
-from frametool.calc.parser import columns_of, needs_time, walk
+from frametool.calc.evaluate import AXES, PLACED, evaluate_line, once_a_block
+from frametool.calc.parser import RADIAN, CalcError, columns_of, needs_time, reads_row
 from frametool.calc.rules import in_radians
-from frametool.calc.tokens import CalcError
-from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, RADIAN, TREE, TWIST, VECTOR, RowValues, Term, Type
+from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
 from frametool.documents.source import opened
-from frametool.errors import FormatError, FrametoolError
+from frametool.errors import FormatError, FrametoolError, ValueInvalid
 from frametool.geometry.representations import notation
 from frametool.geometry.trig import RADIAN as DEGREES
 from frametool.stream.faults import BadRow
-from frametool.stream.request import Operation, Request
+from frametool.stream.gathering import Gathered
+from frametool.stream.request import Request
 from frametool.stream.row_layout import Target
 from frametool.stream.table_stream import run_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.calc.evaluate import Scope
     from frametool.calc.parser import Line
-    from frametool.calc.scope import Scope
-    from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number
+    from frametool.grammar.result import Style
 
-RESULT = "result"
-"""What a number is called that nobody has named."""
-
-NAMES = {TWIST: ("vx", "vy", "vz", "wx", "wy", "wz"), ANGLES: ("roll", "pitch", "yaw"), POINT: tuple("xyz"),
-         VECTOR: tuple("xyz")}  # fmt: skip
-
-
+RESULT = "result"  # the column of a number that nobody has named
+NAMES: dict[str, Sequence[str]] = {ANGLES: ("roll", "pitch", "yaw"), **dict(PLACED.values())}
+# stand for the frames of rows that no expression names: whatever they are called, the result is the same
 SOME, OTHER = "\0some", "\0other"
-"""Stand for the frames of rows that no expression names: whatever they are called, the result is the same."""
 
 
 class Bound(NamedTuple):
@@ -52,44 +47,34 @@ class Bound(NamedTuple):
 
 
 class RowExpressions:
-    """Lines whose results replace rows (one without a name) or stand beside them (all named); a `Formula` of streams.
+    """Lines whose results replace rows (one without a name) or are added to them (all named); a `Formula` of streams.
 
     bindings: lines that only bind names which the others use
     """
 
-    def __init__(
-        self,
-        lines: Sequence[Line],
-        bindings: Sequence[Line],
-        scope: Scope,
-        *,
-        notations: tuple[Notation, ...] = (),
-        degrees: bool = False,
-        keep_sign: bool = False,
-    ) -> None:
-        """Keep the lines; how results are written says how poses beside rows are."""
+    def __init__(self, lines: Sequence[Line], bindings: Sequence[Line], scope: Scope, style: Style) -> None:
+        """Keep the lines; the style says how poses in columns of their own are written."""
         self.lines = tuple(lines)
         self.bindings = tuple(bindings)
         self.scope = scope
-        self.degrees = degrees
-        forms = notations or (notation("quaternion"),)
+        self.degrees = style.degrees
+        forms = style.notations or (notation("quaternion"),)
         whole = len(forms) == 1 and forms[0].representation.whole is not None
-        written = tuple((form, form.in_degrees(degrees)) for form in forms)
-        self.target = Target(None if whole else 1.0, written, keep_sign, whole)
+        written = tuple((form, style.in_degrees(form)) for form in forms)
+        self.target = Target(None if whole else 1.0, written, style.keep_sign, whole)
         self.adds = all(line.name for line in lines)
         trees = [line.tree for line in (*bindings, *lines)]
         self.columns = tuple(dict.fromkeys(name for tree in trees for name in columns_of(tree)))
         self.needs_time = any(map(needs_time, trees))
-        self.reads_row = any(branch.kind == "name" and branch.value == "row" for tree in trees for branch in walk(tree))
+        self.reads_row = any(map(reads_row, trees))
         self._bound: dict[Type, Bound] = {}
-        self._plain: dict[str, Bound] = {}
 
     def check(self, kinds: Sequence[str]) -> None:
         """Raise the error of the first of some kinds of rows if the lines suit none of them."""
         problems = []
         for kind in kinds if self.reads_row else ("",):
             try:
-                self._plainly(kind)
+                self._for(Type(kind))
             except FrametoolError as error:
                 problems.append(error)
             else:
@@ -100,16 +85,16 @@ class RowExpressions:
         """Return whether a row of some kind becomes a pose, a point or a vector; "" for numbers alone."""
         if self.adds:
             return ""
-        kind = self._plainly(row).terms[0][1].type.kind
+        kind = self._for(Type(row)).terms[0][1].type.kind
         return kind if kind in (POSE, POINT, VECTOR) else ""
 
     def extras(self, row: str) -> tuple[str, ...]:
         """Name the numbers that come beside a pose or point."""
-        return self._plainly(row).extras
+        return self._for(Type(row)).extras
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         """Return the frames of the result of a row with these; raise CalcError where the expressions do not fit."""
-        known = self._plainly(row).frames
+        known = self._for(Type(row)).frames
         first = parent if parent in known else SOME
         second = name if name in known else SOME if name == parent else OTHER
         try:
@@ -128,18 +113,12 @@ class RowExpressions:
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
     ) -> Components:
         """Return the components of the result and then the extras; of floats raises CalcError where none are."""
-        bound = self._plainly(row)
-        values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp)
+        bound = self._for(Type(row))
+        values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp, {})
         if self.kind(row):
             return bound.terms[0][1].at(values)
         numbers = [number for _, term in bound.terms for number in self._numbers(term, values)]
-        return (*(0.0,) * 7, *numbers)  # a row stays as it is: no pose of ours is written
-
-    def _plainly(self, row: str) -> Bound:
-        """Return the lines as understood for rows whose frames nobody said."""
-        if row not in self._plain:
-            self._plain[row] = self._for(Type(row))
-        return self._plain[row]
+        return (*(0.0,) * 7, *numbers)  # a row stays as it is: its own pose is not replaced
 
     def _for(self, type_: Type) -> Bound:
         """Understand the lines for rows of a type."""
@@ -159,8 +138,7 @@ class RowExpressions:
     def _bind(self, line: Line, scope: Scope) -> Term:
         term = evaluate_line(line, scope)
         if line.name:
-            scope.names[line.name] = kept(scope.names[line.name])
-            return scope.names[line.name]
+            term = scope.names[line.name] = once_a_block(scope.names[line.name])
         return term
 
     def _names(self, own: str, type_: Type) -> tuple[str, ...]:
@@ -169,11 +147,10 @@ class RowExpressions:
             raise CalcError(f"a {type_.kind} cannot be written beside rows")
         if type_.kind == NUMBER:
             return (f"{own or RESULT}{'_deg' * (self.degrees and type_.unit == RADIAN)}",)
-        names: Sequence[str] = NAMES.get(type_.kind, ())
         if type_.kind == POSE:
-            names = (*("xyz" if self.target.unit is not None else ""), *self.target.names)
-        if type_.kind == ANGLES and self.degrees:
-            names = [f"{name}_deg" for name in names]
+            names: Sequence[str] = (*(AXES if self.target.unit is not None else ()), *self.target.names)
+        else:
+            names = [name + "_deg" * (self.degrees and type_.kind == ANGLES) for name in NAMES[type_.kind]]
         return tuple(f"{own}_{name}" if own else name for name in names)
 
     def _numbers(self, term: Term, row: RowValues) -> Sequence[Number]:
@@ -181,56 +158,21 @@ class RowExpressions:
         type_ = term.type
         if type_.kind == POSE:
             return self.target.written(term.at(row), row.xp)
-        if type_.kind == NUMBER and type_.unit == RADIAN and self.degrees and type_.degrees:
+        is_angle = self.degrees and (type_.kind == ANGLES or type_.unit == RADIAN)
+        if is_angle and type_.degrees:
             return term.at(row)
         numbers = in_radians(term).at(row)
-        if self.degrees and (type_.kind == ANGLES or (type_.kind == NUMBER and type_.unit == RADIAN)):
-            return tuple(number * DEGREES for number in numbers)
-        return numbers
+        return tuple(number * DEGREES for number in numbers) if is_angle else numbers
 
 
 def _row_type(row: str, parent: str | None, name: str | None) -> Type:
     return Type(POSE, parent, name) if row == POSE else Type(row, parent)
 
 
-class _Collector:
-    """An expression over rows that keeps them."""
-
-    columns: tuple[str, ...] = ()
-    reads_row = adds = True
-    needs_time = False
-
-    def __init__(self) -> None:
-        self.kept = ""
-        self.blocks: list[Components] = []
-
-    def kind(self, row: str) -> str:
-        """Write nothing."""
-        self.kept = row
-        return ""
-
-    def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002 - there are none
-        """Write nothing."""
-        return ()
-
-    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
-        """Leave frames as they are."""
-        return parent, name
-
-    def result(
-        self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace  # noqa: ARG002
-    ) -> Components:
-        """Keep the rows of a block."""
-        self.blocks.append(parts)
-        return (0.0,) * 7
-
-
 def poses_of_table(path: str, form: str, *, normalize: bool, degrees: bool) -> Term:
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
-    import numpy as np
-
-    collector = _Collector()
-    request = Request(Operation(moves=True, formula=collector), normalize=normalize, degrees=degrees)
+    gathered = Gathered()
+    request = Request(gathered=gathered, normalize=normalize, degrees=degrees)
     line = 1
     file: Any = opened(path)
     with file as stream:
@@ -239,12 +181,9 @@ def poses_of_table(path: str, form: str, *, normalize: bool, degrees: bool) -> T
                 fault = outcome.faults[0]
                 raise BadRow(fault._replace(line=fault.line + line), fault.reason, source=path)
             line += outcome.lines
-    rows = [
-        np.stack([np.broadcast_to(part, np.broadcast_shapes(*map(np.shape, block))) for part in block], axis=-1)
-        for block in collector.blocks
-    ]
-    if not rows or not sum(map(len, rows)):
-        raise FormatError("no rows in it", source=path)
-    type_ = Type(POSE if collector.kept == POSE else POINT)
-    items = tuple(Term(type_, tuple(row)) for block in rows for row in block.tolist())
-    return Term(Type(LIST), (), items=items)
+    try:
+        rows = zip(*(part.tolist() for part in gathered.transforms.components), strict=True)
+    except ValueInvalid:
+        raise FormatError("no rows in it", source=path) from None
+    type_, size = (Type(POSE), 7) if gathered.turned else (Type(POINT), 3)
+    return Term(Type(LIST), (), items=tuple(Term(type_, row[:size]) for row in rows))

@@ -1,48 +1,47 @@
 """What the operators need and give: frames that touch, units that agree, and the kernels that then run.
 
-What operators and functions demand of their values: one frame, the same frames, plain numbers, angles.
-
-What to write instead: expressions whose frames touch, found by trying, as texts that can be pasted.
-
-A term appears as it was typed: bound names by their names, literals as they are, look-ups in a named tree as d[..].
+Where frames do not touch: what to write instead, found by trying, as texts that can be pasted.  There a term appears
+as it was typed: bound names by their names, literals as they are, look-ups in a named tree as d[..].
 """
 
 from __future__ import annotations
 
+import operator
+from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING
 
-from frametool.calc.tokens import CalcError, frame_text
+from frametool.calc.parser import METRE, PLAIN, RADIAN, CalcError, frame_text
 from frametool.calc.values import (
     ANGLES,
     LIST,
-    METRE,
     NUMBER,
-    PLAIN,
     POINT,
     POSE,
-    RADIAN,
     TO_RADIANS,
     TREE,
     TWIST,
     VECTOR,
     Term,
     Type,
+    arithmetic,
     made,
     meet,
 )
-from frametool.errors import shown
+from frametool.errors import LookupFailed, shown
 from frametool.geometry import floats, quaternion, rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.calc.values import Dimension
+    from frametool.calc.parser import Dimension
+    from frametool.calc.values import Kernel
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     Trees = Sequence[tuple[str, Frames]]
 
-MOST = 2
-"""Suggestions in one message."""
+MOST = 2  # suggestions in one message
+PLACED = (POINT, VECTOR)
 
 
 def _forms(term: Term) -> tuple[tuple[str, str | None, str | None], ...]:
@@ -61,7 +60,7 @@ def rewritten_products(left: Term, right: Term) -> Iterator[str]:
             yield f"{first} * {second}  (= {frame_text(target)}<-{frame_text(source)})"
 
 
-def for_product(left: Term, right: Term, trees: Iterable[tuple[str, Frames]]) -> str:
+def for_product(left: Term, right: Term, trees: Trees) -> str:
     """Say how two poses that do not touch can be multiplied."""
     found = list(rewritten_products(left, right))[:MOST]
     if found:
@@ -70,7 +69,7 @@ def for_product(left: Term, right: Term, trees: Iterable[tuple[str, Frames]]) ->
     return f"a lookup between them is missing: {between or _arrow(left.type.source, right.type.target)}"
 
 
-def for_point(pose: Term, point: Term, trees: Iterable[tuple[str, Frames]]) -> str:
+def for_point(pose: Term, point: Term, trees: Trees) -> str:
     """Say how a point in another frame can be moved."""
     if point.type.target == pose.type.target:
         return f"inv({pose.text}) takes points in {frame_text(pose.type.target)}"
@@ -89,7 +88,7 @@ def for_same_frames(left: Term, right: Term) -> str:
     return ""
 
 
-def for_one_target(left: Term, right: Term, trees: Iterable[tuple[str, Frames]]) -> str:
+def for_one_target(left: Term, right: Term, trees: Trees) -> str:
     """Say how two poses come to be seen from one frame; "" where nothing is found."""
     a, b = left.type, right.type
     if b.source == a.target:
@@ -98,12 +97,10 @@ def for_one_target(left: Term, right: Term, trees: Iterable[tuple[str, Frames]])
         return f"; write inv({left.text}) for the first"
     if a.source is not None and a.source == b.source:
         return f"; write inv(..) for both: inv({left.text}), inv({right.text})"
-    if (over := _looked_up(a.target, b.target, trees)) is not None:
-        return f"; bring the second over: ({over}) * {right.bracketed}"
-    return f"; a lookup between them is missing: {_arrow(a.target, b.target)}"
+    return for_other_frame(left, right, trees)
 
 
-def for_other_frame(left: Term, right: Term, trees: Iterable[tuple[str, Frames]]) -> str:
+def for_other_frame(left: Term, right: Term, trees: Trees) -> str:
     """Say how the second of two points or vectors comes into the frame of the first."""
     over = _looked_up(left.type.target, right.type.target, trees)
     if over is None:
@@ -115,35 +112,21 @@ def _arrow(target: str | None, source: str | None) -> str:
     return f"{frame_text(target)}<-{frame_text(source)}"
 
 
-def _looked_up(target: str | None, source: str | None, trees: Iterable[tuple[str, Frames]]) -> str | None:
+def _looked_up(target: str | None, source: str | None, trees: Trees) -> str | None:
     """Return a look-up of one of some trees, by name, that knows both frames; None where none does."""
     for name, tree in trees:
-        if target in tree.frames and source in tree.frames and _connected(tree, target, source):
-            return f"{name}[{_arrow(target, source)}]" if name else _arrow(target, source)
+        if target in tree.frames and source in tree.frames:
+            with suppress(LookupFailed):
+                tree.lookup_components(str(target), str(source))
+                return f"{name}[{_arrow(target, source)}]" if name else _arrow(target, source)
     return None
-
-
-def _connected(tree: Frames, target: str | None, source: str | None) -> bool:
-    """Tell whether a tree knows where one frame is seen from another."""
-    from frametool.errors import LookupFailed
-
-    try:
-        tree.lookup_components(str(target), str(source))
-    except LookupFailed:
-        return False
-    return True
-
-
-def refuse_frames(left: Term, right: Term) -> str:
-    """Name the two frames that do not touch."""
-    return f"{shown(left.type.source)} and {shown(right.type.target)} do not touch"
 
 
 def in_radians(term: Term) -> Term:
     """Return an angle with its number in radians."""
     if not term.type.degrees:
         return term
-    return made(term.type._replace(degrees=False), lambda angle: (angle * TO_RADIANS,), term, functions=False)
+    return arithmetic(term.type._replace(degrees=False), lambda angle: (angle * TO_RADIANS,), term)
 
 
 def wanted(term: Term) -> Term:
@@ -188,17 +171,10 @@ def one_target(left: Term, right: Term, what: str, trees: Trees) -> None:
         raise CalcError(f"{what} compares two poses seen from one frame, found {left.type} and {right.type}{hint}")
 
 
-def plain_angle(term: Term, what: str) -> Term:
-    """Take an angle, or a plain number as radians."""
-    if term.type.kind != NUMBER or term.type.unit not in (PLAIN, RADIAN):
-        raise CalcError(f"{what} takes an angle, found {term.type.named}")
-    return term
-
-
-def plain_number(term: Term, what: str) -> Term:
-    """Take a number without a unit."""
-    if term.type.kind != NUMBER or term.type.unit != PLAIN:
-        raise CalcError(f"{what} takes a plain number, found {term.type.named}")
+def scalar(term: Term, what: str, *, angle: bool = False) -> Term:
+    """Refuse what is neither a plain number nor, where one is meant, an angle."""
+    if term.type.kind != NUMBER or term.type.unit not in ((PLAIN, RADIAN) if angle else (PLAIN,)):
+        raise CalcError(f"{what} takes {'an angle' if angle else 'a plain number'}, found {term.type.named}")
     return term
 
 
@@ -210,39 +186,17 @@ def need(term: Term, kinds: Sequence[str], what: str) -> Term:
     return term
 
 
-PLACED = (POINT, VECTOR)
+def _by_part(operation: Callable[[Number, Number], Number]) -> Kernel:
+    """Return the kernel that joins two numbers, or two vectors part by part."""
+
+    def kernel(*parts: Number) -> Components:
+        half = len(parts) // 2
+        return tuple(map(operation, parts[:half], parts[half:]))
+
+    return kernel
 
 
-def plus(a: Number, b: Number) -> Components:
-    """Return the sum of two numbers."""
-    return (a + b,)
-
-
-def minus(a: Number, b: Number) -> Components:
-    """Return the difference of two numbers."""
-    return (a - b,)
-
-
-def _plus_all(*parts: Number) -> Components:
-    half = len(parts) // 2
-    return tuple(a + b for a, b in zip(parts[:half], parts[half:], strict=True))
-
-
-def _minus_all(*parts: Number) -> Components:
-    half = len(parts) // 2
-    return tuple(a - b for a, b in zip(parts[:half], parts[half:], strict=True))
-
-
-def _scaled(factor: Number, *vector: Number) -> Components:
-    return tuple(factor * part for part in vector)
-
-
-def _product(a: Number, b: Number) -> Components:
-    return (a * b,)
-
-
-def _quotient(a: Number, b: Number) -> Components:
-    return (a / b,)
+_PLUS, _MINUS, _TIMES, _OVER = map(_by_part, (operator.add, operator.sub, operator.mul, operator.truediv))
 
 
 def _turned(*parts: Number) -> Components:
@@ -266,13 +220,13 @@ def times(left: Term, right: Term, trees: Trees) -> Term:
     if a == b == NUMBER:
         unit = _added(left.type.unit, right.type.unit)
         if PLAIN in (left.type.unit, right.type.unit):  # degrees stay degrees
-            return made(Type(NUMBER, unit=unit, degrees=left.type.degrees or right.type.degrees), _product, left, right,
-                        functions=False)  # fmt: skip
-        return made(Type(NUMBER, unit=unit), _product, in_radians(left), in_radians(right), functions=False)
+            type_ = Type(NUMBER, unit=unit, degrees=left.type.degrees or right.type.degrees)
+            return arithmetic(type_, _TIMES, left, right)
+        return arithmetic(Type(NUMBER, unit=unit), _TIMES, in_radians(left), in_radians(right))
     if {a, b} == {NUMBER, VECTOR}:
         number, vector = (left, right) if a == NUMBER else (right, left)
         _require_scale(number)
-        return made(vector.type, _scaled, number, vector, functions=False)
+        return arithmetic(vector.type, lambda factor, *parts: tuple(factor * part for part in parts), number, vector)
     if POSE in (a, b) and NUMBER in (a, b):
         raise CalcError("a pose cannot be multiplied by a number; its part is pose ^ 0.5")
     if b == POSE and a in PLACED:
@@ -285,8 +239,9 @@ def times(left: Term, right: Term, trees: Trees) -> Term:
 def _composed(left: Term, right: Term, trees: Trees) -> Term:
     a, b = left.type, right.type
     if not meet(a.source, b.target):
-        raise CalcError(f"{a} * {b}: {refuse_frames(left, right)}; {for_product(left, right, trees)}")
-    return made(Type(POSE, a.target, b.source), rigid.compose, left, right, functions=False)
+        apart = f"{shown(a.source)} and {shown(b.target)} do not touch"
+        raise CalcError(f"{a} * {b}: {apart}; {for_product(left, right, trees)}")
+    return arithmetic(Type(POSE, a.target, b.source), rigid.compose, left, right)
 
 
 def _moved(pose: Term, point: Term, trees: Trees) -> Term:
@@ -296,7 +251,7 @@ def _moved(pose: Term, point: Term, trees: Trees) -> Term:
         hint = for_point(pose, point, trees).replace("points", what)
         raise CalcError(f"{a} takes {what} in {shown(a.source)}, found one in {shown(b.target)}; {hint}")
     kernel = rigid.apply if b.kind == POINT else _turned
-    return made(Type(b.kind, a.target), kernel, pose, point, functions=False)
+    return arithmetic(Type(b.kind, a.target), kernel, pose, point)
 
 
 def _require_scale(number: Term) -> None:
@@ -308,23 +263,26 @@ def _added(a: Dimension, b: Dimension) -> Dimension:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-def over(left: Term, right: Term) -> Term:
+def raised(unit: Dimension, power: float) -> Dimension:
+    """Return a power of a unit."""
+    return unit[0] * power, unit[1] * power, unit[2] * power
+
+
+def over(left: Term, right: Term, _: Trees) -> Term:
     """Divide by a number."""
     a, b = left.type, right.type
     if b.kind != NUMBER:
         hint = f"; for poses: inv({right.text}) * {left.bracketed}" if a.kind == b.kind == POSE else ""
         raise CalcError(f"cannot divide by {b.named}{hint}")
     if a.kind == NUMBER:
-        unit = _added(a.unit, (-b.unit[0], -b.unit[1], -b.unit[2]))
+        type_ = Type(NUMBER, unit=_added(a.unit, raised(b.unit, -1.0)))
         if b.unit == PLAIN or (a.degrees and b.degrees):
-            type_ = Type(NUMBER, unit=unit, degrees=a.degrees and not b.degrees)
-            return made(type_, _quotient, left, right, functions=False, check=_no_division)
-        return made(Type(NUMBER, unit=unit), _quotient, in_radians(left), in_radians(right), functions=False,
-                    check=_no_division)  # fmt: skip
+            type_ = type_._replace(degrees=a.degrees and not b.degrees)
+            return arithmetic(type_, _OVER, left, right, check=_no_division)
+        return arithmetic(type_, _OVER, in_radians(left), in_radians(right), check=_no_division)
     if a.kind == VECTOR:
         _require_scale(right)
-        return made(a, lambda *parts: tuple(each / parts[3] for each in parts[:3]), left, right, functions=False,
-                    check=_no_division)  # fmt: skip
+        return arithmetic(a, lambda x, y, z, n: (x / n, y / n, z / n), left, right, check=_no_division)
     hint = "; its part is pose ^ 0.5" if a.kind == POSE else "; a direction is vector([x, y, z])" * (a.kind == POINT)
     raise CalcError(f"cannot divide {a.named} by a number{hint}")
 
@@ -332,47 +290,41 @@ def over(left: Term, right: Term) -> Term:
 # --- sums ---
 
 
-def add(left: Term, right: Term, trees: Trees) -> Term:
-    """Add what can be added."""
-    return _sum(left, right, trees, adding=True)
-
-
-def subtract(left: Term, right: Term, trees: Trees) -> Term:
-    """Subtract what can be subtracted."""
-    return _sum(left, right, trees, adding=False)
-
-
 def _sum(left: Term, right: Term, trees: Trees, *, adding: bool) -> Term:
+    """Add or subtract what can be added."""
     a, b = left.type, right.type
-    verb, sign = ("add", "+") if adding else ("subtract", "-")
+    verb, sign, kernel = ("add", "+", _PLUS) if adding else ("subtract", "-", _MINUS)
     if a.kind == b.kind == NUMBER:
         if a.unit != b.unit:
             raise CalcError(f"cannot {verb} {a.named} and {b.named}")
-        kernel = plus if adding else minus
         if a.degrees and b.degrees:
-            return made(a, kernel, left, right, functions=False)
-        return made(a._replace(degrees=False), kernel, in_radians(left), in_radians(right), functions=False)
-    if a.kind in PLACED and b.kind in PLACED:
+            return arithmetic(a, kernel, left, right)
+        return arithmetic(a._replace(degrees=False), kernel, in_radians(left), in_radians(right))
+    if (a.kind in PLACED and b.kind in PLACED) or a.kind == b.kind == TWIST:
         frame = common(left, right, trees)
-        kind = _kind_of_sum(a, b, adding=adding)
-        return made(Type(kind, frame), _plus_all if adding else _minus_all, left, right, functions=False)
-    if a.kind == b.kind == TWIST:
-        frame = common(left, right, trees)
-        return made(Type(TWIST, frame), _plus_all if adding else _minus_all, left, right, functions=False)
+        return arithmetic(Type(_kind_of_sum(a, b, adding=adding), frame), kernel, left, right)
     if POSE in (a.kind, b.kind):
         raise CalcError(f"poses are composed with *, not {sign}; the difference of two is inv(a) * b")
     raise CalcError(f"cannot {verb} {a.named} and {b.named}")
 
 
 def _kind_of_sum(a: Type, b: Type, *, adding: bool) -> str:
-    """Return what a sum or difference of points and vectors is."""
+    """Return what a sum or difference of points and vectors is, or of twists."""
     if a.kind == b.kind == POINT:
         if adding and (a.target is not None or b.target is not None):
             raise CalcError("the sum of two points depends on the origin; subtract them, or use mean(..)")
         return POINT if adding else VECTOR
     if a.kind == VECTOR and b.kind == POINT and not adding:
         raise CalcError("a point cannot be subtracted from a vector; point - vector is a point")
-    return VECTOR if a.kind == b.kind else POINT
+    return a.kind if a.kind == b.kind else POINT
+
+
+OPERATORS: dict[str, Callable[[Term, Term, Trees], Term]] = {
+    "*": times,
+    "/": over,
+    "+": partial(_sum, adding=True),
+    "-": partial(_sum, adding=False),
+}
 
 
 def negated(term: Term) -> Term:
@@ -384,7 +336,7 @@ def negated(term: Term) -> Term:
         raise CalcError("a point in a frame has no negative; a direction is vector(..)")
     if kind not in (NUMBER, VECTOR, TWIST, POINT):
         raise CalcError(f"{term.type.named} has no negative")
-    return made(term.type, lambda *parts: tuple(0.0 - part for part in parts), term, functions=False)
+    return arithmetic(term.type, lambda *parts: tuple(0.0 - part for part in parts), term)
 
 
 def unsigned(term: Term) -> Term:
@@ -399,7 +351,7 @@ def unsigned(term: Term) -> Term:
 
 def inverse(term: Term) -> Term:
     """Return b<-a of a<-b."""
-    return made(Type(POSE, term.type.source, term.type.target), rigid.inverse, term, functions=False)
+    return arithmetic(Type(POSE, term.type.source, term.type.target), rigid.inverse, term)
 
 
 def power(base: Term, exponent: Term) -> Term:
@@ -414,7 +366,7 @@ def power(base: Term, exponent: Term) -> Term:
         if known == -1.0:
             return inverse(base)
         if known == 1.0:
-            return base.typed(a)
+            return base
         return made(Type(POSE, a.target), _part_of_motion, base, exponent)
     if a.kind != NUMBER:
         raise CalcError(f"{a.named} has no powers; poses and numbers have")
@@ -422,21 +374,21 @@ def power(base: Term, exponent: Term) -> Term:
         return made(a, _powered, base, exponent, check=_no_power)
     if known is None:
         raise CalcError(f"the exponent of {a.named} must be a number that is known")
-    unit = (a.unit[0] * known, a.unit[1] * known, a.unit[2] * known)
-    return made(Type(NUMBER, unit=unit), _powered, in_radians(base), exponent, check=_no_power)
+    return made(Type(NUMBER, unit=raised(a.unit, known)), _powered, in_radians(base), exponent, check=_no_power)
 
 
-def _part_of_motion(
-    tx: Number, ty: Number, tz: Number, x: Number, y: Number, z: Number, w: Number, fraction: Number, xp: Namespace
-) -> Components:
-    vx, vy, vz, wx, wy, wz = rigid.log(tx, ty, tz, *quaternion.unit(x, y, z, w, xp), xp)
-    f = fraction
-    return rigid.exp(f * vx, f * vy, f * vz, f * wx, f * wy, f * wz, xp)
+def _part_of_motion(*numbers: Number) -> Components:
+    *pose, fraction, xp = numbers
+    vx, vy, vz, wx, wy, wz = (fraction * part for part in rigid.log(*unit_pose(*pose, xp), xp))
+    return rigid.exp(vx, vy, vz, wx, wy, wz, xp)
 
 
-def with_unit(pose: Sequence[Number], xp: Namespace) -> Rigid:
-    """Return a pose with its quaternion made unit, which products keep only to some eps."""
-    tx, ty, tz, x, y, z, w = pose
+def unit_pose(*parts: Number) -> Rigid:
+    """Return a pose with its quaternion made unit, which products keep only to some eps.
+
+    parts: of the pose, and the namespace
+    """
+    tx, ty, tz, x, y, z, w, xp = parts
     return tx, ty, tz, *quaternion.unit(x, y, z, w, xp)
 
 
@@ -462,7 +414,7 @@ def as_frames(term: Term, target: str | None, source: str | None) -> Term:
         raise CalcError(f"only a pose has two frames; found {type_.named}")
     if not (meet(type_.target, target) and meet(type_.source, source)):
         raise CalcError(f"this is {type_} already")
-    return term.typed(type_._replace(target=target, source=source))
+    return term._replace(type=type_._replace(target=target, source=source))
 
 
 def in_frame(term: Term, frame: str) -> Term:
@@ -474,7 +426,7 @@ def in_frame(term: Term, frame: str) -> Term:
     if not meet(type_.target, frame):
         moved = f"({frame_text(frame)}<-{frame_text(type_.target)}) * .."
         raise CalcError(f"this is in {shown(type_.target)} already; to move it: {moved}")
-    return term.typed(type_._replace(target=frame))
+    return term._replace(type=type_._replace(target=frame))
 
 
 def list_of_numbers(items: Sequence[Term]) -> Term:
@@ -489,4 +441,4 @@ def list_of_numbers(items: Sequence[Term]) -> Term:
             what = "a point is in metres" if len(items) == 3 else "a twist is three lengths, then three angles"
             raise CalcError(f"{what}, found {term.type.named}")
     kind = POINT if len(items) == 3 else TWIST
-    return made(Type(kind), lambda *parts: parts, *map(in_radians, items), functions=False)
+    return arithmetic(Type(kind), lambda *parts: parts, *map(in_radians, items))

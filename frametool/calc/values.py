@@ -1,6 +1,6 @@
 """The values of expressions: what kind they are, in which frames and units, and their numbers, or what computes them.
 
-A frame that nobody said is None, shown as `?`, and meets any.  Numbers are components, floats or arrays of one shape.
+A frame that is not known is None, shown as `?`, and meets any.  Numbers are components, floats or arrays of one shape.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.calc.tokens import CalcError, frame_text
+from frametool.calc.parser import PLAIN, CalcError, frame_text
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import floats
 from frametool.geometry.validation import single
@@ -16,23 +16,16 @@ from frametool.geometry.validation import single
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from frametool.calc.parser import Dimension
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Namespace
 
-    Dimension = tuple[float, float, float]  # exponents of metre, radian and second
     Kernel = Callable[..., Components]
+    Check = Callable[..., str]
 
 POSE, POINT, VECTOR, NUMBER = "pose", "point", "vector", "number"
 TWIST, ANGLES, LIST, TREE = "twist", "angles", "list", "tree"
-PLAIN: Dimension = (0.0, 0.0, 0.0)
-METRE, RADIAN, SECOND = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TO_RADIANS = 0.017453292519943295
-# how many of the base unit, as a multiple or a divisor: dividing rounds once, so that 100mm is 0.1m
-UNITS: dict[str, tuple[float, float, Dimension]] = {
-    "m": (1.0, 1.0, METRE), "mm": (1.0, 1e3, METRE), "cm": (1.0, 1e2, METRE), "km": (1e3, 1.0, METRE),
-    "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
-    "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
-}  # fmt: skip
 
 
 class Type(NamedTuple):
@@ -68,51 +61,33 @@ class Type(NamedTuple):
 PLAIN_NUMBER = Type(NUMBER)
 
 
-class RowValues:
+class RowValues(NamedTuple):
     """One row, or a block of rows: its pose, point or vector, the columns asked for, its time, and the functions.
 
-    kept: what bound names came to, so that each is computed once
+    bound: the values of bound names by the id of what computes them, so that each is computed once
     """
 
-    __slots__ = ("cells", "kept", "parts", "times_ns", "xp")
-
-    def __init__(self, parts: Components, cells: Mapping[str, Any], times_ns: Any, xp: Namespace) -> None:
-        """Keep all of it."""
-        self.parts = parts
-        self.cells = cells
-        self.times_ns = times_ns
-        self.xp = xp
-        self.kept: dict[int, Components] = {}
+    parts: Components
+    cells: Mapping[str, Any]
+    times_ns: Any
+    xp: Namespace
+    bound: dict[int, Components]
 
 
-class Term:
+class Term(NamedTuple):
     """A part of an expression, understood: its type, and its numbers, or what computes them from a row.
 
     parts: None where they depend on a row; items: those of a list; tree: what can be asked for look-ups
     text: as it was written, for suggestions; atomic: it needs no brackets
     """
 
-    __slots__ = ("atomic", "compute", "items", "parts", "text", "tree", "type")
-
-    def __init__(
-        self,
-        type_: Type,
-        parts: Components | None = None,
-        compute: Callable[[RowValues], Components] | None = None,
-        *,
-        items: tuple[Term, ...] = (),
-        tree: Frames | None = None,
-        text: str = "",
-        atomic: bool = True,
-    ) -> None:
-        """Keep all of it."""
-        self.type = type_
-        self.parts = parts
-        self.compute = compute
-        self.items = items
-        self.tree = tree
-        self.text = text
-        self.atomic = atomic
+    type: Type
+    parts: Components | None = None
+    compute: Callable[[RowValues], Components] | None = None
+    items: tuple[Term, ...] = ()
+    tree: Frames | None = None
+    text: str = ""
+    atomic: bool = True
 
     def at(self, row: RowValues | None) -> Components:
         """Return the numbers, of a row where they depend on it."""
@@ -122,51 +97,41 @@ class Term:
             raise CalcError("row is known in streams only: -i FILE, or standard input")
         return self.compute(row)
 
-    def written(self, text: str, *, atomic: bool) -> Term:
-        """Return the same value as it is written elsewhere."""
-        return Term(
-            self.type, self.parts, self.compute, items=self.items, tree=self.tree, text=text, atomic=atomic
-        )
-
-    def typed(self, type_: Type) -> Term:
-        """Return the same numbers under another type."""
-        return Term(type_, self.parts, self.compute, items=self.items)
-
     @property
     def bracketed(self) -> str:
         """Return its text, in brackets unless it needs none."""
         return self.text if self.atomic else f"({self.text})"
 
 
-def made(
-    type_: Type, kernel: Kernel, *operands: Term, functions: bool = True, check: Callable[..., str] | None = None
-) -> Term:
+def arithmetic(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
+    """Do as `made` with a kernel that needs no namespace."""
+    return made(type_, lambda *numbers: kernel(*numbers[:-1]), *operands, check=check)
+
+
+def made(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
     """Return what a kernel makes of the numbers of all operands: now if they are known, else for each row.
 
-    functions: the kernel takes a namespace last; check: says why floats have no result, "" where they have one
+    kernel: takes the numbers, then the namespace with their functions
+    check: says why floats have no result, "" where they have one
     """
 
     def computed(row: RowValues | None) -> Components:
-        given = tuple(part for each in operands for part in each.at(row))
-        if single(given):
-            return _of_floats(kernel, given, check, functions=functions)
-        if row is not None:
-            return kernel(*given, row.xp) if functions else kernel(*given)
-        return _of_arrays(kernel, given, check, functions=functions)
+        numbers = tuple(part for each in operands for part in each.at(row))
+        if single(numbers):
+            return _of_floats(kernel, numbers, check)
+        return kernel(*numbers, row.xp) if row is not None else _of_arrays(kernel, numbers, check)
 
     if all(each.parts is not None for each in operands):
         return Term(type_, computed(None))
     return Term(type_, None, computed)
 
 
-def _of_floats(
-    kernel: Kernel, given: Components, check: Callable[..., str] | None, *, functions: bool
-) -> Components:
+def _of_floats(kernel: Kernel, numbers: Components, check: Check | None) -> Components:
     """Run a kernel on floats; what has no finite result is an error."""
-    if check is not None and (reason := check(*given)):
+    if check is not None and (reason := check(*numbers)):
         raise CalcError(reason)
     try:
-        result = kernel(*given, floats) if functions else kernel(*given)
+        result = kernel(*numbers, floats)
     except ValueInvalid as error:
         raise CalcError(str(error)) from None
     except (ZeroDivisionError, OverflowError, ValueError):
@@ -176,21 +141,19 @@ def _of_floats(
     return result
 
 
-def _of_arrays(
-    kernel: Kernel, given: Components, check: Callable[..., str] | None, *, functions: bool
-) -> Components:
+def _of_arrays(kernel: Kernel, numbers: Components, check: Check | None) -> Components:
     """Run a kernel on arrays of one shape; the first element without a finite result is an error."""
     import numpy as np
 
     from frametool.geometry import arrays
 
     with np.errstate(all="ignore"):
-        result = kernel(*given, arrays) if functions else kernel(*given)
+        result = kernel(*numbers, arrays)
     bad = np.flatnonzero(~np.logical_and.reduce([np.isfinite(np.asarray(part)) for part in result]))
     if bad.size:
-        full = np.broadcast_arrays(*given)
+        full = np.broadcast_arrays(*numbers)
         try:
-            _of_floats(kernel, tuple(float(part.reshape(-1)[bad[0]]) for part in full), check, functions=functions)
+            _of_floats(kernel, tuple(float(part.reshape(-1)[bad[0]]) for part in full), check)
         except CalcError as error:
             raise CalcError(f"{error} (element {bad[0]})") from None
     return result

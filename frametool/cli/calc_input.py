@@ -1,12 +1,7 @@
-"""Files that get a name in expressions: a tree if it holds frames, the pose if it holds one, a list if many.
+"""What `calc` reads and writes: files that get a name, expressions from a pipe and at the prompt, values as text.
 
-Expressions from a pipe, one a line; each is answered before the next is read.
-
-The prompt of `calc`: lines are read and answered until Ctrl-D; with readline where Python has it.
-
-Completion of expressions, at the prompt and in the shell: frames on both sides of an arrow, names, functions.
-
-The values of expressions, written: poses and points as everywhere, numbers bare or, for a person, with units.
+A file is a tree if it holds frames, the pose if it holds one, a list if many.  Values are written as everywhere: poses
+and points, numbers bare or, for a person, with units.
 """
 
 from __future__ import annotations
@@ -20,12 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.calc.api import line_of_value, plain_results
-from frametool.calc.evaluate import evaluate_line, read_line
+from frametool.calc.api import line_of_value, plain_result
+from frametool.calc.evaluate import PLACED, Scope, evaluate_line, literal, read_line, term_of_pose
 from frametool.calc.functions import FUNCTIONS
+from frametool.calc.parser import LONGEST, CalcError, frame_text
 from frametool.calc.rules import wanted
-from frametool.calc.scope import PLACED, Scope, term_of_pose
-from frametool.calc.tokens import LONGEST, CalcError, frame_text
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type
 from frametool.cli.commands.help import topic
 from frametool.cli.options import Text
@@ -33,9 +27,10 @@ from frametool.cli.poses import source_of
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say_error, tell
 from frametool.cli.trees import load_tree
-from frametool.documents.source import decode
+from frametool.documents.source import HEAD, decode, opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 from frametool.formats.table import FORMATS
+from frametool.grammar.readers import Misfit
 from frametool.grammar.result import Result
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
 
@@ -44,15 +39,12 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from frametool.calc.scope import Literals
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
     from frametool.documents.source import Source
     from frametool.grammar.result import Style
 
 OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
-
-
 LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
 LONGEST_PATH = 4096
 
@@ -60,55 +52,41 @@ LONGEST_PATH = 4096
 def file_named_in(text: str, scope: Scope) -> Term | None:
     """Bind the name of `NAME=FILE` to what the file holds, and return it; None for everything else.
 
-    What looks like a file and is none is refused as one.
+    What looks like the name of a file is read as one, and refused if there is none.
     """
     head, equals, tail = text.partition("=")
     name, path = head.strip(), tail.strip()
     if not equals or not name.isidentifier() or not 0 < len(path) < LONGEST_PATH:
         return None
-    if path != "-" and not _is_file(path) and not re.fullmatch(LIKE_A_FILE, path):
+    if path != "-" and not os.path.exists(path) and not re.fullmatch(LIKE_A_FILE, path):
         return None
     read_line(f"{name}=0")  # refuses a name that is taken
-    scope.names[name] = named_file(name, path, scope.literals).written(name, atomic=True)
+    scope.names[name] = named_file(path, scope)._replace(text=name)
     return scope.names[name]
 
 
-def _is_file(path: str) -> bool:
-    return "\0" not in path and os.path.exists(path)
-
-
-def named_file(name: str, path: str, literals: Literals) -> Term:
+def named_file(path: str, scope: Scope) -> Term:
     """Read a file for a name in expressions; `-` is standard input.  Raises FileProblem, FormatError."""
     if path == "-":
         source = source_of("-")
-        found = _values(source, literals)
-        if found is None:
-            from frametool.formats.load import Recording, load_sources
+        if found := _values(source, scope):
+            return found
+        from frametool.formats.load import load_sources
 
-            return Term(Type(TREE), (), tree=load_sources([Recording.inline(source)]), text=name)
-        return found
-    form = _form(path)
+        return Term(Type(TREE), (), tree=load_sources([source]))
+    from frametool.formats.detect import detect
+
+    with opened(path) as file:  # what is neither a table nor a document may be a tree
+        form = detect(file.read(HEAD), "tree", "rows", "records", name=path, otherwise="yaml")[0]
     if "rows" in FORMATS[form].reads:
         from frametool.calc.rows import poses_of_table
 
-        return poses_of_table(path, form, normalize=literals.normalize, degrees=literals.degrees)
-    found = _values(source_of(path), literals) if "records" in FORMATS[form].reads else None
-    return found or Term(Type(TREE), (), tree=load_tree(path, streams=True), text=name)
+        return poses_of_table(path, form, normalize=scope.normalize, degrees=scope.degrees)
+    found = _values(source_of(path), scope) if "records" in FORMATS[form].reads else None
+    return found or Term(Type(TREE), (), tree=load_tree(path, streams=True))
 
 
-def _form(path: str) -> str:
-    """Find the form of a file; what is none of tables and documents may be a tree."""
-    from frametool.documents.source import InputFile
-    from frametool.formats.detect import detect
-
-    file = InputFile(path)
-    try:
-        return detect(file.head(), "tree", "rows", "records", name=path, otherwise="yaml")[0]
-    finally:
-        file.close()
-
-
-def _values(source: Source, literals: Literals) -> Term | None:
+def _values(source: Source, scope: Scope) -> Term | None:
     """Read the poses or points of a document; None for a tree."""
     from frametool.documents.document import parse_documents
     from frametool.stream.record_values import read_poses
@@ -117,8 +95,11 @@ def _values(source: Source, literals: Literals) -> Term | None:
     if any(type(each) is dict and not OF_TREES.isdisjoint(each) for each in documents):
         return None
     if len(documents) == 1 and type(documents[0]) is dict and not PLACED.keys().isdisjoint(documents[0]):
-        return literals.of_document(documents[0], source)
-    poses = read_poses(source, degrees=literals.degrees, normalize=literals.normalize)
+        try:
+            return literal(documents[0], scope.reading(source))
+        except Misfit as misfit:
+            raise misfit.placed(source, 0) from None
+    poses = read_poses(source, degrees=scope.degrees, normalize=scope.normalize)
     if not poses:
         raise FormatError("nothing in it", source=source.name)
     items = tuple(map(term_of_pose, poses))
@@ -139,24 +120,14 @@ class Expression(Text):
         from click.shell_completion import CompletionItem
 
         scope = Scope()
-        with heard_by(lambda *_: None):
-            _fill(scope, ctx.params.get("trees") or (), ctx.params.get("arguments") or ())
+        trees = ctx.params.get("trees") or ()
+        with heard_by(lambda *_: None), suppress(FrametoolError, click.UsageError):  # a completion must not print
+            scope.tree = load_tree(trees[0], trees[1:]) if trees else None
+            for each in ctx.params.get("arguments") or ():
+                file_named_in(each, scope)
         cut = max(incomplete.rfind(mark) for mark in BETWEEN_WORDS) + 1
         before, word = incomplete[:cut], incomplete[cut:]
         return [CompletionItem(before + each) for each in Completer(scope, None).completions(word, before)]
-
-
-def _fill(scope: Scope, trees: Iterable[str], named: Iterable[str]) -> None:
-    """Read the trees; a completion says nothing of what cannot be read."""
-    from frametool.cli.trees import load_tree
-
-    first, *more = [*trees, ""]
-    try:
-        scope.tree = load_tree(first, [each for each in more if each]) if first else None
-        for each in named:
-            file_named_in(each, scope)
-    except (FrametoolError, click.UsageError):
-        pass
 
 
 class Completer:
@@ -176,27 +147,20 @@ class Completer:
 
     def completions(self, text: str, before: str) -> list[str]:
         """Return all completions of a word behind the rest of a line."""
-        frames = sorted(frame_text(frame) for frame in self._frames(before))
+        asked = self._tree_before(before)
+        tree = asked or self.scope.tree
+        frames = sorted(map(frame_text, tree.frames)) if tree else []
         head, arrow, tail = text.partition("<-")
         if arrow:
             return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
-        if self._tree_before(before) is not None:
-            words: Iterable[str] = ()
-        else:
-            words = (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
-        known = [*words, *(f"{frame}<-" for frame in frames)]
-        return [word for word in known if word.startswith(text)]
+        words = () if asked else (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
+        return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]
 
     def _tree_before(self, before: str) -> Any:
         """Return the tree whose bracket is open right before a word."""
         name = before[:-1].rstrip().rpartition(" ")[2] if before.endswith("[") else ""
-        bare = name.lstrip("()[]{},*^@+=-/")
-        term = self.scope.names.get(bare)
+        term = self.scope.names.get(name.lstrip("()[]{},*^@+=-/"))
         return None if term is None else term.tree
-
-    def _frames(self, before: str) -> Iterable[str]:
-        tree = self._tree_before(before) or self.scope.tree
-        return () if tree is None else tree.frames
 
 
 def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
@@ -223,24 +187,21 @@ def _for_a_person(term: Term, style: Style) -> str:
     """Describe one value."""
     from frametool.view.pose_text import write_points, write_poses
 
-    kind = term.type.kind
-    if kind == POSE:
-        known = term.type.target is not None and term.type.source is not None
-        heading = "" if known or term.type.target is term.type.source else f"{term.type}\n"
-        return heading + write_poses(plain_results(term, style), style)
-    if kind in (POINT, VECTOR):
-        return write_points(plain_results(term, style), style)
+    type_ = term.type
+    if type_.kind == POSE:
+        heading = f"{type_}\n" if (type_.target is None) != (type_.source is None) else ""
+        return heading + write_poses([plain_result(term, style)], style)
+    if type_.kind in (POINT, VECTOR):
+        return write_points([plain_result(term, style)], style)
     return line_of_value(term, style)
 
 
 def _machine(term: Term, style: Style) -> str:
     """Write one value as a document or line of a machine format."""
     module = import_module(FORMATS[style.form].writer)
-    (result,) = plain_results(term, style)
+    result = plain_result(term, style)
     if isinstance(result, Result):
         return str(module.write_poses([result], style))
-    if isinstance(result, float) and style.form not in ("json", "yaml"):
-        raise ValueInvalid(f"{style.form} has no form for {term.type.named}; write it as text, json, yaml or csv")
     if term.type.kind not in (POINT, VECTOR) and style.form not in ("json", "yaml"):
         raise ValueInvalid(f"{style.form} has no form for {term.type.named}; write it as text, json, yaml or csv")
     return str(module.write_points([result], style))
@@ -251,7 +212,7 @@ def _csv(terms: Sequence[Term], style: Style) -> str:
     from frametool.calc.rows import NAMES, RESULT
 
     module = import_module(FORMATS["csv"].writer)
-    results = [each for term in terms for each in plain_results(term, style)]
+    results = [plain_result(term, style) for term in terms]
     if results and all(isinstance(each, Result) for each in results):
         return str(module.write_poses(results, style))
     rows: list[dict[str, Any]] = []
@@ -261,108 +222,75 @@ def _csv(terms: Sequence[Term], style: Style) -> str:
         if isinstance(result, float):
             rows.append({RESULT: result})
             continue
-        *_, numbers = result.values()
-        suffix = "_deg" if "rpy_deg" in result else ""
-        names = [f"{name}{suffix}" for name in NAMES[term.type.kind]]
-        frame = {} if term.type.target is None else {"frame": term.type.target}
-        rows.append(frame | dict(zip(names, numbers, strict=True)))
+        *frame, (key, numbers) = result.items()
+        names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]
+        rows.append(dict(frame) | dict(zip(names, numbers, strict=True)))
     return str(module.write_points(rows, style))
 
 
 def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
-    """Write the value of each line; a binding is shown only where nothing follows it.
+    """Write the value of each line of standard input; a binding is shown only where nothing follows it.
 
     Ends at the first error, or with --on-error skip goes on behind it, and then returns 3.
     """
-    pipe = PipedExpressions(stream, scope)
-    if output.style.form == "csv":
-        output.pieces(value_texts(pipe.values(), output.style))
-    else:
-        output.pieces(_parted(pipe, output))
-    return pipe.finish()
+    bad, count = stream.policy("stdin"), 0
+
+    def values() -> Iterator[Term]:
+        nonlocal count
+        last: Term | None = None
+        for number, text in enumerate(_piped_lines(), 1):
+            if not text.strip() or text.lstrip().startswith("#"):
+                continue
+            count += 1
+            last = None
+            try:
+                line = read_line(text)
+                term = evaluate_line(line, scope)
+            except FrametoolError as error:
+                if bad.on_error == STOP:
+                    raise
+                bad.count += 1
+                if bad.count <= bad.most:
+                    snippet = getattr(error, "snippet", "")
+                    bad.tell(FormatError(f"{error} (line skipped)", source="stdin", line=number, snippet=snippet))
+                continue
+            if line.name:
+                last = term
+            else:
+                yield term
+        if last is not None:
+            yield last
+
+    texts = value_texts if output.style.form == "csv" else _parted
+    output.pieces(texts(values(), output.style))
+    if not bad.count:
+        return 0
+    message = f"stdin: {bad.count} of {count} lines skipped"
+    bad.tell(RowsSkipped(message, source="stdin", bad=bad.count, rows=count))
+    return ROWS_SKIPPED
 
 
-def _parted(pipe: PipedExpressions, output: Output) -> Iterator[str]:
+def _parted(terms: Iterable[Term], style: Style) -> Iterator[str]:
     """Yield the texts of values as they come, and what stands between them."""
-    form, is_first = output.style.form, True
-    for term in pipe.values():
-        text = "".join(value_texts([term], output.style))
-        if not is_first and (form == "yaml" or (form == "text" and text.count("\n") > 1)):
-            yield "---\n" if form == "yaml" else "\n"
+    is_first = True
+    for term in terms:
+        text = "".join(value_texts([term], style))
+        if not is_first and (style.form == "yaml" or (style.form == "text" and text.count("\n") > 1)):
+            yield "---\n" if style.form == "yaml" else "\n"
         yield text
         is_first = False
 
 
-class PipedExpressions:
-    """The lines of standard input, evaluated one after the other."""
-
-    def __init__(self, stream: Stream, scope: Scope) -> None:
-        """Take how bad lines are treated from the stream's options."""
-        self.scope = scope
-        self.bad = stream.policy("stdin")
-        self.skips = stream.options["on_error"] != STOP
-        self.tell = self.bad.tell
-        self.most = self.bad.most
-        self.count = self.skipped = 0
-
-    def values(self) -> Iterator[Term]:
-        """Yield the values that are shown."""
-        held: Term | None = None
-        for number, text in enumerate(self._lines(), 1):
-            if not text.strip() or text.lstrip().startswith("#"):
-                continue
-            self.count += 1
-            held = None
-            try:
-                line = read_line(text)
-                term = evaluate_line(line, self.scope)
-            except FrametoolError as error:
-                if not self.skips:
-                    raise
-                self._skip(error, number)
-                continue
-            if line.name:
-                held = term
-            else:
-                yield term
-        if held is not None:
-            yield held
-
-    def _lines(self) -> Iterator[str]:
-        """Yield the lines; one that is too long is cut, and then refused."""
-        if sys.stdin is None:
-            return
-        while line := sys.stdin.buffer.readline(4 * LONGEST + 2):
-            if len(line) > 4 * LONGEST and not line.endswith(b"\n"):
-                size = len(line) + self._rest()
-                raise CalcError(f"a line of {size} bytes; an expression has at most {LONGEST} characters")
-            yield decode(line, "stdin").rstrip("\r\n")
-
-    @staticmethod
-    def _rest() -> int:
-        """Count the bytes up to the end of a line."""
-        size = 0
-        while part := sys.stdin.buffer.readline(1 << 16):
-            size += len(part)
-            if part.endswith(b"\n"):
-                break
-        return size
-
-    def _skip(self, error: FrametoolError, number: int) -> None:
-        """Report a bad line."""
-        self.skipped += 1
-        if self.skipped <= self.most:
-            told = FormatError(f"{error} (line skipped)", source="stdin", line=number)
-            told.snippet = getattr(error, "snippet", "")
-            self.tell(told)
-
-    def finish(self) -> int:
-        """Report how many lines were skipped; return the exit status."""
-        if not self.skipped:
-            return 0
-        message = f"stdin: {self.skipped} of {self.count} lines skipped"
-        self.tell(RowsSkipped(message, source="stdin", bad=self.skipped, rows=self.count))
-        return ROWS_SKIPPED
+def _piped_lines() -> Iterator[str]:
+    """Yield the lines of standard input; of one that is too long only the size is read."""
+    longest = 4 * LONGEST
+    while sys.stdin is not None and (line := sys.stdin.buffer.readline(longest + 2)):
+        if len(line) > longest and not line.endswith(b"\n"):
+            size = len(line)
+            while not line.endswith(b"\n") and (line := sys.stdin.buffer.readline(1 << 16)):
+                size += len(line)
+            raise CalcError(f"a line of {size} bytes; an expression has at most {LONGEST} characters")
+        yield decode(line, "stdin").rstrip("\r\n")
 
 
 PROMPT = "> "
@@ -417,7 +345,8 @@ def _readline(scope: Scope) -> Iterator[None]:
     except ImportError:
         yield
         return
-    path = history_path()
+    state = os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state")  # as the XDG base directories
+    path = os.path.join(state, "frametool_history")
     readline.set_completer_delims(BETWEEN_WORDS)
     readline.set_completer(Completer(scope, readline))
     is_editline = "libedit" in (readline.__doc__ or "")
@@ -432,9 +361,3 @@ def _readline(scope: Scope) -> Iterator[None]:
         with suppress(OSError):
             os.makedirs(os.path.dirname(path), mode=0o700, exist_ok=True)
             readline.write_history_file(path)
-
-
-def history_path() -> str:
-    """Return the file of the history, as the XDG base directories have it."""
-    state = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
-    return os.path.join(state, "frametool_history")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -83,22 +84,19 @@ def one_argument(argument: str | Source | None) -> str | Source:
 
 def given(
     argument: str | Source | None, notation: Notation | None = None, *, degrees: bool, normalize: bool,
-    told: bool = True,
+    warned: bool = False,
 ) -> Given:  # fmt: skip
     """Read the one pose of an argument as it is written.
 
-    notation: of numbers that do not say theirs.  told: with its warnings, else they were told already.
+    notation: of numbers that do not say theirs.  warned: its warnings are on stderr already.
     """
     from frametool.cli.poses import pose_source, usage_if_inline
     from frametool.explain.given import given_poses
 
     try:
         source = pose_source(one_argument(argument), notation, normalize=normalize)
-        if told:
+        with heard_by(lambda *_: None) if warned else nullcontext():
             found = given_poses(source, degrees=degrees, normalize=normalize)
-        else:
-            with heard_by(lambda *_: None):
-                found = given_poses(source, degrees=degrees, normalize=normalize)
     except FormatError as error:
         raise usage_if_inline(error) from None
     if len(found) != 1:

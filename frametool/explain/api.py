@@ -7,21 +7,10 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, alternatives, shown
-from frametool.explain.derive import (
-    ByPose,
-    ByTree,
-    DerivationStyle,
-    derive_apply,
-    derive_compose,
-    derive_convert,
-    derive_interpolate,
-    derive_invert,
-    derive_lookup,
-    derive_relative,
-    record_source,
-)
+from frametool.explain import derive
+from frametool.explain.derive import ByTree, DerivationStyle
 from frametool.explain.follow import FollowStep, derive_follow
-from frametool.explain.given import given_pose
+from frametool.explain.given import given_pose, source_of
 from frametool.explain.sheet import DIGITS
 from frametool.frames.lookups import Frames
 from frametool.geometry.representations import notations
@@ -30,6 +19,8 @@ from frametool.grammar.result import Style
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from frametool.documents.source import Source
+    from frametool.explain.given import Given
     from frametool.explain.render import Explanation
 
 
@@ -64,63 +55,47 @@ def explain(
     return OPERATIONS[operation](plan, *given, *operands[poses:], **options)
 
 
-def _convert(plan: DerivationStyle, pose: Any) -> Explanation:
-    return derive_convert(pose, plan)
-
-
-def _compose(plan: DerivationStyle, *poses: Any) -> Explanation:
-    if not poses:
-        raise ValueInvalid("compose takes at least one pose")
-    return derive_compose(poses, plan)
-
-
-def _invert(plan: DerivationStyle, pose: Any) -> Explanation:
-    return derive_invert(pose, plan)
-
-
-def _relative(plan: DerivationStyle, a: Any, b: Any) -> Explanation:
-    return derive_relative(a, b, plan)
-
-
-def _interpolate(plan: DerivationStyle, a: Any, b: Any, fraction: float) -> Explanation:
-    return derive_interpolate(a, b, float(fraction), plan)
-
-
-def _lookup(plan: DerivationStyle, tree: Frames, target: str, source: str, **options: Any) -> Explanation:
-    if not isinstance(tree, Frames):
-        raise ValueInvalid(f"expected a tree as frametool.load returns it, found {shown(tree)}")
-    return derive_lookup(tree, target, source, plan, **options)
-
-
 def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:
     by_tree = bool(operands) and isinstance(operands[0], Frames)
     if len(operands) not in ((3, 4) if by_tree else (2,)):
         raise ValueInvalid("apply takes TREE TARGET [SOURCE] RECORD, or POSE RECORD")
     degrees = plan.style.degrees
+    way: ByTree | Given
     if by_tree:
         tree, target, *source, record = operands
-        way: ByTree | ByPose = ByTree(tree, target, source[0] if source else None, at_ns)
+        way = ByTree(tree, target, source[0] if source else None, at_ns)
     else:
         pose, record = operands
-        way = ByPose(given_pose(pose, degrees=degrees))
-    return derive_apply(way, record_source(record, kind), plan, kind=kind, degrees=degrees)
+        way = given_pose(pose, degrees=degrees)
+    return derive.apply(plan, way, _record_source(record, kind), kind=kind, degrees=degrees)
+
+
+def _record_source(value: Any, kind: str) -> Source:
+    """Return the text of a record: three numbers, a mapping, or its text."""
+    if isinstance(value, (str, dict)):
+        return source_of(value)
+    try:
+        x, y, z = map(float, value)
+    except (TypeError, ValueError):
+        raise ValueInvalid(f"expected three numbers or a mapping, found {shown(value)}") from None
+    return source_of({kind or "point": [x, y, z]})
 
 
 def _follow(plan: DerivationStyle, steps: Any) -> Explanation:
     found = [steps] if isinstance(steps, FollowStep) else list(steps) if isinstance(steps, (list, tuple)) else []
     if not found or not all(isinstance(each, FollowStep) for each in found):
         raise ValueInvalid(f"expected the steps of follow_steps, found {shown(steps)}")
-    return derive_follow(found, plan)
+    return derive_follow(plan, found)
 
 
 POSES = {"convert": 1, "compose": sys.maxsize, "invert": 1, "relative": 2, "interpolate": 2}  # operands that are poses
 OPERATIONS: dict[str, Callable[..., Explanation]] = {
-    "convert": _convert,
-    "compose": _compose,
-    "invert": _invert,
-    "relative": _relative,
-    "interpolate": _interpolate,
-    "lookup": _lookup,
+    "convert": derive.convert,
+    "compose": derive.compose,
+    "invert": derive.invert,
+    "relative": derive.relative,
+    "interpolate": derive.interpolate,
+    "lookup": derive.lookup,
     "apply": _apply,
     "follow": _follow,
 }

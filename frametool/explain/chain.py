@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from frametool.errors import printable
+from frametool.explain.formula_tree import latex_number
 from frametool.explain.operations import between, compose, inverse
 from frametool.explain.sheet import upright
 from frametool.frames.path import IDENTITY
@@ -33,11 +36,9 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
         sheet.heading(f"{to}_from_{of}")
         sheet.say("A frame seen from itself: the identity, x 0, y 0, z 0, w 1 and no shift.")
         return IDENTITY
-    latest_ns = frames.latest(target, source)
-    if at_ns is None and latest_ns is not None:
-        at_ns = latest_ns
+    at_ns = frames.latest(target, source) if at_ns is None else at_ns
     down, up = frames.between(target, source, at_ns)
-    tracks = {child: frames.track(child) for child in (*down, *up)}
+    tracks = {track.child: track for track in frames.way(target, source, at_ns)}
     sheet.heading("The way through the tree")
     sheet.say(" <- ".join(map(printable, frames.path(target, source, at_ns))))
     first, second = _names(frames, down, at_ns), _names(frames, [*reversed(up)], at_ns)
@@ -45,24 +46,16 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
     if len(tracks) > 1 or first:
         sheet.say(f"{to}_from_{of} = {_formula(first, second)}")
     sheet.caveat(STORED)
-    moving = [track for track in tracks.values() if track is not None and not track.standing]
+    moving = [track for child in (*down, *up) if not (track := tracks[child]).standing]
     if moving and at_ns is not None:
         _say_time(sheet, moving, at_ns)
     brief = len(tracks) > MOST_SHOWN and not sheet.every
-    standing = [_standing(tracks[child]) for child in (*down, *reversed(up))]
-    for parent, child, pose in filter(None, standing):
-        sheet.reached(pose[:3])
-        sheet.say(f"{parent}_from_{child}: {_line(sheet, pose)}")
-    edges = {child: _edge(sheet, track, at_ns or 0, brief=brief) for child, track in tracks.items() if track}
+    for child in (*down, *reversed(up)):
+        if (track := tracks[child]).standing:
+            sheet.reached(track.components[:3])
+            sheet.say(f"{printable(track.parent)}_from_{printable(child)}: {_line(sheet, track.components)}")
+    edges = {child: _edge(sheet, tracks[child], at_ns or 0, brief=brief) for child in (*down, *up)}
     return _joined(sheet, [edges[each] for each in down], [edges[each] for each in reversed(up)], brief=brief)
-
-
-def joined_across(
-    sheet: Sheet, target_from_fixed: Rigid, fixed_from_source: Rigid, frames: tuple[str, str, str]
-) -> Rigid:
-    """Join the two halves of a lookup across time."""
-    sheet.say("The fixed frame counts as standing between the two times.")
-    return compose(sheet, target_from_fixed, fixed_from_source, frames)
 
 
 def _line(sheet: Sheet, pose: Rigid) -> str:
@@ -91,8 +84,7 @@ def _sentence(first: list[tuple[str, str]], second: list[tuple[str, str]]) -> st
 def _formula(first: list[tuple[str, str]], second: list[tuple[str, str]]) -> str:
     """Write the product of stored edges."""
     left, right = (" @ ".join(f"{parent}_from_{child}" for parent, child in each) for each in (first, second))
-    inverted = [f"({left})^-1"] if left else []
-    return " @ ".join([*inverted, *([right] if right else [])])
+    return " @ ".join(filter(None, [left and f"({left})^-1", right]))
 
 
 def _say_time(sheet: Sheet, moving: Sequence[MovingTrack], at_ns: int) -> None:
@@ -107,43 +99,32 @@ def _say_time(sheet: Sheet, moving: Sequence[MovingTrack], at_ns: int) -> None:
     sheet.say(text)
 
 
-def _standing(track: Track | None) -> Edge | None:
-    if track is None or not track.standing:
-        return None
-    return printable(track.parent), printable(track.child), track.components
-
-
 def _edge(sheet: Sheet, track: Track, at_ns: int, *, brief: bool) -> Edge:
     """Return an edge as it is at a time, with the steps to it if it moves."""
     if track.standing:
         return printable(track.parent), printable(track.child), track.components
     before, after = around(track, at_ns)
-    parent, child = printable(before[1]), printable(track.child)
+    edge = f"{printable(before[1])}_from_{printable(track.child)}"
     sheet.reached(before[2][:3])
-    if after is None or before[0] == at_ns:
-        sheet.say(f"{parent}_from_{child}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}")
-        return parent, child, before[2]
-    if after[1] != before[1]:
-        sheet.say(
-            f"{parent}_from_{child}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}. The next, at "
-            f"{format_stamp(after[0])}, has another parent, {printable(after[1])}: until then this one holds."
+    if after is not None and before[0] != at_ns and after[1] == before[1]:
+        sheet.reached(after[2][:3])
+        with sheet.about(edge):
+            return printable(before[1]), printable(track.child), _interpolated(sheet, before, after, at_ns, brief=brief)
+    text = f"{edge}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}"
+    if after is not None and before[0] != at_ns:
+        text += (
+            f". The next, at {format_stamp(after[0])}, has another parent, {printable(after[1])}: until then this one "
+            "holds."
         )
-        return parent, child, before[2]
-    sheet.reached(after[2][:3])
-    with sheet.about(f"{parent}_from_{child}"):
-        return parent, child, _interpolated(sheet, before, after, at_ns, brief=brief)
+    sheet.say(text)
+    return printable(before[1]), printable(track.child), before[2]
 
 
 def around(track: MovingTrack, at_ns: int) -> tuple[Sample, Sample | None]:
-    """Return the last sample that is not after a time, and the next one, if there is one."""
-    before: Sample | None = None
-    for sample in track.walk():
-        if sample[0] > at_ns and before is not None:
-            return before, sample
-        before = sample
-    if before is None:
-        raise AssertionError(track)  # a track has at least one sample
-    return before, None
+    """Return the last sample that is not after a time, else the first one; and the next one, if there is one."""
+    samples = list(track.walk())
+    at = max(bisect_right(samples, at_ns, key=itemgetter(0)), 1)
+    return samples[at - 1], samples[at] if at < len(samples) else None
 
 
 def fraction(sheet: Sheet, begin_ns: int, end_ns: int, at_ns: int) -> float:
@@ -170,7 +151,10 @@ def _interpolated(sheet: Sheet, before: Sample, after: Sample, at_ns: int, *, br
     weights = f"{sheet.number(1.0 - f)}·", f"{sheet.number(f)}·"
     parts: list[str | Matrix] = [weights[0], upright(a[:3]), "+", weights[1], upright(b[:3]), "=", upright((x, y, z))]
     sheet.grid("t", "(1 - f) ta + f tb", r"(1 - f)\,t_a + f\,t_b", parts, "m")
-    sheet.slerped(a[3:], b[3:], f, found[3:])
+    number, name = sheet.number(f), r"\operatorname{slerp}"
+    latex = rf"{name}\left(%s, %s, {latex_number(number)}\right)"
+    text = "slerp(a, b, f)", f"slerp(%s, %s, {number})"
+    sheet.quaternions(text, (f"{name}(a, b, f)", latex), a[3:], b[3:], found[3:])
     return x, y, z, *found[3:]
 
 
@@ -178,20 +162,16 @@ def _joined(sheet: Sheet, to_target: list[Edge], to_source: list[Edge], *, brief
     """Multiply both branches and join them; where the branch to the target is empty nothing is inverted."""
     if brief:
         sheet.say("A long chain: one product a line; --explain-full writes every product out.")
-    down, up = _product(sheet, to_target, brief=brief), _product(sheet, to_source, brief=brief)
-    if down is None and up is not None:
-        return up[2]
-    if down is None:
-        raise AssertionError(to_target)  # the frames differ: there is an edge
-    top, target, pose = down
+    products = [_product(sheet, edges, brief=brief) for edges in (to_target, to_source) if edges]
+    top, target, pose = products[0]
+    if not to_target:
+        return pose
     back = inverse(sheet, pose, top, target)
-    return back if up is None else compose(sheet, back, up[2], (target, top, up[1]), brief=brief)
+    return compose(sheet, back, products[1][2], (target, top, products[1][1]), brief=brief) if to_source else back
 
 
-def _product(sheet: Sheet, edges: list[Edge], *, brief: bool) -> Edge | None:
+def _product(sheet: Sheet, edges: list[Edge], *, brief: bool) -> Edge:
     """Multiply the edges of a branch, topmost first."""
-    if not edges:
-        return None
     top, here, pose = edges[0]
     for _, child, edge in edges[1:]:
         pose = compose(sheet, pose, edge, (top, here, child), brief=brief)

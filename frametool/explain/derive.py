@@ -1,8 +1,6 @@
-"""One derivation for each operation on poses: from what is written to the result of the command.
+"""One derivation for each operation on poses and records: from what is written to the result of the command.
 
-The derivation of one record moved into another frame.
-
-The end of every derivation: the command's own result, and the check that the derivation leads to it.
+Every derivation ends with the command's own result, after the check that it leads to it.
 """
 
 from __future__ import annotations
@@ -10,27 +8,17 @@ from __future__ import annotations
 import itertools
 import math
 from functools import reduce
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
-from frametool.explain.chain import MOST_SHOWN, chain, joined_across
-from frametool.explain.from_quaternion import FROM_QUATERNION
+from frametool.explain import operations
+from frametool.explain.chain import MOST_SHOWN, chain
+from frametool.explain.from_quaternion import blocks_of, run
 from frametool.explain.given import Given, frames_of, given_of
-from frametool.explain.operations import (
-    MOVERS,
-    between,
-    compose,
-    extent,
-    inverse,
-    pose_covariance,
-    relative,
-    twist_covariance,
-    with_other_axes,
-)
 from frametool.explain.render import Explanation
 from frametool.explain.sheet import DEGREES, DIGITS, METRES, RADIANS, Row, Sheet
-from frametool.explain.short_ways import SHORT
-from frametool.explain.to_quaternion import block_of
+from frametool.explain.to_quaternion import SHORT
+from frametool.frames.lookups import Frames
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
 from frametool.grammar import pose_algebra
@@ -47,7 +35,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
-    from frametool.frames.lookups import Frames
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Quaternion
@@ -81,8 +68,8 @@ class DerivationStyle(NamedTuple):
         return self.style.notations or (notation("quaternion"),)
 
 
-def explained(title: str, write: Callable[[Sheet], None], plan: DerivationStyle) -> Explanation:
-    """Write a derivation; where setting noise to 0 leads too far away, as beside singular numbers, without that."""
+def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None]) -> Explanation:
+    """Write a derivation; where setting noise to 0 leads too far away, as near singular numbers, without that."""
     for clean in dict.fromkeys((plan.digits is not None, False)):
         sheet = Sheet(plan.digits, clean=clean, every=plan.every)
         try:
@@ -100,25 +87,18 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
         check_vector(sheet, derived[:3], own.pose.position)
     for each in plan.notations:
         check_rotation(sheet, each, written(sheet, derived[3:], each, plan), own, plan)
-        matrix_of_pose(sheet, each, own)
     end(sheet, own, plan)
 
 
 def written(sheet: Sheet, q: Quaternion, form: Notation, plan: DerivationStyle) -> Sequence[float]:
     """Add the way from the quaternion to a notation; return its numbers."""
-    block = block_of(FROM_QUATERNION, form)
-    numbers: Sequence[float] = block(sheet, q, form.bound_axes(), plan.style.in_degrees(form), plan.style.keep_sign)
+    block, style = blocks_of(form).from_quaternion, plan.style
+    numbers: Sequence[float] = run(block, sheet, q, form, degrees=style.in_degrees(form), keep_sign=style.keep_sign)
     return numbers
 
 
-def matrix_of_pose(sheet: Sheet, form: Notation, own: Result) -> None:
-    """Say how the matrix of a rotation becomes that of a pose."""
-    if carries_position(form) and own.pose.position is not None:
-        sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
-
-
 def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle) -> None:
-    """Compare numbers of a notation with the result's, as rotations: so also beside lock.
+    """Compare numbers of a notation with the result's as rotations, also near lock; say how a pose is written in it.
 
     Raises DerivationWrong.
     """
@@ -132,6 +112,8 @@ def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: 
     turn = 180.0 if degrees else math.pi
     if any(abs(numbers[at] - final[at]) > turn for at in form.representation.angles):
         sheet.caveat(TWO_NAMES)
+    if carries_position(form) and own.pose.position is not None:
+        sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
 
 
 def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -> None:
@@ -152,7 +134,7 @@ def end(sheet: Sheet, own: Result, plan: DerivationStyle) -> None:
     for each in plan.notations:
         rows += _rotation_rows(own, each, plan.style)
     rows += [row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
-    rows += covariance_rows(own.extras.get("covariance", ()))
+    rows += _rows("covariance", own.extras.get("covariance", ()), 6)
     sheet.result(named, rows)
 
 
@@ -161,59 +143,48 @@ def row(label: str, names: Sequence[str], numbers: Sequence[float], unit: str = 
     return Row(label, [(name, repr(number + 0.0)) for name, number in zip(names, numbers, strict=True)], unit)
 
 
-def covariance_rows(numbers: Sequence[float]) -> list[Row]:
-    """Return a covariance as six rows."""
-    return [row("covariance" * (not at), [""] * 6, numbers[at : at + 6]) for at in range(0, len(numbers), 6)]
+def _rows(label: str, numbers: Sequence[float], size: int) -> list[Row]:
+    """Return a matrix as rows of a size, the label at the first."""
+    return [row(label * (not at), [""] * size, numbers[at : at + size]) for at in range(0, len(numbers), size)]
 
 
 def _rotation_rows(own: Result, form: Notation, style: Style) -> list[Row]:
-    """Return the lines of one notation; a matrix has several."""
+    """Return the lines of one notation; a matrix has several, and so has an axis with its angle."""
     _, numbers = pose_numbers(own.pose, form, style)
-    size = math.isqrt(len(numbers))
-    label = form.spec
     if form.representation.whole is not None:
-        return [
-            row(label if not at else "", [""] * size, numbers[at : at + size]) for at in range(0, len(numbers), size)
-        ]
+        return _rows(form.spec, numbers, math.isqrt(len(numbers)))
     angles = form.representation.angles
-    unit = (DEGREES if style.in_degrees(form) else RADIANS) if angles else ""
-    if len(angles) == len(numbers):
-        return [row(label, form.names, numbers, unit)]
-    if not angles:
-        return [row(label, form.names, numbers)]
-    size = angles[0]  # the axis comes first, then the angle
-    return [row(label, form.names[:size], numbers[:size]), row("", form.names[size:], numbers[size:], unit)]
+    first = angles[0] if angles else len(numbers)
+    unit = DEGREES if style.in_degrees(form) else RADIANS
+    parts = [(form.names[:first], numbers[:first], ""), (form.names[first:], numbers[first:], unit)]
+    return [row(form.spec * (at == 0), *part) for at, part in enumerate(each for each in parts if each[1])]
 
 
-def derive_convert(
-    given: Given, plan: DerivationStyle, *, own: Pose | None = None, change: OtherAxes | None = None
+def convert(
+    plan: DerivationStyle, pose: Given, *, own: Pose | None = None, change: OtherAxes | None = None
 ) -> Explanation:
     """Derive one pose or rotation in the notations asked for.
 
     own: what the command makes of it.  change: of its axes.
     """
-    result = Result(own or given.pose)
+    result = Result(own or pose.pose)
 
     def write(sheet: Sheet) -> None:
-        sheet.reached(given.position)
+        sheet.reached(pose.position)
         hub: Rigid | None = None
         for form in plan.notations:
-            numbers = None if change or given.inverse else _short_way(sheet, given, form, plan)
+            numbers = None if change or pose.inverse else _short_way(sheet, pose, form, plan)
             if numbers is None:
                 if hub is None:
-                    hub = _hub(sheet, given, change)
+                    hub = _hub(sheet, pose, change)
                     if result.pose.position is not None:
                         check_vector(sheet, hub[:3], result.pose.position)
                 numbers = written(sheet, hub[3:], form, plan)
             check_rotation(sheet, form, numbers, result, plan)
-            matrix_of_pose(sheet, form, result)
         end(sheet, result, plan)
 
-    return explained(f"{_title(given)} to {', '.join(form.spec for form in plan.notations)}", write, plan)
-
-
-def _title(given: Given) -> str:
-    return "identity" if given.notation is None else given.notation.spec
+    title = "identity" if pose.notation is None else pose.notation.spec
+    return explained(plan, f"{title} to {', '.join(form.spec for form in plan.notations)}", write)
 
 
 def _hub(sheet: Sheet, given: Given, change: OtherAxes | None) -> Rigid:
@@ -222,8 +193,8 @@ def _hub(sheet: Sheet, given: Given, change: OtherAxes | None) -> Rigid:
     x, y, z = given.position
     pose: Rigid = (x, y, z, *q)
     if given.inverse:
-        pose = inverse(sheet, pose, "child", "parent")
-    return pose if change is None else with_other_axes(sheet, pose, change)
+        pose = operations.inverse(sheet, pose, "child", "parent")
+    return pose if change is None else operations.with_other_axes(sheet, pose, change)
 
 
 def _short_way(sheet: Sheet, given: Given, form: Notation, plan: DerivationStyle) -> Sequence[float] | None:
@@ -233,107 +204,123 @@ def _short_way(sheet: Sheet, given: Given, form: Notation, plan: DerivationStyle
     way = SHORT.get((given.notation.representation.name, form.representation.name))
     if way is None:
         return None
-    return way(sheet, given.numbers, given.notation.bound_axes(), given.degrees, plan.style.in_degrees(form))
+    wanted = plan.style.in_degrees(form)
+    numbers: Sequence[float] | None = run(
+        way, sheet, given.numbers, given.notation, degrees=given.degrees, wanted_degrees=wanted
+    )
+    return numbers
 
 
-def _say_given(sheet: Sheet, given: Sequence[Given], labels: Sequence[tuple[str, str]]) -> None:
+def _say_given(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, str]]) -> None:
     """List the poses as they are written."""
     sheet.heading("Given")
-    for each, (target, source) in zip(given, labels, strict=True):
+    for each, (target, source) in zip(poses, labels, strict=True):
         each.say(sheet, target, source)
 
 
-def derive_compose(given: Sequence[Given], plan: DerivationStyle) -> Explanation:
+def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
     """Derive the product of poses."""
-    poses = [each.pose for each in given]
-    own = Result(reduce(pose_algebra.product, poses))
-    names = frames_of(len(poses) + 1, poses)
+    if not poses:
+        raise ValueInvalid("compose takes at least one pose")
+    own = Result(reduce(pose_algebra.product, [each.pose for each in poses]))
+    names = frames_of(len(poses) + 1, [each.pose for each in poses])
     labels = list(itertools.pairwise(names))
 
     def write(sheet: Sheet) -> None:
-        brief = len(given) > MOST_SHOWN and not sheet.every
-        _say_given(sheet, given, labels)
+        brief = len(poses) > MOST_SHOWN and not sheet.every
+        _say_given(sheet, poses, labels)
         if brief:
             sheet.say("A long chain: one product a line; --explain-full writes every product out.")
-            factors: list[Rigid] = [each.pose.components for each in given]
+            factors: list[Rigid] = [each.pose.components for each in poses]
         else:
-            factors = [each.components(sheet, *label) for each, label in zip(given, labels, strict=True)]
+            factors = [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
         pose = factors[0]
         for at, factor in enumerate(factors[1:], 1):
-            pose = compose(sheet, pose, factor, (names[0], names[at], names[at + 1]), brief=brief)
+            pose = operations.compose(sheet, pose, factor, (names[0], names[at], names[at + 1]), brief=brief)
         end_with_pose(sheet, pose, own, plan)
 
-    return explained(f"{names[0]}_from_{names[-1]}", write, plan)
+    return explained(plan, f"{names[0]}_from_{names[-1]}", write)
 
 
-def derive_invert(given: Given, plan: DerivationStyle) -> Explanation:
+def invert(plan: DerivationStyle, pose: Given) -> Explanation:
     """Derive the inverse of a pose."""
-    own = Result(pose_algebra.inverse(given.pose))
-    target, source = frames_of(2, [given.pose])
+    own = Result(pose_algebra.inverse(pose.pose))
+    target, source = frames_of(2, [pose.pose])
 
     def write(sheet: Sheet) -> None:
-        _say_given(sheet, [given], [(target, source)])
-        pose = inverse(sheet, given.components(sheet, target, source), target, source)
-        end_with_pose(sheet, pose, own, plan)
+        _say_given(sheet, [pose], [(target, source)])
+        found = operations.inverse(sheet, pose.components(sheet, target, source), target, source)
+        end_with_pose(sheet, found, own, plan)
 
-    return explained(f"{source}_from_{target}", write, plan)
+    return explained(plan, f"{source}_from_{target}", write)
 
 
-def derive_relative(a: Given, b: Given, plan: DerivationStyle) -> Explanation:
+def relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
     """Derive B seen from A, with distance and angle."""
     own = pose_algebra.relative(a.pose, b.pose)
-    world = printable(a.pose.parent or b.pose.parent or "world")
-    first, second = printable(a.pose.name or "A"), printable(b.pose.name or "B")
+    frames = _three_frames(a, b)
 
     def write(sheet: Sheet) -> None:
-        _say_given(sheet, [a, b], [(world, first), (world, second)])
-        poses = [a.components(sheet, world, first), b.components(sheet, world, second)]
-        pose = relative(sheet, poses[0], poses[1], (world, first, second))
-        found = extent(sheet, pose, first)
+        pose = operations.relative(sheet, *_both(sheet, a, b, frames), frames)
+        found = operations.extent(sheet, pose, frames[1])
         for name, value in zip(pose_algebra.RELATIVE_EXTRAS, found, strict=True):
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
                 raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")
         end_with_pose(sheet, pose, own, plan)
 
-    return explained(f"{first}_from_{second}", write, plan)
+    return explained(plan, f"{frames[1]}_from_{frames[2]}", write)
 
 
-def derive_interpolate(a: Given, b: Given, fraction: float, plan: DerivationStyle) -> Explanation:
+def interpolate(plan: DerivationStyle, a: Given, b: Given, fraction: float) -> Explanation:
     """Derive the pose at a fraction of the way from A to B."""
+    fraction = float(fraction)
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
-    world = printable(a.pose.parent or b.pose.parent or "world")
-    first, second = printable(a.pose.name or "A"), printable(b.pose.name or "B")
+    frames = _three_frames(a, b)
 
     def write(sheet: Sheet) -> None:
-        _say_given(sheet, [a, b], [(world, first), (world, second)])
-        poses = [a.components(sheet, world, first), b.components(sheet, world, second)]
-        end_with_pose(sheet, between(sheet, poses[0], poses[1], fraction), own, plan)
+        end_with_pose(sheet, operations.between(sheet, *_both(sheet, a, b, frames), fraction), own, plan)
 
-    return explained(f"{first} to {second} at {fraction!r}", write, plan)
+    return explained(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", write)
 
 
-def derive_lookup(
-    frames: Frames, target: str, source: str, plan: DerivationStyle, *, at_ns: int | None = None,
+def _three_frames(a: Given, b: Given) -> tuple[str, str, str]:
+    """Name the frame that two poses are seen from, and the two that they are the poses of."""
+    world = a.pose.parent or b.pose.parent or "world"
+    return printable(world), printable(a.pose.name or "A"), printable(b.pose.name or "B")
+
+
+def _both(sheet: Sheet, a: Given, b: Given, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
+    """Add the way from what is written to both poses."""
+    world, first, second = frames
+    _say_given(sheet, [a, b], [(world, first), (world, second)])
+    return a.components(sheet, world, first), b.components(sheet, world, second)
+
+
+def lookup(
+    plan: DerivationStyle, tree: Frames, target: str, source: str, *, at_ns: int | None = None,
     source_at_ns: int | None = None, fixed: str | None = None,
 ) -> Explanation:  # fmt: skip
     """Derive the pose of one frame of a tree in another; with `fixed` across two times."""
+    if not isinstance(tree, Frames):
+        raise ValueInvalid(f"expected a tree as frametool.load returns it, found {shown(tree)}")
     if fixed is None:
-        own = looked_up(frames, target, source, at_ns)
+        own = looked_up(tree, target, source, at_ns)
     else:
-        own = looked_up_across(frames, target, at_ns, source, source_at_ns, fixed)
+        own = looked_up_across(tree, target, at_ns, source, source_at_ns, fixed)
 
     def write(sheet: Sheet) -> None:
         if fixed is None:
-            pose = chain(sheet, frames, target, source, at_ns)
+            pose = chain(sheet, tree, target, source, at_ns)
         else:
             with sheet.about("where the target was"):
-                first = chain(sheet, frames, target, fixed, at_ns)
+                first = chain(sheet, tree, target, fixed, at_ns)
             with sheet.about("where the source was"):
-                second = chain(sheet, frames, fixed, source, source_at_ns)
-            pose = joined_across(sheet, first, second, (printable(target), printable(fixed), printable(source)))
+                second = chain(sheet, tree, fixed, source, source_at_ns)
+            sheet.say("The fixed frame counts as standing between the two times.")
+            pose = operations.compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
         end_with_pose(sheet, pose, own, plan)
 
-    return explained(f"{printable(target)}_from_{printable(source)}", write, plan)
+    return explained(plan, f"{printable(target)}_from_{printable(source)}", write)
 
 
 UNITS = {"point": ("m",), "vector": ("",), "twist": ("m/s", "rad/s"), "wrench": ("N", "Nm")}
@@ -347,75 +334,36 @@ class ByTree(NamedTuple):
     source: str | None = None
     at_ns: int | None = None
 
-    def names(self, own: str | None) -> tuple[str, str]:
-        """Return target and source for a record given in a frame."""
-        if own and own.startswith("/") and own not in self.frames.frames:
-            own = own[1:]
-        source = own or self.source
-        if self.source is not None and source != self.source:
-            raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(self.source)}")
-        if source is None:
-            raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
-        return self.target, source
 
-    def components(self, names: tuple[str, str], stamp_ns: int | None) -> Rigid:
-        """Return target_from_source."""
-        return self.frames.lookup(*names, self._time(stamp_ns)).components
-
-    def write(self, sheet: Sheet, names: tuple[str, str], stamp_ns: int | None) -> Rigid:
-        """Add the derivation of target_from_source."""
-        return chain(sheet, self.frames, *names, self._time(stamp_ns))
-
-    def _time(self, stamp_ns: int | None) -> int | None:
-        return stamp_ns if self.at_ns is None else self.at_ns
-
-
-class ByPose(NamedTuple):
-    """Move by a pose as it is written."""
-
-    given: Given
-
-    def names(self, own: str | None) -> tuple[str, str]:
-        """Return target and source; a record's own frame must be that of the pose."""
-        pose = self.given.pose
-        if own and pose.name is not None and own != pose.name:
-            raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(pose.name)}")
-        return pose.parent or "a", own or pose.name or "b"
-
-    def components(self, _names: tuple[str, str], _stamp_ns: int | None) -> Rigid:
-        """Return the pose."""
-        return self.given.pose.components
-
-    def write(self, sheet: Sheet, names: tuple[str, str], _stamp_ns: int | None) -> Rigid:
-        """Add the way from what is written to the pose."""
-        target, source = map(printable, names)
-        sheet.heading("Given")
-        self.given.say(sheet, target, source)
-        return self.given.components(sheet, target, source)
-
-
-def derive_apply(
-    way: ByTree | ByPose, source: Source, plan: DerivationStyle, *, kind: str = "", degrees: bool = False,
+def apply(
+    plan: DerivationStyle, way: ByTree | Given, source: Source, *, kind: str = "", degrees: bool = False,
     normalize: bool = False, counters: bool = True, timeless: bool = False,
 ) -> Explanation:  # fmt: skip
     """Derive where a record is in the target's frame.
 
-    source: text that holds one record.  timeless: the stamp of its header does not matter.
+    way: a lookup, or a pose.  source: text that holds one record.  timeless: the stamp of its header does not matter.
     """
     request = Request(Operation(moves=True), kind=kind, degrees=degrees, normalize=normalize, counters=counters)
     records = [record for _, found in documents(source, request) for record in found]
     if len(records) != 1:
         raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")
     record = records[0]
-    names = way.names(record.parent.text)
-    stamp_ns = None if timeless else record.stamp_ns
-    if isinstance(way, ByTree) and way.frames.latest(*names) is None:
-        stamp_ns = None
-    mover = way.components(names, stamp_ns)
+    names = _target_and_source(way, record.parent.text)
     target, origin = map(printable, names)
+    at_ns = None if timeless else record.stamp_ns
+    if isinstance(way, Given):
+        mover = way.pose.components
+    else:
+        at_ns = None if way.frames.latest(*names) is None else at_ns
+        at_ns = at_ns if way.at_ns is None else way.at_ns
+        mover = way.frames.lookup(*names, at_ns).components
 
     def write(sheet: Sheet) -> None:
-        pose = way.write(sheet, names, stamp_ns)
+        if isinstance(way, Given):
+            _say_given(sheet, [way], [(target, origin)])
+            pose = way.components(sheet, target, origin)
+        else:
+            pose = chain(sheet, way.frames, *names, at_ns)
         sheet.reached(pose[:3])
         check_vector(sheet, pose[:3], mover[:3])
         if record.shape.kind == POSE:
@@ -423,36 +371,41 @@ def derive_apply(
         else:
             _move_vectors(sheet, pose, record, mover, (target, origin))
 
-    return explained(f"{record.shape.kind} in {target} of a {record.shape.kind} in {origin}", write, plan)
+    return explained(plan, f"{record.shape.kind} in {target} of a {record.shape.kind} in {origin}", write)
 
 
-def _own(record: Record, mover: Rigid) -> Sequence[float]:
-    """Return what the command makes of a record."""
-    shape = record.shape
-    own = record.values[: shape.own_size]
-    start = shape.position(own) if shape.unit is not None else tuple(own)
-    return Operation(moves=True).move(shape, (*start, *record.values[shape.own_size :]), mover)
+def _target_and_source(way: ByTree | Given, own: str | None) -> tuple[str, str]:
+    """Return target and source for a record; where it names its own frame, that must be the source."""
+    if isinstance(way, Given):
+        target, source = way.pose.parent or "a", way.pose.name
+    else:
+        target, source = way.target, way.source
+        if own and own.startswith("/") and own not in way.frames.frames:
+            own = own[1:]
+    if own and source is not None and own != source:
+        raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(source)}")
+    if not own and source is None and isinstance(way, ByTree):
+        raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
+    return target, own or source or "b"
 
 
-def _move_vectors(
-    sheet: Sheet, pose: Rigid, record: Record, mover: Rigid, frames: tuple[str, str]
-) -> None:
+def _move_vectors(sheet: Sheet, pose: Rigid, record: Record, mover: Rigid, frames: tuple[str, str]) -> None:
     """Move a point, a vector, a twist or a wrench, and end with the result."""
     shape = record.shape
-    own = _own(record, mover)
-    numbers = record.values[: shape.own_size]
+    numbers, covariance = record.values[: shape.own_size], record.values[shape.own_size :]
     start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
+    own = Operation(moves=True).move(shape, (*start, *covariance), mover)
     sheet.reached(start)
-    found = MOVERS[shape.kind](sheet, pose, start, *frames)
+    found = operations.MOVERS[shape.kind](sheet, pose, start, *frames)
     check_vector(sheet, found, own[: len(found)])
-    rows: list[Row] = []
     labels = PARTS.get(shape.kind, (shape.kind,))
-    for at, (label, unit) in enumerate(zip(labels, UNITS[shape.kind], strict=True)):
-        rows.append(row(label, "xyz", own[3 * at : 3 * at + 3], unit))
+    rows = [
+        row(label, "xyz", own[3 * at : 3 * at + 3], unit)
+        for at, (label, unit) in enumerate(zip(labels, UNITS[shape.kind], strict=True))
+    ]
     if shape.covariance:
-        beside = twist_covariance(sheet, pose, record.values[shape.own_size :])
-        _check_covariance(sheet, beside, own[len(found) :])
-        rows += covariance_rows(own[len(found) :])
+        _check_covariance(sheet, operations.twist_covariance(sheet, pose, covariance), own[len(found) :])
+        rows += _rows("covariance", own[len(found) :], 6)
     sheet.result(f"in {frames[0]}", rows)
 
 
@@ -465,33 +418,14 @@ def _move_pose(
     own = Result(Pose.of(Operation().pose([given.pose.components], mover, floats), given.pose.name, names[0]))
     sheet.heading("The record")
     given.say(sheet, origin, name)
-    moved = compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
-    shape = record.shape
-    if shape.covariance:
-        turned = pose_covariance(sheet, pose, record.values[shape.own_size :])
-        numbers = Operation().covariance(shape, tuple(record.values[shape.own_size :]), mover)
-        _check_covariance(sheet, turned, numbers)
-        end_with_pose(sheet, moved, Result(own.pose, {"covariance": numbers}), plan)
-    else:
-        end_with_pose(sheet, moved, own, plan)
+    moved = operations.compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
+    if record.shape.covariance:
+        covariance = tuple(record.values[record.shape.own_size :])
+        own.extras["covariance"] = Operation().covariance(record.shape, covariance, mover)
+        _check_covariance(sheet, operations.pose_covariance(sheet, pose, covariance), own.extras["covariance"])
+    end_with_pose(sheet, moved, own, plan)
 
 
 def _check_covariance(sheet: Sheet, found: Sequence[float], own: Sequence[float]) -> None:
     sheet.reached([sheet.reach**2 * max(map(abs, own))])
     check_vector(sheet, found, own)
-
-
-def record_source(value: Any, kind: str = "") -> Source:
-    """Return the text of a record given in Python: three numbers, a mapping, or its text; raises ValueInvalid."""
-    from frametool.documents.json import dump
-    from frametool.documents.source import Source
-
-    if isinstance(value, str):
-        return Source("argument", value)
-    if isinstance(value, dict):
-        return Source("argument", dump(value))
-    try:
-        x, y, z = map(float, value)
-    except (TypeError, ValueError):
-        raise ValueInvalid(f"expected three numbers or a mapping, found {shown(value)}") from None
-    return Source("argument", dump({kind or "point": [x, y, z]}))

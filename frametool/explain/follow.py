@@ -67,7 +67,7 @@ class FollowStep(NamedTuple):
     angular: float
 
 
-def derive_follow(steps: Sequence[FollowStep], plan: DerivationStyle) -> Explanation:
+def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explanation:
     """Derive the commands of followers at one step."""
 
     def write(sheet: Sheet) -> None:
@@ -75,15 +75,12 @@ def derive_follow(steps: Sequence[FollowStep], plan: DerivationStyle) -> Explana
         for step in steps:
             _law(sheet, step, _seen(sheet, step))
             label = f"{printable(step.follower)} " if len(steps) > 1 else ""
-            rows += [
-                row(f"{label}linear_x", [""], [step.linear], "m/s"),
-                row(f"{label}angular_z", [""], [step.angular], "rad/s"),
-                row(f"{label}distance", [""], [step.distance], METRES),
-            ]
+            command = {"linear_x": (step.linear, "m/s"), "angular_z": (step.angular, "rad/s")}
+            for name, (value, unit) in (command | {"distance": (step.distance, METRES)}).items():
+                rows.append(row(label + name, [""], [value], unit))
         sheet.result(f"the command of {', '.join(printable(step.follower) for step in steps)}", rows)
 
-    number = steps[0].number if steps else 0
-    return explained(f"follow, step {number}", write, plan)
+    return explained(plan, f"follow, step {steps[0].number}", write)
 
 
 def _seen(sheet: Sheet, step: FollowStep) -> Values:
@@ -112,25 +109,22 @@ def _seen(sheet: Sheet, step: FollowStep) -> Values:
 
 def _place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, *, turns: bool) -> None:
     """Add where a frame was: as published, or between two samples."""
-    x, y, h = f"x{index}", f"y{index}", f"h{index}"
     before, after = seen.before, seen.after
     if after is None:
-        values.update({x: before.x, y: before.y})
-        told = f"{x} {sheet.number(before.x)} m, {y} {sheet.number(before.y)} m"
-        if turns:
-            values[h] = before.theta
-            told += f", {h} {sheet.number(before.theta)} rad"
-        sheet.say(f"{name} at {format_stamp(seen.at_ns)} s: {told}")
+        parts = [("x", before.x, METRES), ("y", before.y, METRES), ("h", before.theta, RADIANS)][: 2 + turns]
+        values.update({letter + index: value for letter, value, _ in parts})
+        texts = [f"{letter}{index} {sheet.number(value)} {unit}" for letter, value, unit in parts]
+        sheet.say(f"{name} at {format_stamp(seen.at_ns)} s: {', '.join(texts)}")
         return
     sheet.say(f"{name}, a before and b after:")
     found = {
         "ax": before.x, "ay": before.y, "ah": before.theta, "bx": after.x, "by": after.y, "bh": after.theta,
         "f": fraction(sheet, before.stamp_ns, after.stamp_ns, seen.at_ns),
     }  # fmt: skip
-    values[x] = sheet.step(found, x, "ax + f*(bx - ax)", METRES)
-    values[y] = sheet.step(found, y, "ay + f*(by - ay)", METRES)
+    for letter in "xy":
+        values[letter + index] = sheet.step(found, letter + index, f"a{letter} + f*(b{letter} - a{letter})", METRES)
     if turns:
-        values[h] = sheet.step(found, h, "ah + f*atan2(sin(bh - ah), cos(bh - ah))", RADIANS)
+        values[f"h{index}"] = sheet.step(found, f"h{index}", "ah + f*atan2(sin(bh - ah), cos(bh - ah))", RADIANS)
 
 
 def _law(sheet: Sheet, step: FollowStep, values: Values) -> None:
@@ -176,6 +170,5 @@ def _compare(step: FollowStep, distance: float, linear: float, angular: float) -
     for found, own, gain in zip(
         (distance, linear, angular), (step.distance, step.linear, step.angular), (1.0, *step.gains), strict=True
     ):
-        slack = near * max(1.0, abs(gain))
-        if not abs(found - own) <= slack:
+        if not abs(found - own) <= near * max(1.0, abs(gain)):
             raise DerivationWrong(f"the derivation of {step.follower} gives {found!r}, not {own!r}; {REPORT}")

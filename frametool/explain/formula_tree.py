@@ -8,16 +8,16 @@ from __future__ import annotations
 import ast
 import math
 import re
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     Leaf = Callable[[str], str]
 
 NOISE = 2e-15  # of the largest term: what the rounding of a few terms leaves where they cancel
-FAR = 16.0  # radians: a larger angle is as it was given, no multiple of a rounded pi
+FAR = 16.0  # radians: a larger angle is as it was written, no multiple of a rounded pi
 SUM, PRODUCT, SIGN, POWER = 1, 2, 3, 4  # how tightly an operator binds
 BINDS = {ast.Add: SUM, ast.Sub: SUM, ast.Mult: PRODUCT, ast.Div: PRODUCT, ast.Pow: POWER}
 TEXT = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: "·", ast.Div: "/", ast.Pow: "^"}
@@ -67,10 +67,8 @@ def evaluated(node: ast.expr, values: Mapping[str, float]) -> Value:
 def _joined(operator: ast.operator, left: Value, right: Value) -> Value:
     """Apply an operator, and to first order what rounding does to its result."""
     (a, size_a), (b, size_b) = left, right
-    if isinstance(operator, ast.Add):
-        return Value(a + b, max(size_a, size_b))
-    if isinstance(operator, ast.Sub):
-        return Value(a - b, max(size_a, size_b))
+    if isinstance(operator, (ast.Add, ast.Sub)):
+        return Value(a + b if isinstance(operator, ast.Add) else a - b, max(size_a, size_b))
     if isinstance(operator, ast.Mult):
         return Value(a * b, max(size_a * abs(b), abs(a) * size_b))
     if isinstance(operator, ast.Div):
@@ -84,68 +82,57 @@ def _called(name: str, arguments: list[Value]) -> Value:
     number = float(FUNCTIONS[name](*(each.number for each in arguments)))
     x, size = arguments[0]
     if name in ("sin", "cos"):
-        size = min(size, FAR)
-    if name == "cos":
-        return Value(number, max(abs(number), abs(math.sin(x)) * size))
+        slope = math.cos(x) if name == "sin" else math.sin(x)
+        return Value(number, max(abs(number), abs(slope) * min(size, FAR)))
     if name == "sqrt":
         return Value(number, max(number, size / (2.0 * number)) if number else math.sqrt(size))
     if name == "atan2":
         other, other_size = arguments[1]
         squared = x * x + other * other
         return Value(number, max(abs(number), (abs(other) * size + abs(x) * other_size) / squared if squared else 0.0))
-    if name == "sin":
-        return Value(number, max(abs(number), abs(math.cos(x)) * size))
     return Value(number, max(abs(number), *(each.size for each in arguments)))
 
 
-def as_text(node: ast.expr, leaf: Leaf, outer: int = 0, *, right: bool = False) -> str:
-    """Write a tree as arithmetic, · for times and ^ for powers; `leaf` writes the names."""
+def as_text(
+    node: ast.expr, leaf: Leaf, outer: int = 0, *, right: bool = False, latex: bool = False
+) -> str:  # fmt: skip
+    """Write a tree as arithmetic, · for times and ^ for powers, or as LaTeX; `leaf` writes the names.
+
+    outer: how tightly what stands around it binds; right: it stands behind an operator
+    """
+    write = partial(as_text, leaf=leaf, latex=latex)
     if isinstance(node, ast.Constant):
         return repr(node.value)
+    if isinstance(node, ast.Call):
+        return _call(node.func.id if isinstance(node.func, ast.Name) else "", map(write, node.args), latex=latex)
     if isinstance(node, ast.Name):
         text = leaf(node.id)
-        return f"({text})" if text.startswith("-") and (outer > SUM or right) else text
-    if isinstance(node, ast.UnaryOp):
-        text = f"-{as_text(node.operand, leaf, SIGN, right=True)}"
-        return f"({text})" if outer > SUM or right else text
-    if isinstance(node, ast.Call):
-        return f"{_name(node)}({', '.join(as_text(each, leaf) for each in node.args)})"
-    if not isinstance(node, ast.BinOp):
+        loose = text.startswith("-") and (outer > SUM or right)
+        loose = loose or (r"\times" in text and outer > PRODUCT) or ("^" in text and outer >= POWER)
+    elif isinstance(node, ast.UnaryOp):
+        text = f"-{write(node.operand, outer=SIGN, right=True)}"
+        loose = outer > SUM or right
+    elif not isinstance(node, ast.BinOp):
         raise TypeError(ast.dump(node))
-    binds = BINDS[type(node.op)]
-    first, second = as_text(node.left, leaf, binds), as_text(node.right, leaf, binds + 1, right=True)
-    text = first + TEXT[type(node.op)] + second
-    return f"({text})" if binds < outer else text
-
-
-def as_latex(node: ast.expr, leaf: Leaf, outer: int = 0, *, right: bool = False) -> str:
-    """Write a tree as LaTeX; `leaf` writes the names."""
-    if isinstance(node, ast.Constant):
-        return repr(node.value)
-    if isinstance(node, ast.Name):
-        text = leaf(node.id)
-        loose = (text.startswith("-") and (outer > SUM or right)) or (r"\times" in text and outer > PRODUCT)
-        loose = loose or ("^" in text and outer >= POWER)
-        return rf"\left({text}\right)" if loose else text
-    if isinstance(node, ast.UnaryOp):
-        text = f"-{as_latex(node.operand, leaf, SIGN, right=True)}"
-        return rf"\left({text}\right)" if outer > SUM or right else text
-    if isinstance(node, ast.Call):
-        return _latex_call(_name(node), [as_latex(each, leaf) for each in node.args])
-    if not isinstance(node, ast.BinOp):
-        raise TypeError(ast.dump(node))
-    if isinstance(node.op, ast.Div):
-        text = rf"\frac{{{as_latex(node.left, leaf)}}}{{{as_latex(node.right, leaf)}}}"
-        return rf"\left({text}\right)" if outer > PRODUCT + 1 else text
-    binds = BINDS[type(node.op)]
-    first, second = as_latex(node.left, leaf, binds), as_latex(node.right, leaf, binds + 1, right=True)
-    if isinstance(node.op, ast.Pow):
-        text = f"{first}^{{{second}}}"
-    elif isinstance(node.op, ast.Mult):
-        text = f"{first} {_times(first, second)} {second}"
+    elif latex and isinstance(node.op, ast.Div):
+        text = rf"\frac{{{write(node.left)}}}{{{write(node.right)}}}"
+        loose = outer > PRODUCT + 1
     else:
+        binds = BINDS[type(node.op)]
+        first, second = write(node.left, outer=binds), write(node.right, outer=binds + 1, right=True)
         text = first + TEXT[type(node.op)] + second
-    return rf"\left({text}\right)" if binds < outer else text
+        if latex and isinstance(node.op, ast.Pow):
+            text = f"{first}^{{{second}}}"
+        elif latex and isinstance(node.op, ast.Mult):
+            is_dot = first[-1].isdigit() or second[0].isdigit() or second.startswith(r"\left(-")  # next to a number
+            text = rf"{first} \cdot {second}" if is_dot else rf"{first} \, {second}"
+        loose = binds < outer
+    if not loose:
+        return text
+    return rf"\left({text}\right)" if latex else f"({text})"
+
+
+as_latex = partial(as_text, latex=True)
 
 
 def latex_number(text: str) -> str:
@@ -157,19 +144,13 @@ def latex_number(text: str) -> str:
     return rf"{text[: found.start()]} \times 10^{{{sign}{found[2]}}}"
 
 
-def _name(node: ast.Call) -> str:
-    return node.func.id if isinstance(node.func, ast.Name) else ""
-
-
-def _latex_call(name: str, arguments: list[str]) -> str:
+def _call(name: str, arguments: Iterable[str], *, latex: bool) -> str:
+    inside = ", ".join(arguments)
+    if not latex:
+        return f"{name}({inside})"
     if name == "sqrt":
-        return rf"\sqrt{{{arguments[0]}}}"
+        return rf"\sqrt{{{inside}}}"
     if name == "abs":
-        return rf"\left\lvert {arguments[0]} \right\rvert"
+        return rf"\left\lvert {inside} \right\rvert"
     operator = r"\operatorname{atan2}" if name == "atan2" else rf"\{name}"
-    return rf"{operator}\left({', '.join(arguments)}\right)"
-
-
-def _times(first: str, second: str) -> str:
-    """Choose the sign of a product: a dot where a number stands beside it, else a thin space."""
-    return r"\cdot" if first[-1].isdigit() or second[0].isdigit() or second.startswith(r"\left(-") else r"\,"
+    return rf"{operator}\left({inside}\right)"

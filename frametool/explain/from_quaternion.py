@@ -1,54 +1,44 @@
-"""From the quaternion to each representation: one block a representation, and the table of them."""
+"""From the quaternion to each representation: one block a representation, and the table of the blocks of both ways.
+
+A block takes the sheet, the quaternion, and what it names of `axes`, `degrees` and `keep_sign`.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from inspect import signature
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.explain.sheet import RADIANS, Sheet
-from frametool.explain.steps import direction, rows, to_degrees
-from frametool.explain.to_quaternion import ENTRIES, XYZ, XYZW
+from frametool.errors import ValueInvalid, shown
+from frametool.explain import to_quaternion
+from frametool.explain.sheet import COLUMNS, DEGREES, DET, ENTRIES, RADIANS, XYZ, XYZW, rows
 from frametool.geometry import euler as kernel
 from frametool.geometry import floats
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.explain.sheet import Values
+    from frametool.explain.sheet import Sheet, Values
+    from frametool.geometry.representations import Notation
     from frametool.grammar.readers import Quaternion
 
-    Block = Callable[..., Sequence[float]]  # (sheet, quaternion, axes, degrees, keep_sign) to numbers in column order
-
 NEAR_LOCK = 1e-3  # of h: below, the entries of the matrix lose more digits than the derivation may be off
-ENTRY = dict(
-    zip(
-        ENTRIES,
-        (
-            "1 - 2*(y**2 + z**2)", "2*(x*y - z*w)", "2*(x*z + y*w)",
-            "2*(x*y + z*w)", "1 - 2*(x**2 + z**2)", "2*(y*z - x*w)",
-            "2*(x*z - y*w)", "2*(y*z + x*w)", "1 - 2*(x**2 + y**2)",
-        ),
-        strict=True,
-    )
-)  # fmt: skip
-DET = "r11*(r22*r33 - r23*r32) + r12*(r23*r31 - r21*r33) + r13*(r21*r32 - r22*r31)"
+ENTRY = dict(zip(ENTRIES, (
+    "1 - 2*(y**2 + z**2)", "2*(x*y - z*w)", "2*(x*z + y*w)",
+    "2*(x*y + z*w)", "1 - 2*(x**2 + z**2)", "2*(y*z - x*w)",
+    "2*(x*z - y*w)", "2*(y*z + x*w)", "1 - 2*(x**2 + y**2)",
+), strict=True))  # fmt: skip
 COVER = "Double cover: q and -q are one rotation. The sign with w >= 0 is taken (w = 0: first of x, y, z positive)."
 LOCK = "Gimbal lock: the first and the third axis coincide; only one sum of their angles is known, not each."
 NOT_ASIN = "pitch = atan2(-r31, h), not asin(-r31): asin loses half the digits near +-90 deg."
 NOT_ACOS = "2 atan2(s, w), not 2 acos(w): acos loses half the digits near no rotation."
-COLUMNS = "Column k is axis k of the source frame, written in the target frame."
 
 
-def quaternion(
-    sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, keep_sign: bool  # noqa: FBT001
-) -> Sequence[float]:
+def quaternion(sheet: Sheet, q: Quaternion, *, keep_sign: bool) -> Sequence[float]:
     """Choose the sign; the order is x, y, z, w."""
-    if keep_sign or _first(q) >= 0.0:
-        return q
-    sheet.heading("The quaternion with w >= 0")
-    return canonical(sheet, q)
+    return q if keep_sign else canonical(sheet, q, heading="The quaternion with w >= 0")
 
 
-def wxyz(sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+def wxyz(sheet: Sheet, q: Quaternion, *, keep_sign: bool) -> Sequence[float]:
     """Choose the sign and put the scalar first."""
     sheet.heading("The quaternion as w, x, y, z")
     sheet.say("The scalar stands first; other libraries put it last, and four numbers do not say which.")
@@ -57,32 +47,22 @@ def wxyz(sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, keep_sign: boo
     return w, x, y, z
 
 
-def canonical(sheet: Sheet, q: Quaternion, first: float | None = None) -> Quaternion:
+def canonical(sheet: Sheet, q: Quaternion, *, first: float | None = None, heading: str = "") -> Quaternion:
     """Return q or -q, with steps if the sign is turned; `first` decides it, else w or the first that is not 0."""
-    if (_first(q) if first is None else first) >= 0.0:
+    x, y, z, w = q
+    if (w or x or y or z if first is None else first) >= 0.0:
         return q
-    values = dict(zip(XYZW, q, strict=True))
-    x, y, z, w = (sheet.step(values, f"q{name}", f"-{name}") for name in XYZW)
+    if heading:
+        sheet.heading(heading)
+    x, y, z, w = sheet.each(dict(zip(XYZW, q, strict=True)), XYZW, "q%", "-%")
     sheet.caveat(COVER)
     return x, y, z, w
 
 
-def _first(q: Quaternion) -> float:
-    x, y, z, w = q
-    return w or x or y or z
-
-
-def matrix(
-    sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, _keep_sign: bool  # noqa: FBT001
-) -> Sequence[float]:
-    """Work out the nine entries."""
+def matrix(sheet: Sheet, q: Quaternion) -> Sequence[float]:
+    """Work out the nine entries, and check the determinant."""
     values = dict(zip(XYZW, q, strict=True))
     sheet.heading("Quaternion to matrix")
-    return entries(sheet, values)
-
-
-def entries(sheet: Sheet, values: Values) -> Sequence[float]:
-    """Add the nine entries of x, y, z, w, and the check of the determinant."""
     found = [sheet.step(values, name, formula) for name, formula in ENTRY.items()]
     sheet.grid("R", "", "", [rows(found)])
     sheet.caveat(COLUMNS)
@@ -90,13 +70,14 @@ def entries(sheet: Sheet, values: Values) -> Sequence[float]:
     return found
 
 
-def rpy(sheet: Sheet, q: Quaternion, _axes: str, degrees: bool, _keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+def rpy(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
     """Read the angles off five entries of the matrix; near lock off half their sum and difference."""
-    values = dict(zip(XYZW, q, strict=True))
-    flat = _level(sheet, values)
-    names = ("roll", "pitch", "yaw")
+    values, names = dict(zip(XYZW, q, strict=True)), ("roll", "pitch", "yaw")
+    aside, inner = sheet.aside(), dict(values)
+    for name in ("r11", "r21"):
+        aside.step(inner, name, ENTRY[name])
     sheet.heading("Quaternion to roll, pitch, yaw")
-    if flat < NEAR_LOCK:
+    if aside.step(inner, "h", "sqrt(r11**2 + r21**2)") < NEAR_LOCK:
         sheet.say("pitch is so near +-90 deg that the entries of the matrix lose digits. Instead:")
         return _by_halves(sheet, values, "sxyz", names, degrees=degrees)
     for name in ("r11", "r21", "r31", "r32", "r33"):
@@ -106,18 +87,10 @@ def rpy(sheet: Sheet, q: Quaternion, _axes: str, degrees: bool, _keep_sign: bool
     sheet.step(values, "pitch", "atan2(-r31, h)", RADIANS)
     sheet.step(values, "yaw", "atan2(r21, r11)", RADIANS)
     sheet.caveat(NOT_ASIN)
-    return to_degrees(sheet, values, *names) if degrees else [values[name] for name in names]
+    return sheet.angles(values, names, degrees=degrees)
 
 
-def _level(sheet: Sheet, values: Values) -> float:
-    """Return the cosine of the pitch, without showing the steps to it."""
-    aside, inner = Sheet(sheet.digits, clean=sheet.clean), dict(values)
-    for name in ("r11", "r21"):
-        aside.step(inner, name, ENTRY[name])
-    return aside.step(inner, "h", "sqrt(r11**2 + r21**2)")
-
-
-def euler(sheet: Sheet, q: Quaternion, axes: str, degrees: bool, _keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+def euler(sheet: Sheet, q: Quaternion, *, axes: str, degrees: bool) -> Sequence[float]:
     """Take half the sum and half the difference of the outer angles as directions (Bernardes & Viollet 2022)."""
     values = dict(zip(XYZW, q, strict=True))
     sheet.heading(f"Quaternion to Euler angles {axes}")
@@ -141,8 +114,6 @@ def _by_halves(
         formulas = {"a": f"w {plus} {vj}", "b": f"{vi} + {vk}", "c": f"w {minus} {vj}", "d": f"{vi} - {vk}"}
     for name, formula in formulas.items():
         sheet.step(values, name, formula)
-    x, y, z, w = (values[name] for name in XYZW)
-    locked = bool(kernel.locked(x, y, z, w, axes))
     if symmetric:
         sheet.step(values, "k", "sqrt(c**2 + d**2)")
         sheet.step(values, "h", "sqrt(a**2 + b**2)")
@@ -151,9 +122,11 @@ def _by_halves(
         sheet.step(values, "h", "sqrt((a**2 + b**2)*(c**2 + d**2))")
         sheet.step(values, "k", f"2*(w*{vj} {plus} {vi}*{vk})")
         sheet.step(values, middle, "atan2(k, h)", RADIANS)
-    if locked:
-        by_sum = values["a"] ** 2 + values["b"] ** 2 > values["c"] ** 2 + values["d"] ** 2
-        sheet.step(values, first, _at_lock(by_sum=by_sum, static=static), RADIANS)
+    a, b, c, d, x, y, z, w = (values[name] for name in ("a", "b", "c", "d", *XYZW))
+    if kernel.locked(x, y, z, w, axes):  # the third angle is 0, the first twice that of the pair that is left
+        by_difference = "atan2(-2*c*d, c**2 - d**2)" if static else "atan2(2*c*d, c**2 - d**2)"
+        by_sum = a * a + b * b > c * c + d * d
+        sheet.step(values, first, "atan2(2*a*b, a**2 - b**2)" if by_sum else by_difference, RADIANS)
         sheet.chosen(values, third, 0.0, RADIANS)
         sheet.caveat(LOCK)
     else:
@@ -164,76 +137,56 @@ def _by_halves(
             sheet.step(values, f"y{number}", rise)
             sheet.step(values, f"x{number}", run)
             sheet.step(values, name, f"atan2(y{number}, x{number})", RADIANS)
-        _warn_beside_lock(sheet, values, names)
-    return to_degrees(sheet, values, *names) if degrees else [values[name] for name in names]
+        level = floats.sqrt((a * a + b * b) * (c * c + d * d))
+        if 0.0 < level < NEAR_LOCK:
+            sheet.caveat(
+                f"Beside lock: {first} and {third} each are known only to about {4e-16 / level:.0e} rad, and by so "
+                "much the result may differ; one sum of them is known to all digits."
+            )
+    return sheet.angles(values, names, degrees=degrees)
 
 
-def _warn_beside_lock(sheet: Sheet, values: Values, names: tuple[str, str, str]) -> None:
-    """Say how much of the outer angles is rounding where the axes nearly coincide."""
-    a, b, c, d = (values[name] for name in "abcd")
-    level = floats.sqrt((a * a + b * b) * (c * c + d * d))
-    if 0.0 < level < NEAR_LOCK:
-        sheet.caveat(
-            f"Beside lock: {names[0]} and {names[2]} each are known only to about {4e-16 / level:.0e} rad, and by so "
-            "much the result may differ; one sum of them is known to all digits."
-        )
-
-
-def _at_lock(*, by_sum: bool, static: bool) -> str:
-    """Return the formula of the first angle where the third is 0: twice that of the pair that is left."""
-    if by_sum:
-        return "atan2(2*a*b, a**2 - b**2)"
-    return "atan2(-2*c*d, c**2 - d**2)" if static else "atan2(2*c*d, c**2 - d**2)"
-
-
-def axis_angle(
-    sheet: Sheet, q: Quaternion, _axes: str, degrees: bool, _keep_sign: bool  # noqa: FBT001
-) -> Sequence[float]:
+def axis_angle(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
     """Divide the vector by its length; the angle from both."""
     sheet.heading("Quaternion to axis and angle")
     values = dict(zip(XYZW, canonical(sheet, q), strict=True))
     if not _axis(sheet, values):
         sheet.say("No rotation: the angle is 0, any axis will do, and x is taken.")
         return 1.0, 0.0, 0.0, 0.0
-    angle = to_degrees(sheet, values, "angle")[0] if degrees else values["angle"]
-    return values["vx"], values["vy"], values["vz"], angle
+    return values["vx"], values["vy"], values["vz"], *sheet.angles(values, ["angle"], degrees=degrees)
 
 
 def _axis(sheet: Sheet, values: Values) -> bool:
     """Add s, the angle and the unit axis; return whether there is one."""
     if not any(values[name] for name in XYZ):
         return False
-    direction(sheet, values, XYZ, ("vx", "vy", "vz"), "s")
+    sheet.direction(values, XYZ, ("vx", "vy", "vz"), "s")
     sheet.step(values, "angle", "2*atan2(s, w)", RADIANS)
     sheet.caveat(NOT_ACOS)
     return True
 
 
-def rotvec(sheet: Sheet, q: Quaternion, _axes: str, degrees: bool, _keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+def rotvec(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
     """Multiply the axis with the angle."""
     sheet.heading("Quaternion to rotation vector")
-    values = dict(zip(XYZW, canonical(sheet, q, q[3]), strict=True))
+    values = dict(zip(XYZW, canonical(sheet, q, first=q[3]), strict=True))
     if not _axis(sheet, values):
         sheet.say("No rotation: the vector is 0.")
         return 0.0, 0.0, 0.0
-    unit = "deg" if degrees else RADIANS
-    angle = "angle_deg" if degrees else "angle"
-    if degrees:
-        to_degrees(sheet, values, "angle")
-    return [sheet.step(values, f"r{name}{'_deg' * degrees}", f"v{name}*{angle}", unit) for name in XYZ]
+    sheet.angles(values, ["angle"], degrees=degrees)
+    suffix, unit = ("_deg", DEGREES) if degrees else ("", RADIANS)
+    return sheet.each(values, XYZ, f"r%{suffix}", f"v%*angle{suffix}", unit)
 
 
-def mrp(sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, _keep_sign: bool) -> Sequence[float]:  # noqa: FBT001
+def mrp(sheet: Sheet, q: Quaternion) -> Sequence[float]:
     """Project the sphere: v/(1 + w)."""
     sheet.heading("Quaternion to modified Rodrigues parameters")
     sheet.say("p = v tan(angle/4): with w >= 0 the shorter turn, and |p| at most 1.")
     values = dict(zip(XYZW, canonical(sheet, q), strict=True))
-    return [sheet.step(values, f"p{name}", f"{name}/(1 + w)") for name in XYZ]
+    return sheet.each(values, XYZ, "p%", "%/(1 + w)")
 
 
-def six_d(
-    sheet: Sheet, q: Quaternion, _axes: str, _degrees: bool, _keep_sign: bool  # noqa: FBT001
-) -> Sequence[float]:
+def six_d(sheet: Sheet, q: Quaternion) -> Sequence[float]:
     """Work out the first two columns of the matrix."""
     values = dict(zip(XYZW, q, strict=True))
     sheet.heading("Quaternion to two columns")
@@ -242,15 +195,36 @@ def six_d(
     return found
 
 
-FROM_QUATERNION: dict[str, Block] = {
-    "quaternion": quaternion,
-    "xyzw": quaternion,
-    "wxyz": wxyz,
-    "rpy": rpy,
-    "euler": euler,
-    "axis_angle": axis_angle,
-    "rotvec": rotvec,
-    "matrix": matrix,
-    "mrp": mrp,
-    "six_d": six_d,
+class Blocks(NamedTuple):
+    """The ways of a representation: from its numbers to the quaternion, and back."""
+
+    to_quaternion: Callable[..., Quaternion]
+    from_quaternion: Callable[..., Sequence[float]]
+
+
+BLOCKS = {
+    "quaternion": Blocks(to_quaternion.quaternion, quaternion),
+    "xyzw": Blocks(to_quaternion.quaternion, quaternion),
+    "wxyz": Blocks(to_quaternion.wxyz, wxyz),
+    "rpy": Blocks(to_quaternion.rpy, rpy),
+    "euler": Blocks(to_quaternion.euler, euler),
+    "axis_angle": Blocks(to_quaternion.axis_angle, axis_angle),
+    "rotvec": Blocks(to_quaternion.rotvec, rotvec),
+    "matrix": Blocks(to_quaternion.matrix, matrix),
+    "mrp": Blocks(to_quaternion.mrp, mrp),
+    "six_d": Blocks(to_quaternion.six_d, six_d),
 }
+
+
+def blocks_of(form: Notation) -> Blocks:
+    """Return the blocks of a notation; raises ValueInvalid for a representation without them."""
+    name = form.representation.name
+    if name not in BLOCKS:
+        raise ValueInvalid(f"there is no derivation of {shown(name)}; derived are {', '.join(BLOCKS)}")
+    return BLOCKS[name]
+
+
+def run(block: Callable[..., Any], sheet: Sheet, numbers: Sequence[float], form: Notation, **how: bool) -> Any:
+    """Run a block with what it names of the axes and units of a notation."""
+    known = {"axes": form.bound_axes(), **how}
+    return block(sheet, numbers, **{name: known[name] for name in signature(block).parameters if name in known})

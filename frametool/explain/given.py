@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, printable
+from frametool.explain.from_quaternion import blocks_of, run
 from frametool.explain.operations import inverse
-from frametool.explain.to_quaternion import TO_QUATERNION, block_of
 from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.stream.record_values import documents, pose_of
@@ -15,7 +16,7 @@ from frametool.stream.request import Request
 from frametool.stream.row_layout import POSE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from frametool.explain.sheet import Sheet
     from frametool.geometry.representations import Notation
@@ -51,109 +52,90 @@ class Given(NamedTuple):
             sheet.heading("The rotation")
             sheet.say("None is given: the identity, x 0, y 0, z 0, w 1.")
             return IDENTITY
-        block = block_of(TO_QUATERNION, self.notation)
-        q: Quaternion = block(sheet, self.numbers, self.notation.bound_axes(), self.degrees)
+        block = blocks_of(self.notation).to_quaternion
+        q: Quaternion = run(block, sheet, self.numbers, self.notation, degrees=self.degrees)
         return q
 
     def components(self, sheet: Sheet, target: str, source: str) -> Rigid:
         """Add the way from the numbers as written to target_from_source."""
-        if self.notation is None:
-            q: Quaternion = IDENTITY
-        elif self.is_plain:
-            x, y, z, w = self.numbers
-            q = x, y, z, w
+        name = self.notation.representation.name if self.notation else ""
+        if not name or (name in PLAIN and abs(sum(x * x for x in self.numbers) - 1.0) <= 1e-12):
+            qx, qy, qz, qw = self.numbers or IDENTITY
         else:
-            with sheet.about(f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"):
-                q = self.quaternion(sheet)
+            with sheet.about(self._named(target, source)):
+                qx, qy, qz, qw = self.quaternion(sheet)
         x, y, z = self.position
-        found: Rigid = (x, y, z, *q)
+        found: Rigid = (x, y, z, qx, qy, qz, qw)
         return inverse(sheet, found, source, target) if self.inverse else found
+
+    def _named(self, target: str, source: str) -> str:
+        return f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"
 
     def turned(self) -> Given:
         """Return the inverse: what is written stays, the pose and its frames are turned around."""
         return self._replace(pose=pose_algebra.inverse(self.pose), inverse=not self.inverse)
 
-    @property
-    def is_plain(self) -> bool:
-        """Return whether the rotation is written as a unit quaternion, or not at all."""
-        if self.notation is None:
-            return True
-        return self.notation.representation.name in PLAIN and abs(sum(x * x for x in self.numbers) - 1.0) <= 1e-12
-
     def say(self, sheet: Sheet, target: str, source: str) -> None:
         """List the pose of target_from_source as it is written."""
         sheet.reached(self.position)
-        written = f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"
-        sheet.say(f"{written}: {self._line(sheet)}{f'; its inverse is {target}_from_{source}' if self.inverse else ''}")
-
-    def _line(self, sheet: Sheet) -> str:
-        position = f"xyz {sheet.numbers(self.position)} m"
-        if self.notation is None:
-            return position
-        name = self.notation.representation.name
-        if self.notation.representation.angles:
-            name += ("_deg" if self.degrees else "_rad") + (f":{self.notation.axes}" if self.notation.axes else "")
-        return f"{position}, {'xyzw' if name == 'quaternion' else name} {sheet.numbers(self.numbers)}"
+        line = f"{self._named(target, source)}: xyz {sheet.numbers(self.position)} m"
+        if self.notation is not None:
+            name, axes = self.notation.representation.name, self.notation.axes
+            if self.notation.representation.angles:
+                name += ("_deg" if self.degrees else "_rad") + (f":{axes}" if axes else "")
+            line += f", {'xyzw' if name == 'quaternion' else name} {sheet.numbers(self.numbers)}"
+        sheet.say(line + (f"; its inverse is {target}_from_{source}" if self.inverse else ""))
 
 
 def given_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Given]:
     """Read the poses of a text as they are written; raises as `read_poses` does."""
-    return list(_given(source, Request(kind=POSE, degrees=degrees, normalize=normalize)))
-
-
-def _given(source: Source, request: Request) -> Iterator[Given]:
-    for _, records in documents(source, request):
-        yield from (given_of(record, request) for record in records)
+    request = Request(kind=POSE, degrees=degrees, normalize=normalize)
+    return [given_of(record, request) for _, records in documents(source, request) for record in records]
 
 
 def given_of(record: Record, request: Request) -> Given:
     """Return a record as it is written."""
-    shape = record.shape
-    numbers = shape.rotation(record.values) if shape.notation is not None else ()
-    degrees = shape.degrees if shape.notation is not None and shape.notation.representation.angles else False
-    position = shape.position(record.values)
-    return Given(pose_of(record, request), shape.notation, numbers, degrees, position, record.inverse)
+    shape, form = record.shape, record.shape.notation
+    given = Given(pose_of(record, request), form, position=shape.position(record.values), inverse=record.inverse)
+    if form is None:
+        return given
+    return given._replace(
+        numbers=shape.rotation(record.values), degrees=bool(form.representation.angles) and shape.degrees
+    )
 
 
-def given_pose(value: Any, *, degrees: bool = False, normalize: bool = False) -> Given:
-    """Take one pose: a mapping, its text, a Transform, a Rotation, or what is a `Given` already.
+def given_pose(value: Any, *, degrees: bool = False) -> Given:
+    """Take one pose: a mapping, its text, a Transform or a Rotation.
 
     Raises ValueInvalid, FormatError.
     """
-    if isinstance(value, Given):
-        return value
-    if isinstance(value, (dict, list)):
-        from frametool.documents.json import dump
-
-        value = Source(INLINE, dump(value))
-    if isinstance(value, str):
-        value = Source(INLINE, value)
-    if isinstance(value, Source):
-        found = given_poses(value, degrees=degrees, normalize=normalize)
-        if len(found) != 1:
-            raise ValueInvalid(f"a derivation is of one pose, {value.name} holds {len(found)}")
-        return found[0]
-    return _of_value(value)
-
-
-def _of_value(value: Any) -> Given:
-    """Take a Transform or a Rotation."""
     from frametool.geometry.representations import notation
     from frametool.geometry.rotation import Rotation
     from frametool.geometry.transform import Transform
 
+    if isinstance(value, (str, dict, list)):
+        found = given_poses(source_of(value), degrees=degrees)
+        if len(found) != 1:
+            raise ValueInvalid(f"a derivation is of one pose, {INLINE} holds {len(found)}")
+        return found[0]
     if not isinstance(value, (Transform, Rotation)) or value.shape:
         raise ValueInvalid(f"expected one pose: a mapping, its text, a Transform or a Rotation; found {value!r:.60}")
-    components = value.components if isinstance(value, Transform) else (0.0, 0.0, 0.0, *value.components)
-    pose = Pose.of(components) if isinstance(value, Transform) else Pose(None, value.components)
-    return Given(pose, notation("quaternion"), components[3:], position=components[:3])
+    pose = Pose.of(value.components) if isinstance(value, Transform) else Pose(None, value.components)
+    x, y, z, *rotation = pose.components
+    return Given(pose, notation("quaternion"), rotation, position=(x, y, z))
+
+
+def source_of(value: Any) -> Source:
+    """Return a text, or a mapping or list as text."""
+    from frametool.documents.json import dump
+
+    return Source(INLINE, value if isinstance(value, str) else dump(value))
 
 
 def frames_of(count: int, poses: Sequence[Pose]) -> list[str]:
     """Name the frames along a chain of poses, each as its neighbours call it, else by a letter."""
     taken = {name for pose in poses for name in (pose.name, pose.parent) if name}
-    letters = (letter for letter in (*"abcdefghijklmnopqrstuvwxyz", *(f"f{n}" for n in range(count + 1)))
-               if letter not in taken)  # fmt: skip
+    letters = (each for each in (*ascii_lowercase, *(f"f{n}" for n in range(count + 1))) if each not in taken)
     names = []
     for at in range(count):
         before = poses[at - 1].name if at else None

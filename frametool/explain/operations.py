@@ -1,18 +1,15 @@
-"""Steps of what is done to poses: product, inverse, difference, the way between two, and what moves points.
+"""Steps of what is done to poses: product, inverse, difference, the way between two, a change of axes at both ends.
 
-Steps that move what a record holds into another frame: points, vectors, twists, wrenches, covariances.
-
-Steps of a change of axes at the two ends of a pose: W p B, of `--world-axes` and `--axes`.
+And of what moves the content of a record into another frame: points, vectors, twists, wrenches, covariances.
 """
 
 from __future__ import annotations
 
+from itertools import product as pairs
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.explain.sheet import METRES, RADIANS, Sheet, transposed, upright
-from frametool.explain.steps import length, norm, of_quaternion, to_degrees
-from frametool.explain.to_quaternion import XYZ, XYZW
-from frametool.geometry import rigid
+from frametool.explain.sheet import CYCLES, METRES, RADIANS, XYZ, XYZW, Sheet, norm, transposed, upright
+from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,7 +18,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Quaternion, Vector
     Parts = list[str | Matrix]
-    Block = Callable[[Sheet, Rigid, Sequence[float], str, str], Sequence[float]]
 
 TOUCH = "Frames that touch cancel. The second position is first turned into the first frame, then the first is added."
 ORDER = (
@@ -31,6 +27,8 @@ ORDER = (
 INVERSE = "The position is not just negated but also turned into the other frame: -R^T t."
 HALF_TURN = "Half a turn apart both ways round are equally short; the sign of b decides, as in tf2."
 VECTOR = "A direction (vector, axis, velocity) is only turned: R v, without + t. A point moves by R p + t."
+ARM = "The velocity and the torque depend on the point they are taken at: the lever arm t comes in."
+MIRROR = "One side alone would leave no rotation: its matrix would have the determinant -1."
 FROM_Q = "R(q) is the matrix of q: r11 = 1 - 2 (y^2 + z^2), r12 = 2 (x y - z w), and so on."
 NEARLY_ZERO = 1e-15
 HAMILTON = {
@@ -41,17 +39,21 @@ HAMILTON = {
 }
 
 
+def _named(prefix: str, numbers: Sequence[float], names: Sequence[str]) -> dict[str, float]:
+    return {f"{prefix}{name}": number for name, number in zip(names, numbers, strict=True)}
+
+
 def product(sheet: Sheet, a: Quaternion, b: Quaternion, *, brief: bool = False) -> Quaternion:
     """Multiply two quaternions; brief: on one line."""
     values = _named("a", a, XYZW) | _named("b", b, XYZW)
+    if not brief:
+        sheet.say("c = a b (Hamilton: ij = k, ji = -k; not commutative)")
+    steps = sheet.aside() if brief else sheet
+    x, y, z, w = (steps.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
     if brief:
-        aside = type(sheet)(sheet.digits, clean=sheet.clean)
-        x, y, z, w = (aside.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
-        sheet.quaternions("q", "a b", (a, b), (x, y, z, w))
-        return x, y, z, w
-    sheet.say("c = a b (Hamilton: ij = k, ji = -k; not commutative)")
-    x, y, z, w = (sheet.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
-    sheet.caveat(ORDER)
+        sheet.quaternions(("a b", "%s·%s"), (r"a\,b", r"%s \cdot %s"), a, b, (x, y, z, w))
+    else:
+        sheet.caveat(ORDER)
     return x, y, z, w
 
 
@@ -61,28 +63,26 @@ def compose(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str], *, b
     sheet.heading(f"{first}_from_{last} = {first}_from_{middle} @ {middle}_from_{last}")
     if not brief:
         sheet.say(TOUCH)
-    position = moved(sheet, a, b[:3], "t", ("R(a) tb + ta", r"R(a)\,t_b + t_a"), METRES)
+    position = turned(sheet, a[3:], b[:3], "t", ("R(a) tb + ta", r"R(a)\,t_b + t_a"), METRES, shift=a[:3])
     return *position, *product(sheet, a[3:], b[3:], brief=brief)
 
 
-def moved(
-    sheet: Sheet, pose: Rigid, point: Sequence[float], name: str, formula: tuple[str, str], unit: str
-) -> Vector:
-    """Move a point: turn it, then shift it."""
-    matrix = of_quaternion(sheet, pose[3:])
-    x, y, z = (sheet.inner(row, point, shift) for row, shift in zip(matrix, pose[:3], strict=True))
-    parts: Parts = [matrix, upright(point), "+", upright(pose[:3]), "=", upright((x, y, z))]
-    sheet.grid(name, *formula, parts, unit)
-    return x, y, z
-
-
 def turned(
-    sheet: Sheet, q: Quaternion, vector: Sequence[float], name: str, formula: tuple[str, str], unit: str = ""
-) -> Vector:
-    """Turn a vector."""
-    matrix = of_quaternion(sheet, q)
-    x, y, z = (sheet.inner(row, vector) for row in matrix)
-    sheet.grid(name, *formula, [matrix, upright(vector), "=", upright((x, y, z))], unit)
+    sheet: Sheet, q: Quaternion, vector: Sequence[float], name: str, formula: tuple[str, str], unit: str = "",
+    shift: Sequence[float] = (),
+) -> Vector:  # fmt: skip
+    """Turn a vector, or turn and then shift a point."""
+    return _times(sheet, sheet.matrix(q), vector, name, formula, unit, shift)
+
+
+def _times(
+    sheet: Sheet, matrix: Matrix, vector: Sequence[float], name: str, formula: tuple[str, str], unit: str,
+    shift: Sequence[float] = (),
+) -> Vector:  # fmt: skip
+    """Add a matrix times a vector, and a shift."""
+    x, y, z = (sheet.inner(row, vector, *shift[at : at + 1]) for at, row in enumerate(matrix))
+    more: Parts = ["+", upright(shift)] if shift else []
+    sheet.grid(name, *formula, [matrix, upright(vector), *more, "=", upright((x, y, z))], unit)
     return x, y, z
 
 
@@ -90,50 +90,41 @@ def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
     """Turn target_from_source around."""
     sheet.heading(f"{source}_from_{target} = inverse of {target}_from_{source}")
     sheet.say("The axis turns round: q* = (-x, -y, -z, w), and its matrix is R^T.")
-    back = transposed(of_quaternion(sheet, pose[3:]))
+    back = transposed(sheet.matrix(pose[3:]))
     x, y, z = (0.0 - sheet.inner(row, pose[:3]) for row in back)
     parts: Parts = ["-", back, upright(pose[:3]), "=", upright((x, y, z))]
     sheet.grid("t'", "-R^T t", r"-R^{\mathsf T}\,t", parts, METRES)
     sheet.caveat(INVERSE)
-    return x, y, z, *conjugate(sheet, pose[3:])
-
-
-def conjugate(sheet: Sheet, q: Quaternion) -> Quaternion:
-    """Turn the axis of a rotation round."""
-    x, y, z, w = q
-    found = (0.0 - x, 0.0 - y, 0.0 - z, w)
-    sheet.say("q* = " + ", ".join(f"{name} {sheet.number(part)}" for name, part in zip(XYZW, found, strict=True)))
-    return found
+    q = quaternion.conjugate(*pose[3:])
+    sheet.say("q* = " + ", ".join(f"{name} {sheet.number(part)}" for name, part in zip(XYZW, q, strict=True)))
+    return x, y, z, *q
 
 
 def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
-    """Compare two poses: `frames` are the one both are given in, that of a and that of b."""
+    """Compare two poses: `frames` are the one both are seen from, that of a and that of b."""
     world, first, second = frames
     sheet.heading(f"{first}_from_{second} = ({world}_from_{first})^-1 @ {world}_from_{second}")
     sheet.say("inverse, then compose: R^T tb + (-R^T ta) = R^T (tb - ta); subtracted first, near poses keep their "
               "digits.")  # fmt: skip
     sheet.say("d = tb - ta")
     values = _named("a", a[:3], XYZ) | _named("b", b[:3], XYZ)
-    apart = [sheet.step(values, f"d{name}", f"b{name} - a{name}", METRES) for name in XYZ]
-    back = transposed(of_quaternion(sheet, a[3:]))
-    x, y, z = (sheet.inner(row, apart) for row in back)
-    sheet.grid("t", "R(A)^T d", r"R(A)^{\mathsf T}\,d", [back, upright(apart), "=", upright((x, y, z))], METRES)
+    apart = sheet.each(values, XYZ, "d%", "b% - a%", METRES)
+    back = transposed(sheet.matrix(a[3:]))
+    x, y, z = _times(sheet, back, apart, "t", ("R(A)^T d", r"R(A)^{\mathsf T}\,d"), METRES)
     sheet.caveat(INVERSE)
     sheet.say("a = q(A)*, b = q(B); the axis of A turns round: q* = (-x, -y, -z, w).")
-    _, _, _, ax, ay, az, aw = a
-    qx, qy, qz, qw = product(sheet, (0.0 - ax, 0.0 - ay, 0.0 - az, aw), b[3:])
-    return x, y, z, qx, qy, qz, qw
+    return x, y, z, *product(sheet, quaternion.conjugate(*a[3:]), b[3:])
 
 
 def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
     """Measure a transform: distance, angle in radians and in degrees."""
     sheet.heading("How far apart")
     values = _named("t", pose[:3], XYZ) | _named("", pose[3:], XYZW)
-    distance, _, _ = length(sheet, values, ("tx", "ty", "tz"), "d", METRES)
-    length(sheet, values, XYZ, "s")
+    distance, _, _ = sheet.length(values, ("tx", "ty", "tz"), "d", METRES)
+    sheet.length(values, XYZ, "s")
     angle = sheet.step(values, "angle", "2*atan2(s, abs(w))", RADIANS)
     sheet.caveat(f"The distance does not depend on the frame; the position does: it is written in {frame}.")
-    return distance, angle, to_degrees(sheet, values, "angle")[0]
+    return distance, angle, sheet.angles(values, ["angle"], degrees=True)[0]
 
 
 def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
@@ -147,8 +138,8 @@ def line(sheet: Sheet, a: Sequence[float], b: Sequence[float], fraction: float) 
     """Interpolate positions along the line, from the nearer end."""
     sheet.heading("Position: along the straight line")
     values = {"f": fraction} | _named("a", a, XYZ) | _named("b", b, XYZ)
-    nearer = "a{0} + f*(b{0} - a{0})" if fraction < 0.5 else "b{0} - (1 - f)*(b{0} - a{0})"
-    x, y, z = (sheet.step(values, f"t{name}", nearer.format(name), METRES) for name in XYZ)
+    nearer = "a% + f*(b% - a%)" if fraction < 0.5 else "b% - (1 - f)*(b% - a%)"
+    x, y, z = sheet.each(values, XYZ, "t%", nearer, METRES)
     return x, y, z
 
 
@@ -161,15 +152,13 @@ def slerp(sheet: Sheet, a: Quaternion, b: Quaternion, fraction: float) -> Quater
     if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + 0.0 < 0.0:
         sheet.say("dot < 0: the arc to -b, the same rotation, is the shorter one (double cover).")
         other = "n"
-        for name in XYZW:
-            sheet.step(values, f"n{name}", f"-b{name}")
+        sheet.each(values, XYZW, "n%", "-b%")
     else:
         sheet.say("dot >= 0: the arc to b is not longer than that to -b (double cover).")
     if abs(values["dot"]) < NEARLY_ZERO:
         sheet.caveat(HALF_TURN)
-    for letter, sign in (("m", "-"), ("p", "+")):
-        for name in XYZW:
-            sheet.step(values, f"{letter}{name}", f"{other}{name} {sign} a{name}")
+    sheet.each(values, XYZW, "m%", f"{other}% - a%")
+    sheet.each(values, XYZW, "p%", f"{other}% + a%")
     sheet.step(values, "minus", norm([f"m{name}" for name in XYZW]))
     sheet.step(values, "plus", norm([f"p{name}" for name in XYZW]))
     sheet.step(values, "arc", "2*atan2(minus, plus)", RADIANS)
@@ -181,22 +170,15 @@ def slerp(sheet: Sheet, a: Quaternion, b: Quaternion, fraction: float) -> Quater
         sheet.say("The rotations are the same: the weights are those of a straight line.")
         sheet.step(values, "ka", "1 - f")
         sheet.step(values, "kb", "f")
-    x, y, z, w = (sheet.step(values, f"q{name}", f"ka*a{name} + kb*{other}{name}") for name in XYZW)
+    x, y, z, w = sheet.each(values, XYZW, "q%", f"ka*a% + kb*{other}%")
     return x, y, z, w
-
-
-def _named(prefix: str, numbers: Sequence[float], names: Sequence[str]) -> dict[str, float]:
-    return {f"{prefix}{name}": number for name, number in zip(names, numbers, strict=True)}
-
-
-ARM = "The velocity and the torque depend on the point they are taken at: the lever arm t comes in."
 
 
 def point(sheet: Sheet, pose: Rigid, numbers: Sequence[float], target: str, source: str) -> Sequence[float]:
     """Turn, then shift."""
     sheet.heading(f"point_in_{target} = {target}_from_{source} * point_in_{source}")
     sheet.say(FROM_Q)
-    found = moved(sheet, pose, numbers, "p'", ("R(q) p + t", "R(q)\\,p + t"), METRES)
+    found = turned(sheet, pose[3:], numbers, "p'", ("R(q) p + t", r"R(q)\,p + t"), METRES, shift=pose[:3])
     sheet.caveat(VECTOR)
     return found
 
@@ -214,55 +196,49 @@ def twist(sheet: Sheet, pose: Rigid, numbers: Sequence[float], target: str, sour
     """Turn both vectors; the linear one is then that of the body's point at the target's origin."""
     sheet.heading(f"twist at the origin of {target}, from that at the origin of {source}")
     sheet.say("w' = R w, and v' = R v + t x w': the velocity of the same rigid body, elsewhere.")
-    angular = turned(sheet, pose[3:], numbers[3:], "w'", ("R(q) w", "R(q)\\,w"), "rad/s")
-    linear = turned(sheet, pose[3:], numbers[:3], "u", ("R(q) v", "R(q)\\,v"), "m/s")
-    sheet.caveat(ARM)
-    return *_with_arm(sheet, pose, linear, angular, ("u", "w", "v"), "m/s"), *angular
+    angular, linear = _with_arm(sheet, pose, ("w", numbers[3:], "rad/s"), ("v", numbers[:3], "m/s"))
+    return *linear, *angular
 
 
 def wrench(sheet: Sheet, pose: Rigid, numbers: Sequence[float], target: str, source: str) -> Sequence[float]:
     """Turn both vectors; the torque is then that about the target's origin."""
     sheet.heading(f"wrench about the origin of {target}, from that about the origin of {source}")
     sheet.say("f' = R f, and m' = R m + t x f'.")
-    force = turned(sheet, pose[3:], numbers[:3], "f'", ("R(q) f", "R(q)\\,f"), "N")
-    torque = turned(sheet, pose[3:], numbers[3:], "u", ("R(q) m", "R(q)\\,m"), "Nm")
-    sheet.caveat(ARM)
-    return *force, *_with_arm(sheet, pose, torque, force, ("u", "f", "m"), "Nm")
+    force, torque = _with_arm(sheet, pose, ("f", numbers[:3], "N"), ("m", numbers[3:], "Nm"))
+    return *force, *torque
 
 
 def _with_arm(
-    sheet: Sheet, pose: Rigid, own: Sequence[float], other: Sequence[float], names: tuple[str, str, str], unit: str
-) -> Sequence[float]:
-    """Add own + t x other."""
-    a, b, c = names
-    values = {f"{letter}{axis}": part for letter, vector in ((a, own), ("t", pose[:3]), (b, other))
-              for axis, part in zip(XYZ, vector, strict=True)}  # fmt: skip
-    return [
-        sheet.step(values, f"{c}{i}", f"{a}{i} + t{j}*{b}{k} - t{k}*{b}{j}", unit)
-        for i, j, k in (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y"))
-    ]
+    sheet: Sheet, pose: Rigid, first: tuple[str, Sequence[float], str], second: tuple[str, Sequence[float], str]
+) -> tuple[Sequence[float], Sequence[float]]:
+    """Turn two vectors (letter, numbers, unit), and add t x the first one to the second."""
+    (a, vector, unit), (b, other, other_unit) = first, second
+    free = turned(sheet, pose[3:], vector, f"{a}'", (f"R(q) {a}", rf"R(q)\,{a}"), unit)
+    here = turned(sheet, pose[3:], other, "u", (f"R(q) {b}", rf"R(q)\,{b}"), other_unit)
+    sheet.caveat(ARM)
+    values = _named("u", here, XYZ) | _named("t", pose[:3], XYZ) | _named(a, free, XYZ)
+    return free, [sheet.step(values, f"{b}{i}", f"u{i} + t{j}*{a}{k} - t{k}*{a}{j}", other_unit) for i, j, k in CYCLES]
 
 
 def pose_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
     """Turn each 3x3 block C into R C R^T."""
     sheet.heading("The covariance: each 3x3 block C becomes R C R^T")
-    turn = of_quaternion(sheet, pose[3:])
-    found = [[0.0] * 6 for _ in range(6)]
-    for top, rows in ((0, "position"), (3, "rotation")):
-        for left, columns in ((0, "position"), (3, "rotation")):
-            block = [list(numbers[6 * (top + i) + left : 6 * (top + i) + left + 3]) for i in range(3)]
-            sheet.say(f"{rows} with {columns}:")
-            made = _sandwich(sheet, turn, block, "R C R^T", r"R\,C\,R^{\mathsf T}")
-            for i, row in enumerate(made):
-                found[top + i][left : left + 3] = row
-    return [entry for row in found for entry in row]
+    turn = sheet.matrix(pose[3:])
+    found = [0.0] * 36
+    for top, left in pairs((0, 3), repeat=2):
+        sheet.say(f"{'rotation' if top else 'position'} with {'rotation' if left else 'position'}:")
+        places = [slice(at + left, at + left + 3) for at in range(6 * top, 6 * top + 18, 6)]
+        made = _sandwich(sheet, turn, [list(numbers[place]) for place in places], "R C R^T", r"R\,C\,R^{\mathsf T}")
+        for place, row in zip(places, made, strict=True):
+            found[place] = row
+    return found
 
 
 def twist_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
     """Turn the 6x6 covariance C into A C A^T."""
     sheet.heading("The covariance of the twist: A C A^T")
     sheet.say("A is what the move does to the six numbers: rows R | t x R, and 0 | R.")
-    turn = of_quaternion(sheet, pose[3:])
+    turn = sheet.matrix(pose[3:])
     tx, ty, tz = pose[:3]
     arm = sheet.product([[0.0, -tz, ty], [tz, 0.0, -tx], [-ty, tx, 0.0]], turn)
     adjoint = [[*turn[i], *arm[i]] for i in range(3)] + [[0.0, 0.0, 0.0, *turn[i]] for i in range(3)]
@@ -278,10 +254,7 @@ def _sandwich(sheet: Sheet, a: Matrix, c: Matrix, text: str, latex: str) -> Matr
     return found
 
 
-MOVERS: dict[str, Block] = {"point": point, "vector": vector, "twist": twist, "wrench": wrench}
-
-
-MIRROR = "One side alone would leave no rotation: its matrix would have the determinant -1."
+MOVERS: dict[str, Callable[..., Sequence[float]]] = {"point": point, "vector": vector, "twist": twist, "wrench": wrench}
 
 
 class OtherAxes(NamedTuple):

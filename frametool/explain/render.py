@@ -7,48 +7,40 @@ from __future__ import annotations
 
 from itertools import groupby
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain.formula_tree import latex_number
-from frametool.explain.sheet import Caveat, MatrixLine, Sentence, SheetHeading, SheetResult, SheetStep
+from frametool.explain.sheet import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from frametool.explain.sheet import Item, Row
 
 WIDTH = 80
 INDENT = "   "
+INDENTS = {HEADING: ("", INDENT), SENTENCE: (INDENT, INDENT), CAVEAT: (f"{INDENT}! ", f"{INDENT}  ")}
 
 
 def text_of(items: Sequence[Item]) -> str:
     """Return a derivation as text."""
     lines: list[str] = []
-    count = 0
     for is_step, group in groupby(items, lambda item: isinstance(item, SheetStep)):
         if is_step:
             lines += _steps([item for item in group if isinstance(item, SheetStep)])
-            continue
-        for item in group:
-            count += isinstance(item, SheetHeading)
-            lines += _lines(item, count)
+        else:
+            lines += [line for item in group for line in _lines(item)]
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _lines(item: Item, count: int) -> list[str]:
-    """Return the lines of what is no step."""
-    if isinstance(item, SheetHeading):
-        return ["", *_wrapped(item.text, f"{count}. ", INDENT)]
-    if isinstance(item, Sentence):
-        return _wrapped(item.text, INDENT, INDENT)
-    if isinstance(item, Caveat):
-        return _wrapped(item.text, f"{INDENT}! ", f"{INDENT}  ")
-    if isinstance(item, MatrixLine):
-        return _grid(item)
+def _lines(item: Item) -> list[str]:
+    """Return the lines of words, of matrices or of the result."""
+    if isinstance(item, Words):
+        return [""] * (item.kind == HEADING) + _wrapped(item.text, *INDENTS[item.kind])
     if isinstance(item, SheetResult):
         return ["", *_wrapped(f"Result: {item.text}" if item.text else "Result", "", INDENT), *result_lines(item.rows)]
-    return []
+    return _grid(item) if isinstance(item, MatrixLine) else []
 
 
 def _wrapped(text: str, first: str, further: str) -> list[str]:
@@ -61,22 +53,19 @@ def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
     """Write successive steps with their signs of equality below one another."""
     width = max(len(step.name) for step in steps)
     for step in steps:
-        unit = f" {step.unit}" if step.unit else ""
+        texts = [*step.texts[:-1], f"{step.texts[-1]} {step.unit}".rstrip()]
         head = f"{INDENT}{step.name:<{width}} = "
-        line = head + " = ".join(step.texts) + unit
-        if len(line) <= WIDTH:
+        if len(line := head + " = ".join(texts)) <= WIDTH:
             yield line
             continue
-        further = " " * (len(head) - 2) + "= "
-        *formulas, value = step.texts
-        last = " = ".join([*formulas[1:], value]) + unit
-        yield from _broken(head, formulas[0])
-        if len(further + last) <= WIDTH:
-            yield further + last
+        yield from _broken(head, texts[0])
+        head = " " * (len(head) - 2) + "= "
+        if len(line := head + " = ".join(texts[1:])) <= WIDTH:
+            yield line
             continue
-        for formula in formulas[1:]:
-            yield from _broken(further, formula)
-        yield f"{further}{value}{unit}"
+        for formula in texts[1:-1]:
+            yield from _broken(head, formula)
+        yield head + texts[-1]
 
 
 def _broken(head: str, formula: str) -> Iterator[str]:
@@ -153,14 +142,13 @@ def result_lines(rows: Sequence[Row]) -> list[str]:
         head = f"{INDENT}{row.label:<{width}}  "
         cells = [f"{name} {number}".lstrip() for name, number in row.cells]
         unit = f" {row.unit}" if row.unit else ""
-        line = head + "  ".join(cells) + unit
-        if len(line) <= WIDTH:
-            lines.append(line)
-        elif any(name for name, _ in row.cells):
-            lines += [(head if at == 0 else " " * len(head)) + cell + unit for at, cell in enumerate(cells)]
-        else:
-            filled = wrap("  ".join(cells), WIDTH - len(head), break_on_hyphens=False, break_long_words=False)
-            lines += [(head if at == 0 else " " * len(head)) + part for at, part in enumerate(filled)]
+        texts = ["  ".join(cells) + unit]
+        if len(head + texts[0]) > WIDTH:
+            if any(name for name, _ in row.cells):
+                texts = [cell + unit for cell in cells]
+            else:
+                texts = wrap("  ".join(cells), WIDTH - len(head), break_on_hyphens=False, break_long_words=False)
+        lines += [(" " * len(head) if at else head) + text for at, text in enumerate(texts)]
     return lines
 
 
@@ -202,15 +190,13 @@ class Explanation:
 
     def markdown(self) -> str:
         """Return Markdown with formulas between dollar signs, as GitHub and Jupyter show it."""
-        parts = [f"## {_markdown_text(self.title)}", *_parts(self.items, _markdown_item, _markdown_formulas)]
-        return "\n\n".join(parts) + "\n"
+        return _document(self, MARKDOWN)
 
     _repr_markdown_ = markdown
 
     def latex(self) -> str:
         """Return a LaTeX document."""
-        parts = _parts(self.items, _latex_item, _latex_formulas)
-        return PREAMBLE + "\n\n".join([rf"\section*{{{_latex_text(self.title)}}}", *parts]) + "\n\\end{document}\n"
+        return _document(self, LATEX)
 
     def render(self, form: str = "text") -> str:
         """Return the derivation as text, markdown or latex; raises ValueInvalid for another form."""
@@ -226,42 +212,38 @@ FORMS: dict[str, Callable[[Explanation], str]] = {
 }
 
 
-def _parts(
-    items: Sequence[Item], write: Callable[[Item, int], str], formulas: Callable[[list[str]], str]
-) -> Iterator[str]:
-    """Yield the parts of a derivation; successive formulas stand in one."""
-    count = 0
-    for is_formula, group in groupby(items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
+def _document(explanation: Explanation, markup: Markup) -> str:
+    """Write a derivation in a language with formulas; successive formulas stand in one block."""
+    parts = []
+    for is_formula, group in groupby(explanation.items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
         if is_formula:
-            yield formulas([line for item in group for line in _aligned(item)])
+            lines = [line for item in group if not isinstance(item, (Words, SheetResult)) for line in _aligned(item)]
+            parts.append(markup.formulas % " \\\\\n".join(lines))
             continue
         for item in group:
-            count += isinstance(item, SheetHeading)
-            yield write(item, count)
+            if isinstance(item, Words):
+                parts.append(markup.words[item.kind] % markup.escape(item.text))
+            elif isinstance(item, SheetResult):
+                lines = [line.removeprefix(INDENT) for line in result_lines(item.rows)]
+                head = f": {markup.escape(item.text)}" if item.text else ""
+                parts.append(markup.result % (head, markup.table(lines)))
+    return markup.document % (markup.escape(explanation.title), "\n\n".join(parts))
 
 
-def _aligned(item: Item) -> Iterator[str]:
-    """Yield the lines of a formula, aligned at the first sign of equality of each."""
-    unit = ""
+def _aligned(item: SheetStep | MatrixLine) -> list[str]:
+    """Return the lines of a formula, aligned at the first sign of equality of each."""
     if isinstance(item, MatrixLine):
         name = item.name.replace("'", r"^{\prime}")
-        matrices = " ".join(_matrix(part) for part in item.parts)
-        parts, unit = [*([item.latex] if item.latex else []), matrices], item.unit
-    elif isinstance(item, SheetStep):
-        name, parts, unit = item.latex_name, list(item.latex), item.unit
+        parts = [*filter(None, [item.latex]), " ".join(map(_matrix, item.parts))]
     else:
-        return
-    unit = rf"\ \text{{{_latex_text(unit)}}}" if unit else ""
-    if sum(map(len, parts)) <= LONG or len(parts) == 1:
-        yield f"{name} &= {' = '.join(parts)}{unit}"
-        return
-    yield f"{name} &= {parts[0]}"
-    if sum(map(len, parts[1:])) <= 2 * LONG:
-        yield f"&= {' = '.join(parts[1:])}{unit}"
-        return
-    for part in parts[1:-1]:
-        yield f"&= {part}"
-    yield f"&= {parts[-1]}{unit}"
+        name, parts = item.latex_name, list(item.latex)
+    if sum(map(len, parts)) <= LONG:
+        parts = [" = ".join(parts)]
+    elif sum(map(len, parts[1:])) <= 2 * LONG:
+        parts = [parts[0], *filter(None, [" = ".join(parts[1:])])]
+    if item.unit:
+        parts[-1] += rf"\ \text{{{_latex_text(item.unit)}}}"
+    return [f"{name} &= {parts[0]}", *(f"&= {part}" for part in parts[1:])]
 
 
 def _matrix(part: str | Sequence[Sequence[str]]) -> str:
@@ -271,46 +253,6 @@ def _matrix(part: str | Sequence[Sequence[str]]) -> str:
     return rf"\begin{{bmatrix}} {rows} \end{{bmatrix}}"
 
 
-def _markdown_formulas(lines: list[str]) -> str:
-    body = " \\\\\n".join(lines)
-    return f"$$\n\\begin{{aligned}}\n{body}\n\\end{{aligned}}\n$$"
-
-
-def _latex_formulas(lines: list[str]) -> str:
-    body = " \\\\\n".join(lines)
-    return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
-
-
-def _markdown_item(item: Item, count: int) -> str:
-    """Write what is no formula."""
-    if isinstance(item, SheetHeading):
-        return f"### {count}. {_markdown_text(item.text)}"
-    if isinstance(item, Sentence):
-        return _markdown_text(item.text)
-    if isinstance(item, Caveat):
-        return f"> **Note.** {_markdown_text(item.text)}"
-    if isinstance(item, SheetResult):
-        lines = "\n".join(line.removeprefix("   ") for line in result_lines(item.rows))
-        head = f"**Result**: {_markdown_text(item.text)}" if item.text else "**Result**"
-        return f"{head}\n\n```text\n{lines}\n```"
-    return ""
-
-
-def _latex_item(item: Item, count: int) -> str:
-    """Write what is no formula."""
-    if isinstance(item, SheetHeading):
-        return rf"\subsection*{{{count}. {_latex_text(item.text)}}}"
-    if isinstance(item, Sentence):
-        return _latex_text(item.text)
-    if isinstance(item, Caveat):
-        return rf"\emph{{Note.}} {_latex_text(item.text)}"
-    if isinstance(item, SheetResult):
-        lines = [_latex_text(line.removeprefix("   ")).replace(" ", "~") for line in result_lines(item.rows)]
-        head = rf"\textbf{{Result}}: {_latex_text(item.text)}" if item.text else r"\textbf{Result}"
-        return f"{head}\n\n{{\\ttfamily\n" + "\\\\\n".join(lines) + "\n\\par}"
-    return ""
-
-
 def _markdown_text(text: str) -> str:
     return "".join(f"\\{each}" if each in MARKDOWN_SPECIAL else each for each in text)
 
@@ -318,3 +260,32 @@ def _markdown_text(text: str) -> str:
 def _latex_text(text: str) -> str:
     """Escape text; letters beyond ASCII are named, because not every TeX has them."""
     return "".join(LATEX_SPECIAL.get(each, each) if each.isascii() else f"[U+{ord(each):04X}]" for each in text)
+
+
+class Markup(NamedTuple):
+    """A language with formulas: templates of a document, of its parts and of the result, and how text is escaped."""
+
+    document: str
+    words: Mapping[str, str]
+    formulas: str
+    result: str
+    escape: Callable[[str], str]
+    table: Callable[[Sequence[str]], str]
+
+
+MARKDOWN = Markup(
+    document="## %s\n\n%s\n",
+    words={HEADING: "### %s", SENTENCE: "%s", CAVEAT: "> **Note.** %s"},
+    formulas="$$\n\\begin{aligned}\n%s\n\\end{aligned}\n$$",
+    result="**Result**%s\n\n```text\n%s\n```",
+    escape=_markdown_text,
+    table="\n".join,
+)
+LATEX = Markup(
+    document=PREAMBLE + "\\section*{%s}\n\n%s\n\\end{document}\n",
+    words={HEADING: r"\subsection*{%s}", SENTENCE: "%s", CAVEAT: r"\emph{Note.} %s"},
+    formulas="\\begin{align*}\n%s\n\\end{align*}",
+    result="\\textbf{Result}%s\n\n{\\ttfamily\n%s\n\\par}",
+    escape=_latex_text,
+    table=lambda lines: "\\\\\n".join(_latex_text(line).replace(" ", "~") for line in lines),
+)

@@ -1,16 +1,18 @@
 """A derivation while it is written: headings, sentences, steps, matrices, caveats, and the result at its end.
 
-How the names of formulas are written in LaTeX.
+Also the steps that several blocks share, of angles and lengths, and how the names of formulas are written in LaTeX.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid
 from frametool.explain.formula_tree import Value, as_latex, as_text, evaluated, latex_number, parsed
+from frametool.geometry.quaternion import to_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -42,26 +44,25 @@ def symbol(name: str) -> str:
     return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
 
 
+XYZ, XYZW = ("x", "y", "z"), ("x", "y", "z", "w")
+CYCLES = (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y"))
+ENTRIES = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))
+DET = "r11*(r22*r33 - r23*r32) + r12*(r23*r31 - r21*r33) + r13*(r21*r32 - r22*r31)"
+COLUMNS = "Column k is axis k of the source frame, written in the target frame."
+TINY, HUGE = 1e-140, 1e140  # beyond, squares leave the range of a double
+TWO_TURNS = 720.0  # degrees: the half angle inside has turned once
+ROOTS = ("sqrt(0)/2", "sqrt(2)/2", "sqrt(4)/2", "sqrt(2)/2", "sqrt(0)/2", "-sqrt(2)/2", "-sqrt(4)/2", "-sqrt(2)/2")
+EXACT = "Multiples of 90 deg are exact: no rounded pi comes into their sines and cosines."
 METRES, RADIANS, DEGREES = "m", "rad", "deg"
-DIGITS = 6  # significant ones, unless told
+HEADING, SENTENCE, CAVEAT = "heading", "sentence", "caveat"
+DIGITS = 6  # significant ones, unless another count is asked for
 TOO_LARGE = "the numbers are too large or too small for a derivation: a step is not finite"
 
 
-class SheetHeading(NamedTuple):
-    """What the next steps are about; they are counted."""
+class Words(NamedTuple):
+    """A line of words: a heading with its number, a sentence, or a caveat, which is what is easily got wrong."""
 
-    text: str
-
-
-class Sentence(NamedTuple):
-    """A line of words."""
-
-    text: str
-
-
-class Caveat(NamedTuple):
-    """What is easily got wrong here."""
-
+    kind: str
     text: str
 
 
@@ -100,7 +101,7 @@ class SheetResult(NamedTuple):
     rows: Sequence[Row]
 
 
-Item: TypeAlias = SheetHeading | Sentence | Caveat | SheetStep | MatrixLine | SheetResult
+Item: TypeAlias = Words | SheetStep | MatrixLine | SheetResult
 
 
 class Sheet:
@@ -121,6 +122,7 @@ class Sheet:
         self.items: list[Item] = []
         self.reach = 1.0
         self.stretch = 1.0
+        self._headings = 0
         self._about = ""
         self._warned: set[str] = set()
 
@@ -151,12 +153,13 @@ class Sheet:
 
     def heading(self, text: str) -> None:
         """Begin a part."""
-        self.items.append(SheetHeading(f"{self._about}: {text}" if self._about else text))
+        self._headings += 1
+        self.items.append(Words(HEADING, f"{self._headings}. {self._about}{text}"))
 
     @contextmanager
     def about(self, what: str) -> Iterator[None]:
         """Name in the headings of a block what they are about."""
-        outer, self._about = self._about, f"{self._about}: {what}" if self._about else what
+        outer, self._about = self._about, f"{self._about}{what}: "
         yield
         self._about = outer
 
@@ -166,13 +169,13 @@ class Sheet:
 
     def say(self, text: str) -> None:
         """Add a sentence."""
-        self.items.append(Sentence(text))
+        self.items.append(Words(SENTENCE, text))
 
     def caveat(self, text: str) -> None:
         """Add a caveat, once a sheet."""
         if text not in self._warned:
             self._warned.add(text)
-            self.items.append(Caveat(text))
+            self.items.append(Words(CAVEAT, text))
 
     def step(self, values: Values, name: str, formula: str, unit: str = "", *, exactly: str = "") -> float:
         """Add a step and keep its value under its name.
@@ -193,33 +196,33 @@ class Sheet:
         ]
         if texts[1] in (texts[0], digits[name]):
             del texts[1], latex[1]
-        self.items.append(
-            SheetStep(name, [*texts, digits[name]], symbol(name), [*latex, latex_number(digits[name])], unit)
-        )
+        texts, latex = [*texts, digits[name]], [*latex, latex_number(digits[name])]
+        self.items.append(SheetStep(name, texts, symbol(name), latex, unit))
         return value
+
+    def each(self, values: Values, names: Sequence[str], name: str, formula: str, unit: str = "") -> list[float]:
+        """Add one step for each of some names, which stand in the place of %."""
+        return [self.step(values, name.replace("%", each), formula.replace("%", each), unit) for each in names]
 
     def grid(self, name: str, text: str, latex: str, parts: Sequence[str | Matrix], unit: str = "") -> None:
         """Add matrices side by side; the last one is the value."""
         shown = [part if isinstance(part, str) else [[self.number(v) for v in row] for row in part] for part in parts]
         self.items.append(MatrixLine(name, text, latex, shown, unit))
 
-    def quaternions(self, name: str, text: str, factors: Sequence[Quaternion], value: Quaternion) -> None:
-        """Add a product of quaternions on one line, each as (x, y, z, w)."""
-        tuples = [f"({', '.join(map(self.number, each))})" for each in (*factors, value)]
-        latex = [latex_tuple(each) for each in tuples]
-        shown = ["·".join(tuples[:-1]), tuples[-1]]
-        self.items.append(SheetStep(name, [text, *shown], symbol(name), [
-            text.replace(" ", r"\,"), r" \cdot ".join(latex[:-1]), latex[-1],
-        ]))  # fmt: skip
+    def quaternions(self, text: tuple[str, str], latex: tuple[str, str], *values: Quaternion) -> None:
+        """Add what two quaternions make, on one line, each as (x, y, z, w).
 
-    def slerped(self, a: Quaternion, b: Quaternion, fraction: float, value: Quaternion) -> None:
-        """Add a way between two quaternions on one line."""
-        texts = [f"({', '.join(map(self.number, each))})" for each in (a, b, value)]
-        shown = f"slerp({texts[0]}, {texts[1]}, {self.number(fraction)})"
-        a_latex, b_latex, value_latex = map(latex_tuple, texts)
-        name = r"\operatorname{slerp}"
-        latex = [f"{name}(a, b, f)", rf"{name}\left({a_latex}, {b_latex}, {latex_number(self.number(fraction))}\right)"]
-        self.items.append(SheetStep("q", ["slerp(a, b, f)", shown, texts[2]], "q", [*latex, value_latex]))
+        text, latex: the formula, and the same with a place for each of the two
+        values: the two, and what they make
+        """
+        *texts, found = (f"({', '.join(map(self.number, each))})" for each in values)
+        *latex_texts, latex_found = map(latex_tuple, (*texts, found))
+        shown, latex_shown = text[1] % tuple(texts), latex[1] % tuple(latex_texts)
+        self.items.append(SheetStep("q", [text[0], shown, found], "q", [latex[0], latex_shown, latex_found]))
+
+    def aside(self) -> Sheet:
+        """Return an empty sheet for steps that are not shown."""
+        return Sheet(self.digits, clean=self.clean)
 
     def chosen(self, values: Values, name: str, value: float, unit: str) -> None:
         """Add a value that is chosen, not derived."""
@@ -240,6 +243,64 @@ class Sheet:
         columns = transposed(b)
         return [[self.inner(row, column) for column in columns] for row in a]
 
+    def take_angle(self, values: Values, name: str, written: float, *, degrees: bool) -> None:
+        """Take an angle as it is written; one in degrees becomes radians."""
+        if not degrees:
+            values[name] = written
+            return
+        values[f"{name}_deg"] = rest = math.fmod(written, TWO_TURNS)
+        if rest != written:
+            self.say(f"{name}: {written!r} deg less whole double turns of 720 deg is {rest!r} deg, exactly.")
+        self.step(values, name, f"{name}_deg*pi/180", RADIANS)
+
+    def sine_and_cosine(self, values: Values, name: str, sine: str, cosine: str, *, half: bool = True) -> None:
+        """Add the cosine and the sine of an angle or of its half; exact where degrees say so."""
+        inside = f"{name}/2" if half else name
+        turn = values.get(f"{name}_deg", 0.0) / (90.0 if half else 45.0)  # the argument, in 45 degrees
+        is_exact = turn != 0.0 and turn == int(turn) and (half or turn % 2 == 0)
+        eighths = int(turn) if is_exact else 0
+        self.step(values, cosine, f"cos({inside})", exactly=ROOTS[(eighths + 2) % 8] if is_exact else "")
+        self.step(values, sine, f"sin({inside})", exactly=ROOTS[eighths % 8] if is_exact else "")
+        if is_exact:
+            self.caveat(EXACT)
+
+    def direction(
+        self, values: Values, names: Sequence[str], parts: Sequence[str], name: str, measure: str = ""
+    ) -> float:
+        """Add the length of a non-zero vector and its direction."""
+        found, divided, by = self.length(values, names, name, measure)
+        for each, part in zip(parts, divided, strict=True):
+            self.step(values, each, f"{part}/{by}")
+        return found
+
+    def length(
+        self, values: Values, names: Sequence[str], name: str, measure: str = ""
+    ) -> tuple[float, Sequence[str], str]:
+        """Add the length of a vector; one whose squares leave the range of a double is scaled first.
+
+        Returns it, and the names of numbers whose quotients are the direction.
+        """
+        most = max(abs(values[each]) for each in names)
+        if most == 0.0 or TINY < most < HUGE:
+            return self.step(values, name, norm(names), measure), names, name
+        self.say("Squares of these numbers leave the range of a double; they are divided by the largest first.")
+        self.step(values, "m", f"max({', '.join(f'abs({each})' for each in names)})", measure)
+        scaled = [f"k{letter}" for letter in "xyzw"[: len(names)]]
+        for each, part in zip(scaled, names, strict=True):
+            self.step(values, each, f"{part}/m")
+        self.step(values, "k", norm(scaled))
+        return self.step(values, name, "m*k", measure), scaled, "k"
+
+    def angles(self, values: Values, names: Sequence[str], *, degrees: bool) -> Sequence[float]:
+        """Return angles, in degrees with the steps to them."""
+        if not degrees:
+            return [values[name] for name in names]
+        return self.each(values, names, "%_deg", "%*180/pi", DEGREES)
+
+    def matrix(self, q: Quaternion) -> Matrix:
+        """Return the matrix of a quaternion as the steps after it take it."""
+        return rows([self.settled(Value(entry, 1.0)) for entry in to_matrix(*q)])
+
     def result(self, text: str, rows: Sequence[Row]) -> None:
         """End with the result."""
         self.items.append(SheetResult(text, rows))
@@ -249,6 +310,16 @@ def latex_tuple(text: str) -> str:
     """Return numbers in parentheses as LaTeX."""
     numbers = r",\ ".join(latex_number(each) for each in text[1:-1].split(", "))
     return rf"\left({numbers}\right)"
+
+
+def norm(names: Sequence[str] = XYZW) -> str:
+    """Return the formula of a length."""
+    return f"sqrt({' + '.join(f'{name}**2' for name in names)})"
+
+
+def rows(entries: Sequence[float]) -> Matrix:
+    """Return nine numbers as three rows."""
+    return [list(entries[at : at + 3]) for at in (0, 3, 6)]
 
 
 def transposed(matrix: Sequence[Sequence[float]]) -> Matrix:

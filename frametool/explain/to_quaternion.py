@@ -1,23 +1,27 @@
-"""From each representation to the quaternion: one block a representation, and the table of them."""
+"""From each representation to the quaternion, one block a representation; and the ways of textbooks that pass it by.
+
+A block takes the sheet, the numbers as written, and what it names of their axes and units.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from frametool.errors import ValueInvalid, shown
-from frametool.explain.sheet import RADIANS
-from frametool.explain.steps import HALF, UNIT, angle, direction, nearest_rotation, norm, sine_and_cosine
+from frametool.explain.sheet import COLUMNS, CYCLES, DEGREES, DET, ENTRIES, RADIANS, XYZ, XYZW, norm, rows
+from frametool.geometry import floats
+from frametool.geometry import matrix as kernel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
-    from frametool.explain.sheet import Sheet, Values
-    from frametool.geometry.representations import Notation
+    from frametool.explain.sheet import Matrix, Sheet, Values
     from frametool.grammar.readers import Quaternion
 
-    Block = Callable[..., Quaternion]  # (sheet, numbers as written, axes, degrees)
-
-XYZ, XYZW = ("x", "y", "z"), ("x", "y", "z", "w")
+UNIT = 8.9e-16  # 4 eps: a length this near 1 is 1
+LAST_STEP = 1e-9  # the convergence is quadratic: what comes after such a step is rounding
+MOST_STEPS = 60
+HALF = "Half the angle stands inside: a quaternion acts twice (q v q*), so w = cos(angle/2)."
+NEAR_HALF_TURN = 1e-3  # of s: below, near half a turn, the axis loses more digits than the derivation may be off
 NOT_UNIT = "The axis is not a unit vector: it is divided by its length. With a longer axis q would be no rotation."
 SQUARES = (
     "ww, xx, yy, zz are four times the squares of w, x, y, z. The largest is taken: nothing is then divided by a "
@@ -27,19 +31,24 @@ GRAM_SCHMIDT = (
     "Gram and Schmidt: the first is made unit, the second loses what it has along the first and is made unit, the "
     "third is their vector product."
 )
-ENTRIES = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))
 SHEPPERD = {"w": "1 + r11 + r22 + r33", "x": "1 + r11 - r22 - r33", "y": "1 - r11 + r22 - r33",
             "z": "1 - r11 - r22 + r33"}  # fmt: skip
 PAIRS = {"xy": "r12 + r21", "xz": "r13 + r31", "yz": "r23 + r32", "xw": "r32 - r23", "yw": "r13 - r31",
          "zw": "r21 - r12"}  # fmt: skip
+RODRIGUES = (
+    "c + vx**2*k", "vx*vy*k - vz*s", "vx*vz*k + vy*s",
+    "vy*vx*k + vz*s", "c + vy**2*k", "vy*vz*k - vx*s",
+    "vz*vx*k - vy*s", "vz*vy*k + vx*s", "c + vz**2*k",
+)  # fmt: skip
+NOT_ACOS = "atan2(s, tr - 1), not acos((tr - 1)/2): acos loses half the digits near 0 and 180 deg."
 
 
-def quaternion(sheet: Sheet, numbers: Sequence[float], _axes: str, _degrees: bool) -> Quaternion:  # noqa: FBT001
+def quaternion(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     """Take x, y, z, w: named or scalar last."""
     return _as_given(sheet, numbers, "x, y, z, w: the scalar w stands last.")
 
 
-def wxyz(sheet: Sheet, numbers: Sequence[float], _axes: str, _degrees: bool) -> Quaternion:  # noqa: FBT001
+def wxyz(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     """Take w, x, y, z."""
     w, *vector = numbers
     return _as_given(sheet, (*vector, w), "w, x, y, z: the scalar w stands first.")
@@ -52,23 +61,21 @@ def _as_given(sheet: Sheet, numbers: Sequence[float], order: str) -> Quaternion:
     sheet.say(order)
     sheet.say(", ".join(f"{name} {sheet.number(value)}" for name, value in values.items()))
     if abs(sum(part * part for part in numbers) - 1.0) <= UNIT:
-        sheet.step(values, "norm", norm(XYZW))
+        sheet.step(values, "norm", norm())
         return _four(values, XYZW)
-    direction(sheet, values, XYZW, ("qx", "qy", "qz", "qw"), "norm")
+    sheet.direction(values, XYZW, ("qx", "qy", "qz", "qw"), "norm")
     sheet.caveat("The norm is not 1: every part is divided by it, which keeps the axis and the angle.")
     return _four(values, ("qx", "qy", "qz", "qw"))
 
 
-def rpy(sheet: Sheet, numbers: Sequence[float], _axes: str, degrees: bool) -> Quaternion:  # noqa: FBT001
+def rpy(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
     """Multiply the turns about z, y, x, written out: six sines and cosines of half angles."""
-    values: Values = {}
     sheet.heading("Roll, pitch, yaw to quaternion")
     sheet.say("About the fixed axes x, then y, then z: the same as z, y', x'' turning along.")
     sheet.say("q = qz(yaw) qy(pitch) qx(roll): what is done first stands rightmost.")
-    for name, given in zip(("roll", "pitch", "yaw"), numbers, strict=True):
-        angle(sheet, values, name, given, degrees=degrees)
+    values = _roll_pitch_yaw(sheet, numbers, degrees=degrees)
     for name in ("roll", "pitch", "yaw"):
-        sine_and_cosine(sheet, values, name, f"s{name[0]}", f"c{name[0]}")
+        sheet.sine_and_cosine(values, name, f"s{name[0]}", f"c{name[0]}")
     sheet.caveat(HALF)
     sheet.step(values, "x", "sr*cp*cy - cr*sp*sy")
     sheet.step(values, "y", "cr*sp*cy + sr*cp*sy")
@@ -77,46 +84,48 @@ def rpy(sheet: Sheet, numbers: Sequence[float], _axes: str, degrees: bool) -> Qu
     return _unit(sheet, values)
 
 
-def euler(sheet: Sheet, numbers: Sequence[float], axes: str, degrees: bool) -> Quaternion:  # noqa: FBT001
+def _roll_pitch_yaw(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Values:
+    values: Values = {}
+    for name, written in zip(("roll", "pitch", "yaw"), numbers, strict=True):
+        sheet.take_angle(values, name, written, degrees=degrees)
+    return values
+
+
+def euler(sheet: Sheet, numbers: Sequence[float], *, axes: str, degrees: bool) -> Quaternion:
     """Multiply three elementary quaternions: two products."""
     values: Values = {}
-    order, fixed = axes[1:], axes[0] == "s"
     sheet.heading(f"Euler angles {axes} to quaternion")
-    outermost = introduce(sheet, values, numbers, axes, degrees=degrees)
-    sheet.say(f"q = {' '.join(f'q{order[at]}(a{at + 1})' for at in outermost)}")
-    for at in range(3):
-        sine_and_cosine(sheet, values, f"a{at + 1}", f"s{at + 1}", f"c{at + 1}")
+    outermost = _introduce(sheet, values, numbers, axes, degrees=degrees)
+    sheet.say(f"q = {' '.join(f'q{axes[at]}(a{at})' for at in outermost)}")
+    for at in (1, 2, 3):
+        sheet.sine_and_cosine(values, f"a{at}", f"s{at}", f"c{at}")
     sheet.caveat(HALF)
     first, second, third = outermost
-    p = {"w": f"c{first + 1}", order[first]: f"s{first + 1}"}
-    sheet.say(f"p = q{order[first]} q{order[second]}, then q = p q{order[third]}; only these parts are not 0:")
-    for name, formula in _times_elementary(p, order[second], second + 1).items():
+    sheet.say(f"p = q{axes[first]} q{axes[second]}, then q = p q{axes[third]}; only these parts are not 0:")
+    p = {"w": f"c{first}", axes[first]: f"s{first}"}
+    for name, formula in _times_elementary(p, axes[second], second).items():
         sheet.step(values, f"p{name}", formula)
-    for name, formula in _times_elementary({part: f"p{part}" for part in XYZW}, order[third], third + 1).items():
+    for name, formula in _times_elementary({part: f"p{part}" for part in XYZW}, axes[third], third).items():
         sheet.step(values, name, formula)
-    sheet.caveat(_about_order(fixed=fixed))
+    other = "turning axes read left to right" if axes[0] == "s" else "fixed axes read right to left"
+    sheet.caveat(f"The same product about {other}: s and r differ only in the order of the factors.")
     return _unit(sheet, values)
 
 
-def introduce(sheet: Sheet, values: Values, numbers: Sequence[float], axes: str, *, degrees: bool) -> tuple[int, ...]:
-    """Say what three Euler angles mean and take them; return the places of the factors, outermost first."""
+def _introduce(sheet: Sheet, values: Values, numbers: Sequence[float], axes: str, *, degrees: bool) -> tuple[int, ...]:
+    """Say what three Euler angles mean and take them; return the numbers of the factors, outermost first."""
     order, fixed = axes[1:], axes[0] == "s"
     kind = "the fixed axes" if fixed else "the axes as they turn along,"
     way = "right to left: what is done first stands rightmost" if fixed else "left to right, in the order of the turns"
     sheet.say(f"{axes}: a1, a2, a3 about {kind} {', then '.join(order)}. The factors stand {way}.")
-    for at, given in enumerate(numbers):
-        angle(sheet, values, f"a{at + 1}", given, degrees=degrees)
-    return (2, 1, 0) if fixed else (0, 1, 2)
-
-
-def _about_order(*, fixed: bool) -> str:
-    other = "turning axes read left to right" if fixed else "fixed axes read right to left"
-    return f"The same product about {other}: s and r differ only in the order of the factors."
+    for at, written in enumerate(numbers, 1):
+        sheet.take_angle(values, f"a{at}", written, degrees=degrees)
+    return (3, 2, 1) if fixed else (1, 2, 3)
 
 
 def _times_elementary(p: dict[str, str], axis: str, number: int) -> dict[str, str]:
     """Return the formulas of p times the quaternion (s along an axis, c): parts of p that are 0 are left out."""
-    after, last = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}[axis]
+    _, after, last = CYCLES["xyz".index(axis)]
     sine, cosine = f"s{number}", f"c{number}"
     terms = {
         axis: ((axis, cosine, "+"), ("w", sine, "+")),
@@ -131,33 +140,32 @@ def _times_elementary(p: dict[str, str], axis: str, number: int) -> dict[str, st
     return formulas
 
 
-def axis_angle(sheet: Sheet, numbers: Sequence[float], _axes: str, degrees: bool) -> Quaternion:  # noqa: FBT001
+def axis_angle(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
     """Take the axis' direction and half the angle."""
-    values = dict(zip(("ax", "ay", "az"), numbers, strict=False))
     sheet.heading("Axis and angle to quaternion")
     sheet.say("q = (v sin(angle/2), cos(angle/2)), v a unit axis.")
-    unit_axis(sheet, values)
-    angle(sheet, values, "angle", numbers[3], degrees=degrees)
-    return _about_axis(sheet, values)
+    return _about_axis(sheet, _axis_and_angle(sheet, numbers, degrees=degrees))
 
 
-def unit_axis(sheet: Sheet, values: Values) -> None:
-    """Add the unit axis vx, vy, vz of ax, ay, az."""
-    length = direction(sheet, values, ("ax", "ay", "az"), ("vx", "vy", "vz"), "n")
+def _axis_and_angle(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Values:
+    """Add the unit axis vx, vy, vz, and take the angle."""
+    values = dict(zip(("ax", "ay", "az"), numbers, strict=False))
+    length = sheet.direction(values, ("ax", "ay", "az"), ("vx", "vy", "vz"), "n")
     if abs(length - 1.0) > UNIT:
         sheet.caveat(NOT_UNIT)
+    sheet.take_angle(values, "angle", numbers[3], degrees=degrees)
+    return values
 
 
 def _about_axis(sheet: Sheet, values: Values) -> Quaternion:
     """Add the quaternion of the unit axis vx, vy, vz and `angle`."""
-    sine_and_cosine(sheet, values, "angle", "s", "w")
-    for name in XYZ:
-        sheet.step(values, name, f"v{name}*s")
+    sheet.sine_and_cosine(values, "angle", "s", "w")
+    sheet.each(values, XYZ, "%", "v%*s")
     sheet.caveat(HALF)
     return _unit(sheet, values)
 
 
-def rotvec(sheet: Sheet, numbers: Sequence[float], _axes: str, degrees: bool) -> Quaternion:  # noqa: FBT001
+def rotvec(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
     """Take the length for the angle and the direction for the axis."""
     unit = "_deg" if degrees else ""
     names = tuple(f"r{name}{unit}" for name in XYZ)
@@ -167,19 +175,20 @@ def rotvec(sheet: Sheet, numbers: Sequence[float], _axes: str, degrees: bool) ->
     if not any(numbers):
         sheet.say("The vector is 0: no rotation, x 0, y 0, z 0, w 1, and no axis.")
         return 0.0, 0.0, 0.0, 1.0
-    length = direction(sheet, values, names, ("vx", "vy", "vz"), f"angle{unit}", "deg" if degrees else RADIANS)
-    angle(sheet, values, "angle", length, degrees=degrees)
+    length = sheet.direction(values, names, ("vx", "vy", "vz"), f"angle{unit}",
+                       DEGREES if degrees else RADIANS)  # fmt: skip
+    sheet.take_angle(values, "angle", length, degrees=degrees)
     return _about_axis(sheet, values)
 
 
-def matrix(sheet: Sheet, numbers: Sequence[float], _axes: str, _degrees: bool) -> Quaternion:  # noqa: FBT001
+def matrix(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     """Take the largest of the four squares (Shepperd 1978)."""
-    values = dict(zip(ENTRIES, nearest_rotation(sheet, numbers), strict=True))
+    return _shepperd(sheet, nearest_rotation(sheet, numbers))
+
+
+def _shepperd(sheet: Sheet, entries: Sequence[float]) -> Quaternion:
+    values = dict(zip(ENTRIES, entries, strict=True))
     sheet.heading("Matrix to quaternion")
-    return _shepperd(sheet, values)
-
-
-def _shepperd(sheet: Sheet, values: Values) -> Quaternion:
     sheet.say(SQUARES)
     squares = {name: sheet.step(values, name * 2, formula) for name, formula in SHEPPERD.items()}
     large = max(squares, key=squares.__getitem__)
@@ -191,45 +200,40 @@ def _shepperd(sheet: Sheet, values: Values) -> Quaternion:
     return _unit(sheet, values)
 
 
-def six_d(sheet: Sheet, numbers: Sequence[float], _axes: str, _degrees: bool) -> Quaternion:  # noqa: FBT001
+def six_d(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     """Orthonormalise two columns by Gram and Schmidt, add the third, go on as with a matrix."""
     values = dict(zip(("ax", "ay", "az", "bx", "by", "bz"), numbers, strict=True))
     sheet.heading("Two columns to a matrix")
     sheet.say(GRAM_SCHMIDT)
-    direction(sheet, values, ("ax", "ay", "az"), ("ux", "uy", "uz"), "n")
+    sheet.direction(values, ("ax", "ay", "az"), ("ux", "uy", "uz"), "n")
     sheet.step(values, "d", "ux*bx + uy*by + uz*bz")
-    for name in XYZ:
-        sheet.step(values, f"e{name}", f"b{name} - d*u{name}")
-    direction(sheet, values, ("ex", "ey", "ez"), ("vx", "vy", "vz"), "l")
+    sheet.each(values, XYZ, "e%", "b% - d*u%")
+    sheet.direction(values, ("ex", "ey", "ez"), ("vx", "vy", "vz"), "l")
     if sheet.step(values, "f", "ux*vx + uy*vy + uz*vz"):
         sheet.say("The columns are nearly parallel; what is left along the first is taken out again.")
-        for name in XYZ:
-            sheet.step(values, f"g{name}", f"v{name} - f*u{name}")
+        sheet.each(values, XYZ, "g%", "v% - f*u%")
     second = "g" if "gx" in values else "v"
-    for name, a, b in (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y")):
+    for name, a, b in CYCLES:
         sheet.step(values, f"w{name}", f"u{a}*{second}{b} - u{b}*{second}{a}")
     columns = [[values[f"{letter}{name}"] for name in XYZ] for letter in ("u", second, "w")]
     sheet.grid("R", "(u v w)", r"(u\ v\ w)", [[list(row) for row in zip(*columns, strict=True)]])
-    sheet.heading("Matrix to quaternion")
-    entries = [part for row in zip(*columns, strict=True) for part in row]
-    return _shepperd(sheet, dict(zip(ENTRIES, entries, strict=True)))
+    return _shepperd(sheet, [part for row in zip(*columns, strict=True) for part in row])
 
 
-def mrp(sheet: Sheet, numbers: Sequence[float], _axes: str, _degrees: bool) -> Quaternion:  # noqa: FBT001
+def mrp(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
     """Undo the projection: 2 p/(1 + |p|^2)."""
     values = dict(zip(("px", "py", "pz"), numbers, strict=True))
     sheet.heading("Modified Rodrigues parameters to quaternion")
     sheet.say("p = v tan(angle/4), v a unit axis; so |p| = 1 is half a turn.")
     sheet.step(values, "pp", "px**2 + py**2 + pz**2")
-    for name in XYZ:
-        sheet.step(values, name, f"2*p{name}/(1 + pp)")
+    sheet.each(values, XYZ, "%", "2*p%/(1 + pp)")
     sheet.step(values, "w", "(1 - pp)/(1 + pp)")
     return _unit(sheet, values)
 
 
 def _unit(sheet: Sheet, values: Values) -> Quaternion:
     """Check that a quaternion is unit, and return it."""
-    sheet.step(values, "norm", norm(XYZW))
+    sheet.step(values, "norm", norm())
     return _four(values, XYZW)
 
 
@@ -238,23 +242,110 @@ def _four(values: Values, names: Sequence[str]) -> Quaternion:
     return x, y, z, w
 
 
-TO_QUATERNION: dict[str, Block] = {
-    "quaternion": quaternion,
-    "xyzw": quaternion,
-    "wxyz": wxyz,
-    "rpy": rpy,
-    "euler": euler,
-    "axis_angle": axis_angle,
-    "rotvec": rotvec,
-    "matrix": matrix,
-    "mrp": mrp,
-    "six_d": six_d,
+def euler_to_matrix(sheet: Sheet, numbers: Sequence[float], *, axes: str, degrees: bool) -> Sequence[float]:
+    """Multiply three elementary matrices."""
+    values: Values = {}
+    sheet.heading(f"Euler angles {axes} to matrix")
+    outermost = _introduce(sheet, values, numbers, axes, degrees=degrees)
+    return _product(sheet, values, [(axes[at], f"a{at}", f"{at}") for at in outermost])
+
+
+def rpy_to_matrix(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Sequence[float]:
+    """Multiply the elementary matrices about z, y, x."""
+    sheet.heading("Roll, pitch, yaw to matrix")
+    sheet.say("About the fixed axes x, then y, then z: what is done first stands rightmost.")
+    values = _roll_pitch_yaw(sheet, numbers, degrees=degrees)
+    return _product(sheet, values, [("z", "yaw", "y"), ("y", "pitch", "p"), ("x", "roll", "r")])
+
+
+def _product(sheet: Sheet, values: Values, factors: list[tuple[str, str, str]]) -> Sequence[float]:
+    """Add the product of turns about axes (axis, name of the angle, its letter), outermost first."""
+    for _, name, letter in reversed(factors):
+        sheet.sine_and_cosine(values, name, f"s{letter}", f"c{letter}", half=False)
+    matrices = [_elementary(axis, values[f"s{letter}"], values[f"c{letter}"]) for axis, _, letter in factors]
+    texts = [f"R{axis}({name})" for axis, name, _ in factors]
+    latex = [rf"R_{axis}(\mathrm{{{name}}})" for axis, name, _ in factors]
+    inner = sheet.product(matrices[1], matrices[2])
+    sheet.grid("P", " ".join(texts[1:]), r"\,".join(latex[1:]), [matrices[1], matrices[2], "=", inner])
+    found = sheet.product(matrices[0], inner)
+    sheet.grid("R", f"{texts[0]} P", rf"{latex[0]}\,P", [matrices[0], inner, "=", found])
+    sheet.caveat(COLUMNS)
+    entries = [entry for row in found for entry in row]
+    sheet.step(dict(zip(ENTRIES, entries, strict=True)), "det", DET)
+    return entries
+
+
+def _elementary(axis: str, s: float, c: float) -> Matrix:
+    minus = 0.0 - s
+    if axis == "x":
+        return [[1.0, 0.0, 0.0], [0.0, c, minus], [0.0, s, c]]
+    if axis == "y":
+        return [[c, 0.0, s], [0.0, 1.0, 0.0], [minus, 0.0, c]]
+    return [[c, minus, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+
+
+def axis_angle_to_matrix(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Sequence[float]:
+    """Apply Rodrigues' formula."""
+    sheet.heading("Axis and angle to matrix (Rodrigues)")
+    sheet.say("R = c 1 + k v v^T + s (v x ..), v a unit axis, k = 1 - c.")
+    values = _axis_and_angle(sheet, numbers, degrees=degrees)
+    sheet.sine_and_cosine(values, "angle", "s", "c", half=False)
+    sheet.step(values, "k", "1 - c")
+    found = [sheet.step(values, name, formula) for name, formula in zip(ENTRIES, RODRIGUES, strict=True)]
+    sheet.grid("R", "", "", [rows(found)])
+    sheet.caveat(COLUMNS)
+    sheet.step(values, "det", DET)
+    return found
+
+
+def matrix_to_axis_angle(
+    sheet: Sheet, numbers: Sequence[float], *, wanted_degrees: bool
+) -> Sequence[float] | None:  # fmt: skip
+    """Read the angle off the trace and the axis off the differences; None near half a turn, where both vanish."""
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = numbers
+    if r11 + r22 + r33 < 1.0 and max(abs(r32 - r23), abs(r13 - r31), abs(r21 - r12)) < NEAR_HALF_TURN:
+        return None
+    values = dict(zip(ENTRIES, nearest_rotation(sheet, numbers), strict=True))
+    sheet.heading("Matrix to axis and angle, by the trace")
+    sheet.say("tr = 1 + 2 cos(angle); the differences across the diagonal are 2 v sin(angle).")
+    sheet.step(values, "tr", "r11 + r22 + r33")
+    for name, formula in (("dx", "r32 - r23"), ("dy", "r13 - r31"), ("dz", "r21 - r12")):
+        sheet.step(values, name, formula)
+    if not (values["dx"] or values["dy"] or values["dz"]):
+        sheet.say("No rotation: the angle is 0, any axis will do, and x is taken.")
+        return 1.0, 0.0, 0.0, 0.0
+    sheet.direction(values, ("dx", "dy", "dz"), ("vx", "vy", "vz"), "s")
+    sheet.step(values, "angle", "atan2(s, tr - 1)", RADIANS)
+    sheet.caveat(NOT_ACOS)
+    return values["vx"], values["vy"], values["vz"], *sheet.angles(values, ["angle"], degrees=wanted_degrees)
+
+
+def nearest_rotation(sheet: Sheet, entries: Sequence[float]) -> Sequence[float]:
+    """Return the rotation nearest to a matrix, with the steps to it; what is one already stays as it is."""
+    off = kernel.defect(*kernel.nine(entries), floats)
+    if off <= kernel.ORTHONORMAL:
+        return entries
+    sheet.heading("The nearest rotation")
+    sheet.say(f"The rows are orthonormal only to {off:.1e}. Newton's way to the nearest rotation (Higham 1986): the "
+              "mean of M and of its inverse transposed, again and again; each step doubles the right digits.")
+    here = rows(kernel.balanced(*kernel.nine(entries), floats))
+    if here != rows(entries):
+        sheet.say("M is divided by a power of two first; its rotation stays.")
+    for count in range(1, MOST_STEPS + 1):
+        there = rows(kernel.newton(*kernel.nine(part for row in here for part in row)))
+        other = [[2.0 * b - a for a, b in zip(*pair, strict=True)] for pair in zip(here, there, strict=True)]
+        name, latex = f"M{count - 1 or ''}", r"\tfrac{1}{2}\left(M + M^{-\mathsf{T}}\right)"
+        sheet.grid(f"M{count}", f"1/2 ({name} + {name}^-T)", latex, ["1/2·(", here, "+", other, ")", "=", there])
+        step = max(abs(a - b) for pair in zip(here, there, strict=True) for a, b in zip(*pair, strict=True))
+        here = there
+        if step < LAST_STEP:
+            break
+    return [part for row in here for part in row]
+
+
+SHORT: dict[tuple[str, str], Callable[..., Sequence[float] | None]] = {
+    ("rpy", "matrix"): rpy_to_matrix,
+    ("euler", "matrix"): euler_to_matrix,
+    ("axis_angle", "matrix"): axis_angle_to_matrix,
+    ("matrix", "axis_angle"): matrix_to_axis_angle,
 }
-
-
-def block_of(table: Mapping[str, Callable[..., Any]], form: Notation) -> Callable[..., Any]:
-    """Return the block of a notation; raises ValueInvalid for a representation without one."""
-    name = form.representation.name
-    if name not in table:
-        raise ValueInvalid(f"there is no derivation of {shown(name)}; derived are {', '.join(table)}")
-    return table[name]

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import frametool
-from frametool.calc.evaluate import evaluate
-from frametool.calc.scope import Scope
+from frametool.calc.evaluate import Scope, evaluate
 from frametool.calc.values import TREE, Term, Type
 from frametool.errors import FrametoolError
 from frametool.geometry.transform import Transform

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import frametool
-from frametool.calc.parser import DEEPEST
-from frametool.calc.tokens import LONGEST
+from frametool.calc.parser import DEEPEST, LONGEST
 from frametool.errors import FrametoolError
 
 if TYPE_CHECKING:

@@ -11,9 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import frametool
-from frametool.calc.evaluate import evaluate
+from frametool.calc.evaluate import Scope, evaluate
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.scope import Scope
 from frametool.calc.values import TREE, Term, Type
 from frametool.errors import FrametoolError
 

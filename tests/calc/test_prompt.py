@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.calc.scope import Scope
+from frametool.calc.evaluate import Scope
 from frametool.calc.values import TREE, Term, Type
 from frametool.cli.calc_input import Completer
 from frametool.formats.load import load

@@ -13,7 +13,7 @@ from written import HOSTILE, ROTATIONS, SPECS, rotation, seeded
 import frametool
 from frametool.explain import derive, operations
 from frametool.explain.derive import DerivationWrong
-from frametool.explain.to_quaternion import TO_QUATERNION
+from frametool.explain.from_quaternion import BLOCKS
 from frametool.geometry import euler
 
 if TYPE_CHECKING:
@@ -152,8 +152,7 @@ def test_a_derivation_that_leads_elsewhere_is_never_printed(monkeypatch: pytest.
 
 
 def test_a_representation_without_a_block_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch, run: Callable[..., Outcome]) -> None:
-    blocks = {name: block for name, block in TO_QUATERNION.items() if name != "mrp"}
-    monkeypatch.setattr("frametool.explain.given.TO_QUATERNION", blocks)
+    monkeypatch.delitem(BLOCKS, "mrp")
     outcome = run("convert", "--from", "mrp", "0.1", "0", "0", "--explain")
     assert (outcome.status, outcome.out) == (1, "")
     assert outcome.err.startswith("frametool: there is no derivation of 'mrp'; derived are quaternion, xyzw, wxyz, rpy")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     Run = Callable[..., Outcome]
 
 
-@pytest.mark.parametrize("right", ["{xyz: [1, 2, 3]}", "{rpy_deg: [0, 0, 90]}", "{xyz: [0, 0, 0]}"])
+@pytest.mark.parametrize("right", ["{xyz: [1, 2, 3]}", "{xyz: [0, 0, 1e-9], rpy_deg: [0, 0, 90]}"])
 @pytest.mark.parametrize("command", ["compose", "relative"])
 def test_a_bare_matrix_that_gains_a_position_becomes_a_mapping(run: Run, command: str, right: str) -> None:
     matrix = "[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]"
@@ -26,6 +26,17 @@ def test_a_bare_matrix_that_gains_a_position_becomes_a_mapping(run: Run, command
     xyz = streamed["xyz"] if "xyz" in streamed else [row[3] for row in streamed["matrix"][:3]]
     assert xyz == [row[3] for row in single["matrix"][:3]]
     assert streamed.get("distance") == single.get("distance")
+
+
+@pytest.mark.parametrize("right", ["{rpy_deg: [0, 0, 90]}", "{xyz: [0, 0, 0]}"])
+@pytest.mark.parametrize("command", ["compose", "relative"])
+def test_a_bare_matrix_that_gains_no_position_stays_a_rotation(run: Run, command: str, right: str) -> None:
+    matrix = "[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]"
+    streamed = json.loads(run(command, "-", right, "-f", "json", stdin=matrix + "\n").out)
+    single = json.loads(run(command, matrix, right, "-f", "json", "--to", "matrix,quaternion").out)
+    rows = streamed if command == "compose" else streamed["matrix"]
+    assert rows == [row[:3] for row in single["matrix"][:3]]
+    assert command == "compose" or (streamed["distance"] == 0.0 and "xyz" not in streamed)
 
 
 def test_a_bare_matrix_as_angles_is_json(run: Run) -> None:

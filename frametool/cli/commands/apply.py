@@ -35,7 +35,8 @@ from frametool.text.numbers import NotFinite, parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.explain.derive import ByPose, ByTree
+    from frametool.explain.derive import ByTree
+    from frametool.explain.given import Given
     from frametool.formats.load import Rules
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Rigid
@@ -126,10 +127,10 @@ def command(
         if rest in ((), ("-",)) or len(records) != 1 or frame_column is not None:
             raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
         try:
-            from frametool.explain.derive import derive_apply
+            from frametool.explain import derive
 
             source = pose_source(records[0], stream.given, normalize=normalize, points=True)
-            made = derive_apply(way.explained(), source, plan, kind=kind or "", degrees=deg, normalize=normalize,
+            made = derive.apply(plan, way.explained(), source, kind=kind or "", degrees=deg, normalize=normalize,
                                 counters=way.counters, timeless=at is not None)  # fmt: skip
         except FormatError as error:
             raise usage_if_inline(error) from None
@@ -177,7 +178,7 @@ class Way(NamedTuple):
     from_frame: Callable[[str | None, int | None], Rigid]
     at_times: Callable[[str | None, Any], Components] | None
     moves: Callable[[str | None], bool]
-    explained: Callable[[], ByTree | ByPose]
+    explained: Callable[[], ByTree | Given]
     has_source: bool
     counters: bool = True
 
@@ -260,10 +261,8 @@ def _way_by_pose(argument: str, given: Notation | None, *, degrees: bool, normal
         _settled(own, pose.name)
         return pose.components
 
-    def explained() -> ByPose:
-        from frametool.explain.derive import ByPose
-
-        return ByPose(given_as_written(source, given, degrees=degrees, normalize=normalize, told=False))
+    def explained() -> Given:
+        return given_as_written(source, given, degrees=degrees, normalize=normalize, warned=True)
 
     return Way(pose.parent, from_frame, None, lambda _own: False, explained, has_source=True)
 

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.calc.evaluate import evaluate_line, read_line
+from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import mentions_row, walk
-from frametool.calc.scope import Literals, Scope
-from frametool.cli.calc_input import Expression, file_named_in
+from frametool.cli.calc_input import Expression, calculate_lines, file_named_in, talk, value_texts
 from frametool.cli.options import (
     FILE,
     ColumnNames,
@@ -86,20 +85,17 @@ def command(
     """
     stream = Stream(options)
     output = Output("points", deg=deg, **options)
-    scope = Scope(literals=Literals(degrees=deg, normalize=normalize))
+    scope = Scope(degrees=deg, normalize=normalize)
     given = list(_given(arguments, expressions, scope))
     lines = [read_line(text) for text, _ in given]
     scope.tree = _tree(trees, lines)
     if not lines:
         return _without_expression(stream, output, scope)
     if stream.path is not None or any(mentions_row(line.tree) for line in lines):
-        flags = [is_option for _, is_option in given]
-        formula = _over_rows(lines, flags, scope, output)
+        formula = _over_rows(lines, [is_option for _, is_option in given], scope, output)
         formula.check((kind,) if kind else ("pose", "point", "vector"))
         request = _request(formula, kind or "", time_column, degrees=deg, normalize=normalize)
         return stream.run(request, output)
-    from frametool.cli.calc_input import value_texts
-
     output.pieces(value_texts(_results(lines, scope), output.style))
     return 0
 
@@ -134,11 +130,7 @@ def _without_expression(stream: Stream, output: Output, scope: Scope) -> int:
     if stream.path is not None:
         raise click.UsageError("-i FILE needs an expression over row")
     if sys.stdin is not None and sys.stdin.isatty():
-        from frametool.cli.calc_input import talk
-
         return talk(scope, output)
-    from frametool.cli.calc_input import calculate_lines
-
     return calculate_lines(stream, output, scope)
 
 
@@ -146,20 +138,15 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
     """Part lines into those whose results are written and those that only bind names."""
     from frametool.calc.rows import RowExpressions
 
-    results = [line for line, is_option in zip(lines, flags, strict=True) if is_option or not line.name]
-    if not results:
-        results = [lines[-1]]
-    unnamed = [line for line in results if not line.name]
-    if unnamed and len(results) > 1:
-        raise click.UsageError("rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
+    marked = [line for line, is_option in zip(lines, flags, strict=True) if is_option or not line.name]
+    results = marked or [lines[-1]]
     names = [line.name for line in results]
+    if len(names) > 1 and not all(names):
+        raise click.UsageError("rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
     if twice := next((name for name in names if name and names.count(name) > 1), ""):
         raise click.UsageError(f"-e {twice}= is given twice")
     bindings = [line for line in lines if line not in results]
-    return RowExpressions(
-        results, bindings, scope, notations=output.notations, degrees=output.style.degrees,
-        keep_sign=output.style.keep_sign,
-    )  # fmt: skip
+    return RowExpressions(results, bindings, scope, output.style)
 
 
 def _request(formula: RowExpressions, kind: str, time_column: str | None, *, degrees: bool, normalize: bool) -> Request:

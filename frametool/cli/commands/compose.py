@@ -43,11 +43,11 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     given = [each.argument for each in factors]
     if explaining:
         plan = explaining.plan(output, stream)
-        from frametool.explain.derive import derive_compose
+        from frametool.explain import derive
 
         written = all_given(given, stream.given, degrees=deg, normalize=normalize)
         turned = [each.turned() if factor.is_inverse else each for each, factor in zip(written, factors, strict=True)]
-        return explaining.write(derive_compose(turned, plan), output)
+        return explaining.write(derive.compose(plan, *turned), output)
     if "-" not in given:
         if stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")

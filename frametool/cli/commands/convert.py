@@ -164,11 +164,11 @@ def command(
     if explaining:
         if len(poses) != 1:
             raise click.UsageError(f"--explain derives one pose, found {len(results)}")
-        from frametool.explain.derive import derive_convert
+        from frametool.explain import derive
 
-        written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, told=False)
+        written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, warned=True)
         change = _named_change(axes, world, operation) if values else None
-        return explaining.write(derive_convert(written, explaining.plan(output), own=poses[0], change=change), output)
+        return explaining.write(derive.convert(explaining.plan(output), written, own=poses[0], change=change), output)
     output.values(results)
     output.tell_of_lock(poses)
     return 0

@@ -38,10 +38,10 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
         plan = explaining.plan(output)
         if len(fractions) != 1:
             raise click.UsageError(f"--explain derives one fraction, found {len(fractions)}")
-        from frametool.explain.derive import derive_interpolate
+        from frametool.explain import derive
 
         first, last = all_given((a, b), degrees=deg, normalize=normalize)
-        explaining.write(derive_interpolate(first, last, fractions[0], plan), output)
+        explaining.write(derive.interpolate(plan, first, last, fractions[0]), output)
         return
     pairs = combinations((a, b), degrees=deg, normalize=normalize)
     output.poses([Result(interpolated(first, last, each)) for first, last in pairs for each in fractions])

@@ -34,10 +34,10 @@ def command(pose: str, deg: bool, normalize: bool, **options: Any) -> int:
     output = Output("poses", deg=deg, **options)
     if explaining:
         plan = explaining.plan(output, stream)
-        from frametool.explain.derive import derive_invert
+        from frametool.explain import derive
 
         written = given(pose, stream.given, degrees=deg, normalize=normalize)
-        return explaining.write(derive_invert(written, plan), output)
+        return explaining.write(derive.invert(plan, written), output)
     from frametool.stream.request import Operation, Request
 
     request = Request(

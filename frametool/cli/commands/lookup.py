@@ -87,9 +87,9 @@ def command(
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
     if plan is not None:
-        from frametool.explain.derive import derive_lookup
+        from frametool.explain import derive
 
-        found = derive_lookup(frames, target, source, plan, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
+        found = derive.lookup(plan, frames, target, source, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
         return explaining.write(found, output)
     output.style.axes = frames.camera_axes.get(source, "")
     every = output.is_trajectory and at is None and fixed is None and frames.latest(target, source) is not None

@@ -83,11 +83,11 @@ def command(
         plan = explaining.plan(output, stream)
         if consecutive or first:
             raise click.UsageError("--consecutive and --first are about the rows of a stream; leave --explain out")
-        from frametool.explain.derive import derive_relative
+        from frametool.explain import derive
 
         arguments = [str(one_argument(each)) for each in (a, b)]
         given_a, given_b = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
-        return explaining.write(derive_relative(given_a, given_b, plan), output)
+        return explaining.write(derive.relative(plan, given_a, given_b), output)
     from frametool.stream.request import Request
 
     if velocity and not consecutive:

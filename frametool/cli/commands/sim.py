@@ -121,7 +121,7 @@ def _explain(options: dict[str, Any], leader: str, step: int, form: str) -> None
     from frametool.sim.followed import follow_steps
 
     plan = DerivationStyle(output.style, significant(precision))
-    text = derive_follow(follow_steps(scene, step), plan).render(form)
+    text = derive_follow(plan, follow_steps(scene, step)).render(form)
     with writing(output.output, force=output.force) as write:
         write(text)
 
