@@ -124,9 +124,10 @@ class Node(NamedTuple):
     column: int = 0
 
     def at(self, path: tuple[str | int, ...]) -> Node:
-        """Return the node further down."""
+        """Return the node further down; raises FormatError below an alias."""
         node: Node = self
         for step in path:
+            refuse_alias(node)
             inner: Any = node.value
             index: Any = step
             node = inner[index] if type(inner) is list else inner[index][1]
@@ -143,6 +144,12 @@ class Node(NamedTuple):
                 pending += reversed(node.value)
             else:
                 yield node
+
+
+def refuse_alias(node: Node) -> None:
+    """Raise FormatError for an alias of YAML: what it stands for is written elsewhere, and perhaps for others too."""
+    if node.quote == "*":
+        raise FormatError("an alias of YAML stands in the place of what is rewritten; write out what it stands for")
 
 
 NOTHING = Node(0, 0, {})

@@ -11,7 +11,7 @@ from functools import cached_property, partial
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import NOTHING, Node, parse_documents, parse_nodes
+from frametool.documents.document import NOTHING, Node, parse_documents, parse_nodes, refuse_alias
 from frametool.documents.json import JSON_NUMBER, Verbatim
 from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
@@ -265,7 +265,8 @@ def _with_stamp_ns(extras: dict[str, Any], *, keeps: bool) -> dict[str, Any]:
 
 def _used_keys(record: Record) -> set[str]:
     """Return the keys of a record that say its pose, or what is no longer true of the result."""
-    return {record.key, record.rotation, *record.others, *record.flat, *record.members, *NOT_PLAIN}
+    halves = PARTS.get(record.shape.kind, ())
+    return {record.key, record.rotation, *record.others, *record.flat, *record.members, *halves, *NOT_PLAIN}
 
 
 def _says_no_more(record: Record, document: Document, unit: Path) -> bool:
@@ -313,6 +314,7 @@ def plain(node: Node, number: Callable[[str], float | None] = lambda _: None) ->
         return {key: plain(value, number) for key, (_, value) in node.value.items()}
     if type(node.value) is list:
         return [plain(item, number) for item in node.value]
+    refuse_alias(node)
     if node.quote or node.value is None:
         return node.value
     if node.value in ("null", "~", ""):
