@@ -15,7 +15,7 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 from frametool.documents.source import MOST_CHARACTERS, Source, line_of, not_text, pointer
-from frametool.errors import FileProblem, FormatError, shown
+from frametool.errors import FileProblem, FormatError, bare, shown
 from frametool.text.numbers import parse_number
 
 TYPE_CHECKING = False
@@ -157,6 +157,13 @@ class XmlFile:
         snippet = pointer(line_of(text[0], 1), column)
         return FormatError(message, source=self.name, line=line, column=column, snippet=snippet, rule=rule)
 
+    def required(self, element: Element, attribute: str) -> str:
+        """Return an attribute that must be there and say something."""
+        value = element.attributes.get(attribute)
+        if not value:
+            raise self.error(element, f"<{element.tag}> has no {attribute}", attribute if value is not None else "")
+        return value
+
     def numbers(self, element: Element, attribute: str, count: int, default: str | None = None) -> tuple[float, ...]:
         """Read an attribute as so many finite numbers between blanks; without it the default."""
         text = element.attributes.get(attribute, default)
@@ -225,10 +232,11 @@ class XmlNode:
         return self.element.attributes.get(name, "").strip()
 
 
-def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]]) -> XmlNode:
+def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = "") -> XmlNode:
     """Return the root element with what is kept below it.
 
     held: the elements that are kept in each element, the root first; of all others nothing is.
+    form: what a file with another root is not
     Raises FormatError.
     """
     top = next(iter(held))
@@ -244,7 +252,8 @@ def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]]) -> XmlNode:
                 ended.text = element.text.strip()
                 root = ended
         elif not opened and element.tag != top:
-            raise xml.error(element, f"expected <{top}>, found <{element.tag}>")
+            expected = f"{form} begins with <{top}>" if form else f"expected <{top}>"
+            raise xml.error(element, f"{expected}, found <{bare(element.tag)}>")
         elif opened and element.tag not in held.get(opened[-1].tag, ()):
             skipped = element.depth
         else:

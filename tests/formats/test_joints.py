@@ -9,7 +9,7 @@ import pytest
 
 import frametool
 from frametool.errors import BadAnswer, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
-from frametool.formats.robots.joints import Joint, JointValue, Mimic, motion, read_value
+from frametool.formats.robots.model import Joint, JointValue, Mimic, motion, read_value
 from frametool.formats.robots.posture import Posture, find_joint_columns, stamp_column
 from frametool.grammar.edges import Answers, Options, Tally, Topics
 
@@ -318,11 +318,11 @@ def test_joints_that_move_together_are_interpolated_at_each_others_times() -> No
     for name, values in series.items():
         found.still.pop(name)
         found.moving[name] = {at: JointValue(value) for at, value in values.items()}
-    steps = {at: tuple(moved[0] for moved in both) for at, both in found.motions("a", "b")}
+    steps = {at: tuple(value.number for value in both) for at, both in found.values("a", "b")}
     assert steps == {5: (0.5, 0.5), 10: (1.0, 1.5)}
     found.moving["b"] = {20: JointValue(0.0), 30: JointValue(1.0)}
     with pytest.raises(FormatError, match="joints a, b move one frame and have no time in common"):
-        list(found.motions("a", "b"))
+        list(found.values("a", "b"))
 
 
 def test_columns_are_found_by_name_and_unit() -> None:

@@ -22,7 +22,7 @@ from frametool.documents.document import format_error, parse_documents
 from frametool.documents.json import looks_like_json
 from frametool.documents.source import pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, shown
-from frametool.formats.robots.joints import Joint
+from frametool.formats.robots.model import Joint
 from frametool.formats.robots.posture import Posture
 from frametool.geometry import euler, floats, rigid
 from frametool.grammar.edges import Edge

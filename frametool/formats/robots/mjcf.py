@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.documents.source import Source
 from frametool.documents.xml import XmlFile, read_nodes
 from frametool.errors import FormatError, alternatives, shown
-from frametool.formats.robots.joints import Joint, JointValue
+from frametool.formats.robots.model import Joint, JointValue
 from frametool.formats.robots.mjcf_attributes import Classes, PoseReader, own_attributes
 from frametool.formats.robots.posture import Posture, Setting
 from frametool.geometry import floats, quaternion, rigid

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from frametool.documents.source import InputFile, Source
 from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
 from frametool.formats.detect import detect
-from frametool.formats.robots.joints import IDENTITY, TURNING, JointValue, followed, motion, read_value
+from frametool.formats.robots.model import TURNING, JointValue, followed, read_value
 from frametool.formats.table import FORMATS, readers
 from frametool.frames.stamps import format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
@@ -40,13 +40,12 @@ from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.formats.robots.joints import Joint, Value
+    from frametool.formats.robots.model import Fail, Joint, Link, Value
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path
 
     Series = Mapping[int, Value]
-    Fail = Callable[[Joint, str], FormatError]
 
 SLACK = 1e-9  # by which a value may lie beyond a limit: printed with fewer digits than it has
 HALF_TURN = 3.141592653589793
@@ -84,24 +83,28 @@ class Posture:
         options.tally.has_joints = True
         options.tally.about = options.tally.about or self._about()
 
-    def edges(self, parent: str, child: str, origin: Rigid, joint: str, line: int = 0) -> Iterator[Edge]:
-        """Yield the edge across one joint: for good, or a sample at each time; `origin` is the pose at rest."""
-        for stamp_ns, (moved,) in self.motions(joint):
-            pose = origin if moved is IDENTITY else rigid.compose(*origin, *moved)
-            yield Edge(parent, child, pose, stamp_ns, line)
+    @classmethod
+    def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> Posture:
+        """Find out where the joints of some links stand."""
+        joints = (joint for link in links for joint in link.joints)
+        return cls(joints, options, fail or _at_its_line, fixed=[link.fixed for link in links if link.fixed])
 
-    def motions(self, *names: str) -> Iterator[tuple[int | None, tuple[Rigid, ...]]]:
-        """Yield what joints do together to the frames behind them: once without a stamp, or at each of their times.
+    def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
+        """Yield an edge a link: for good, or a sample at each time at which one of its joints has a value."""
+        for link in links:
+            for stamp_ns, values in self.values(*(joint.name for joint in link.joints)):
+                yield Edge(link.parent, link.child, link.pose(values), stamp_ns, link.line)
+
+    def values(self, *names: str) -> Iterator[tuple[int | None, list[Value]]]:
+        """Yield the values of joints that move one frame together: once without a stamp, or at each of their times.
 
         A joint without a sample at the time of another one is interpolated.
         """
-        joints = [self.joints[name] for name in names]
-        moving = [name for name in names if name in self.moving]
-        if not moving:
-            yield None, tuple(motion(joint, self.still[joint.name]) for joint in joints)
-            return
-        for stamp_ns in self._common_times(moving):
-            yield stamp_ns, tuple(motion(joint, self._at(joint.name, stamp_ns)) for joint in joints)
+        if moving := [name for name in names if name in self.moving]:
+            for stamp_ns in self._common_times(moving):
+                yield stamp_ns, [self._at(name, stamp_ns) for name in names]
+        else:
+            yield None, [self.still[name] for name in names]
 
     def _common_times(self, moving: Sequence[str]) -> list[int]:
         """Return the times at which any of some joints has a sample and all are known."""
@@ -256,6 +259,10 @@ class Posture:
         at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)
         many = f"{len(free)} joint{'s' * (len(free) > 1)}"
         return f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
+
+
+def _at_its_line(joint: Joint, problem: str) -> FormatError:
+    return FormatError(problem, line=joint.line)
 
 
 def _about_limits(joint: Joint, beyond: Sequence[float], count: int) -> str:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.xml import XmlFile, read_nodes
 from frametool.errors import FormatError, alternatives, shown
-from frametool.formats.robots.joints import Joint, Mimic
+from frametool.formats.robots.model import Joint, Mimic
 from frametool.formats.robots.posture import Posture
 from frametool.formats.robots.sdf_frames import HELD, IDENTITY, WORLD, SdfFrames
 from frametool.geometry import floats, quaternion, rigid

@@ -16,9 +16,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.source import UTF16, Source
-from frametool.documents.xml import XmlFile
+from frametool.documents.xml import XmlFile, read_nodes
 from frametool.errors import FormatError, ValueInvalid, alternatives, bare, listing, shown
-from frametool.formats.robots.joints import IDENTITY, Joint, Mimic
+from frametool.formats.robots.model import IDENTITY, Joint, Link, Mimic
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
 from frametool.geometry import euler, floats, quaternion
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
-    from frametool.documents.xml import Element
+    from frametool.documents.xml import Element, XmlNode
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
@@ -44,154 +44,116 @@ if TYPE_CHECKING:
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
-PARTS = ("origin", "parent", "child", "axis", "limit", "mimic")
-
-
-class Hinge(NamedTuple):
-    """What connects a link to its parent: the pose at rest, and the joint, None for a fixed one."""
-
-    name: str
-    parent: str
-    child: str
-    origin: Rigid
-    joint: Joint | None
-    element: Element
+LIMITED = ("revolute", "prismatic")
+HELD = {
+    "robot": ("link", "joint"),
+    "link": ("link", "joint"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
+}
+_XACRO = f"xacro, not yet URDF; {FORMATS['xacro'].instead}"
 
 
 class RobotDescription(NamedTuple):
-    """The links of a robot, each with its line, and what connects them, in the order of the file."""
+    """The frames of a robot, each with its line, and how those hang that a joint holds, in the order of the file."""
 
-    xml: XmlFile
-    links: dict[str, int]
-    hinges: list[Hinge]
+    frames: dict[str, int]
+    links: list[Link]
+    posture: Posture
 
     @property
     def roots(self) -> list[str]:
-        """Return the links that hang nowhere."""
-        children = {hinge.child for hinge in self.hinges}
-        return [link for link in self.links if link not in children]
-
-    def posture(self, options: Options) -> Posture:
-        """Return where the joints stand, as the options say."""
-        places = {hinge.name: hinge.element for hinge in self.hinges}
-        joints = [hinge.joint for hinge in self.hinges if hinge.joint]
-        fixed = [hinge.name for hinge in self.hinges if not hinge.joint]
-        return Posture(joints, options, lambda joint, problem: self.xml.error(places[joint.name], problem), fixed=fixed)
+        """Return the frames that hang nowhere."""
+        children = {link.child for link in self.links}
+        return [frame for frame in self.frames if frame not in children]
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a robot, its joints as told, else at 0."""
+    """Yield the edges of a robot, its joints as options say, else at 0."""
     robot = describe(file, options)
-    for link in robot.roots:
-        yield Edge(None, link, IDENTITY, line=robot.links[link])
-    posture = robot.posture(options)
-    for _, parent, child, origin, joint, element in robot.hinges:
-        if joint is None:
-            yield Edge(parent, child, origin, line=element.line)
-        else:
-            yield from posture.edges(parent, child, origin, joint.name, element.line)
+    for frame in robot.roots:
+        yield Edge(None, frame, IDENTITY, line=robot.frames[frame])
+    yield from robot.posture.edges(robot.links)
 
 
 def describe(file: InputFile, options: Options) -> RobotDescription:
-    """Read the links and joints of a robot.
+    """Read the links and joints of a robot, and find out where the joints stand.
 
     Raises FormatError for what is no URDF; what is wrong with one joint goes to `options.report`.
     """
     xml = XmlFile(file)
+    # few files hold what would have to be looked for in every attribute
+    if b"$" in xml.data or b"xacro" in xml.data or xml.data.startswith(UTF16):
+        for element in xml.elements(deepest=3, ends=False):
+            _refuse_xacro(xml, element)
     reader = _Reader(xml, options)
-    for element in xml.elements(deepest=3, ends=False):
-        reader.take(element)
-    reader.end_joint()
-    robot = RobotDescription(xml, reader.links, list(reader.connected()))
-    if not robot.links:
+    for node in read_nodes(xml, HELD, "URDF").children:
+        try:
+            reader.take(node)
+        except FormatError as error:
+            options.report(error)
+    links = list(reader.connected())
+    robot = RobotDescription(reader.frames, links, Posture.of(links, options, reader.fail))
+    if not robot.frames:
         raise FormatError("no links in it", source=file.name)
     if len(roots := robot.roots) > 1:
         named = f"{', '.join(map(bare, roots[:5]))}{', ..' * (len(roots) > 5)}"
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
-        options.tally.note(Note("several-roots", message, ()), robot.links[roots[1]])
+        options.tally.note(Note("several-roots", message, ()), robot.frames[roots[1]])
     return robot
 
 
+def _refuse_xacro(xml: XmlFile, element: Element) -> None:
+    """Refuse what xacro would have to expand first: its elements, and expressions in attributes."""
+    if element.tag.startswith("xacro:"):
+        raise xml.error(element, f"<{bare(element.tag)}> is {_XACRO}")
+    for name, value in element.attributes.items():
+        if "${" in value or "$(" in value:
+            raise xml.error(element, f"{shown(value)} is {_XACRO}", name)
+
+
 class _Reader:
-    """Takes elements as they come, and keeps what the joint in hand is made of."""
+    """Read links and joints one by one."""
 
     def __init__(self, xml: XmlFile, options: Options) -> None:
         self.xml = xml
         self.options = options
-        self.bare = options.tally.names.bare
-        self.links: dict[str, int] = {}
-        self.hinges: dict[str, Hinge] = {}
-        self.outer: Element | None = None  # the link or joint in hand
-        self.parts: dict[str, Element] = {}
-        # few files hold what would have to be looked for in every attribute
-        self.suspicious = b"$" in xml.data or b"xacro" in xml.data or xml.data.startswith(UTF16)
+        self.frames: dict[str, int] = {}
+        self.joints: dict[str, tuple[Link, Element]] = {}
 
-    def take(self, element: Element) -> None:
-        """Take the beginning of an element down to the parts of joints."""
-        if self.suspicious:
-            self._refuse_xacro(element)
-        if element.depth == 3:
-            self._inside(element)
+    def take(self, node: XmlNode) -> None:
+        """Read one link or joint; raises FormatError."""
+        if node.tag == "link":
+            self._frame(node)
             return
-        self.end_joint()
-        self.outer = element
-        self.parts = {}
-        if element.depth == 1:
-            if element.tag != "robot":
-                raise self.xml.error(element, f"URDF begins with <robot>, found <{bare(element.tag)}>")
-        elif element.tag == "link":
-            try:
-                self._link(element)
-            except FormatError as error:
-                self.options.report(error)
+        parts: dict[str, Element] = {}
+        for part in node.children:
+            if parts.setdefault(part.tag, part.element) is not part.element:
+                self.options.report(self.xml.error(part.element, f"<{part.tag}> twice in one joint"))
+        self._link(node.element, parts)
 
-    def _link(self, element: Element) -> None:
-        name = self.bare(self._name(element))
-        if name in self.links:
-            raise self.xml.error(element, f"link {shown(name)} twice; first in line {self.links[name]}", "name")
-        self.links[name] = element.line
+    def fail(self, joint: Joint, problem: str) -> FormatError:
+        """Make the error for the place of a joint."""
+        return self.xml.error(self.joints[joint.name][1], problem)
 
-    def _inside(self, element: Element) -> None:
-        """Keep a part of a joint; links and joints do not stand inside links."""
-        outer, tag = self.outer.tag if self.outer else "", element.tag
-        if outer == "joint":
-            if tag in PARTS and self.parts.setdefault(tag, element) is not element:
-                self.options.report(self.xml.error(element, f"<{tag}> twice in one joint"))
-        elif outer == "link" and tag in ("link", "joint"):
-            raise self.xml.error(element, f"<{tag}> inside a <link>; links and joints stand side by side in <robot>")
+    def _frame(self, node: XmlNode) -> None:
+        for inner in node.children:
+            message = f"<{inner.tag}> inside a <link>; links and joints stand side by side in <robot>"
+            raise self.xml.error(inner.element, message)
+        name = self._bare(node.element, "name")
+        if name in self.frames:
+            message = f"link {shown(name)} twice; first in line {self.frames[name]}"
+            raise self.xml.error(node.element, message, "name")
+        self.frames[name] = node.element.line
 
-    def _refuse_xacro(self, element: Element) -> None:
-        """Refuse what xacro would have to expand first: its elements, and expressions in attributes."""
-        if element.tag.startswith("xacro:"):
-            raise self.xml.error(element, f"<{bare(element.tag)}> is {_XACRO}")
-        for name, value in element.attributes.items():
-            if "${" in value or "$(" in value:
-                raise self.xml.error(element, f"{shown(value)} is {_XACRO}", name)
+    def _bare(self, element: Element, attribute: str) -> str:
+        """Return the name of a frame without its leading slash."""
+        return self.options.tally.names.bare(self.xml.required(element, attribute))
 
-    def end_joint(self) -> None:
-        """Read the joint in hand, if it is one, from its parts."""
-        if self.outer is None or self.outer.tag != "joint":
-            return
-        try:
-            hinge = self._hinge(self.outer, self.parts)
-        except FormatError as error:
-            self.options.report(error)
-        else:
-            self.hinges[hinge.name] = hinge
-
-    def _name(self, element: Element, attribute: str = "name") -> str:
-        """Return an attribute that names something."""
-        name = element.attributes.get(attribute)
-        if not name:
-            raise self.xml.error(element, f"<{element.tag}> has no {attribute}", attribute if name is not None else "")
-        return name
-
-    def _hinge(self, element: Element, parts: dict[str, Element]) -> Hinge:
+    def _link(self, element: Element, parts: dict[str, Element]) -> None:
         """Read one joint from its parts."""
-        name = self._name(element)
-        kind = self._name(element, "type")
-        if name in self.hinges:
-            line = self.hinges[name].element.line
+        name, kind = self.xml.required(element, "name"), self.xml.required(element, "type")
+        if name in self.joints:
+            line = self.joints[name][1].line
             raise self.xml.error(element, f"joint {shown(name)} twice; first in line {line}", "name")
         if kind not in KINDS:
             message = f"joint {shown(name)} has the type {shown(kind)}{alternatives(kind, KINDS, 'types')}"
@@ -199,10 +161,11 @@ class _Reader:
         if "parent" not in parts or "child" not in parts:
             missing = "child" if "parent" in parts else "parent"
             raise self.xml.error(element, f"joint {shown(name)} has no <{missing}>")
-        parent, child = self.bare(self._name(parts["parent"], "link")), self.bare(self._name(parts["child"], "link"))
+        parent, child = self._bare(parts["parent"], "link"), self._bare(parts["child"], "link")
         origin = self._origin(parts["origin"]) if "origin" in parts else IDENTITY
-        joint = None if kind == "fixed" else self._joint(name, kind, element, parts)
-        return Hinge(name, parent, child, origin, joint, element)
+        joints = () if kind == "fixed" else (self._joint(name, kind, element, parts),)
+        link = Link(parent, child, origin, joints, element.line, fixed="" if joints else name)
+        self.joints[name] = link, element
 
     def _origin(self, element: Element) -> Rigid:
         """Read the pose of a joint in its parent: rpy, or a quaternion."""
@@ -258,26 +221,22 @@ class _Reader:
         return lower, upper
 
     def _mimic(self, name: str, kind: str, element: Element) -> Mimic:
-        leader = self._name(element, "joint")
+        leader = self.xml.required(element, "joint")
         if kind in ("planar", "floating"):
             raise self.xml.error(element, f"joint {shown(name)} is {kind}: it follows no other")
         (multiplier,) = self.xml.numbers(element, "multiplier", 1, "1")
         (offset,) = self.xml.numbers(element, "offset", 1, "0")
         return Mimic(leader, multiplier, offset)
 
-    def connected(self) -> Iterator[Hinge]:
-        """Yield the joints between links that there are."""
-        for hinge in self.hinges.values():
-            missing = next((link for link in (hinge.parent, hinge.child) if link not in self.links), None)
+    def connected(self) -> Iterator[Link]:
+        """Yield the links whose ends are there."""
+        for name, (link, element) in self.joints.items():
+            missing = next((end for end in (link.parent, link.child) if end and end not in self.frames), None)
             if missing is None:
-                yield hinge
+                yield link
                 continue
-            message = f"joint {shown(hinge.name)}: no link {shown(missing)}{alternatives(missing, self.links, 'links')}"
-            self.options.report(self.xml.error(hinge.element, message))
-
-
-LIMITED = ("revolute", "prismatic")
-_XACRO = f"xacro, not yet URDF; {FORMATS['xacro'].instead}"
+            message = f"joint {shown(name)}: no link {shown(missing)}{alternatives(missing, self.frames, 'links')}"
+            self.options.report(self.xml.error(element, message))
 
 
 _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}
