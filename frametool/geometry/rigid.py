@@ -35,7 +35,6 @@ if TYPE_CHECKING:
         Eight,
         Functions,
         N,
-        Namespace,
         Number,
         Quaternion,
         Rigid,
@@ -244,11 +243,16 @@ def go_on(pose: Rigid, piece: Rigid) -> Rigid:
         dx, dy, dz = _rotated(pose[3:], (px, py, pz))
         tx, ty, tz = tx + dx, ty + dy, tz + dz
     ix, iy, iz = (each if _is_zero(each) else -each for each in (x, y, z))
-    return tx, ty, tz, *settled(
-        _sum((w, bx), (x, bw), (y, bz), (iz, by)),
-        _sum((w, by), (ix, bz), (y, bw), (z, bx)),
-        _sum((w, bz), (x, by), (iy, bx), (z, bw)),
-        _sum((w, bw), (ix, bx), (iy, by), (iz, bz)),
+    return (
+        tx,
+        ty,
+        tz,
+        *settled(
+            _sum((w, bx), (x, bw), (y, bz), (iz, by)),
+            _sum((w, by), (ix, bz), (y, bw), (z, bx)),
+            _sum((w, bz), (x, by), (iy, bx), (z, bw)),
+            _sum((w, bw), (ix, bx), (iy, by), (iz, bz)),
+        ),
     )
 
 

@@ -30,9 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import BinaryIO
 
-    from frametool.formats.robots.model import Joint
+    from frametool.formats.robots.model import Joint, Robot
     from frametool.formats.robots.posture import Posture
-    from frametool.formats.robots.model import Robot
     from frametool.geometry.types import Components, Namespace, Number
     from frametool.stream.faults import BadRows
 

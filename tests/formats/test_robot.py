@@ -79,15 +79,22 @@ def test_a_tree_and_a_robot_give_the_same_bits_at_the_same_joints(seed: int, tmp
 @pytest.mark.parametrize("unit", ["", "deg"])
 def test_lookup_and_fk_print_the_same_numbers(unit: str, run: Callable[..., Outcome]) -> None:
     names = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_roll")
-    rows = np.random.default_rng(3).uniform(-2.0, 2.0, (20, 4)).tolist() + [[0.0] * 4, [0.5, 0.0, -0.0, 0.25]]
+    rows = [*np.random.default_rng(3).uniform(-2.0, 2.0, (20, 4)).tolist(), [0.0] * 4, [0.5, 0.0, -0.0, 0.25]]
     header = ",".join(f"{name}{'_deg' * bool(unit)}" for name in names)
     text = "\n".join([header, *(",".join(map(repr, row)) for row in rows), ""])
-    ways = {name: run("fk", str(ARM), *name, "-f", "json", stdin=text).out for name in (("arm_base", "tool"), ("tool", "shoulder"))}
+    ways = {
+        name: run("fk", str(ARM), *name, "-f", "json", stdin=text).out
+        for name in (("arm_base", "tool"), ("tool", "shoulder"))
+    }
     for (base, tip), out in ways.items():
         for row, line in zip(rows, out.splitlines(), strict=True):
-            joints = [each for name, value in zip(names, row, strict=True) for each in ("-j", f"{name}={value!r}{unit}")]
+            joints = [
+                each for name, value in zip(names, row, strict=True) for each in ("-j", f"{name}={value!r}{unit}")
+            ]
             found = json.loads(run("lookup", str(ARM), base, tip, *joints, "-f", "json").out)
-            assert [json.loads(line)[key] for key in ("xyz", "quaternion")] == [found[key] for key in ("xyz", "quaternion")]
+            assert [json.loads(line)[key] for key in ("xyz", "quaternion")] == [
+                found[key] for key in ("xyz", "quaternion")
+            ]
 
 
 def test_values_may_be_text_numbers_and_arrays_together(arm: Robot) -> None:

@@ -22,10 +22,9 @@ from frametool.documents.document import format_error, parse_documents
 from frametool.documents.json import looks_like_json
 from frametool.documents.source import pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, shown
-from frametool.formats.robots.model import Joint
+from frametool.formats.robots.model import IDENTITY, Joint, Link
 from frametool.formats.robots.posture import Posture
 from frametool.geometry import euler, floats, rigid
-from frametool.grammar.edges import Edge
 from frametool.grammar.readers import kind
 from frametool.text.csv_line import LineCell, split_line
 from frametool.text.numbers import NotFinite, parse_angle, parse_length, parse_number
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
+    from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Path
 
     Fail = Callable[[str], FormatError]
@@ -316,7 +315,6 @@ def _turned(columns: dict[str, Any], path: Path) -> list[tuple[str, dict[str, tu
 
 AXIS = (0.0, 0.0, 1.0)
 TURN = 6.283185307179586
-_IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -326,36 +324,28 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         choice = "--dh standard (a and alpha behind the joint) or --dh modified (Craig: before it)"
         error = rows[0].fail(f"nothing in a table of Denavit-Hartenberg parameters says which they are: give {choice}")
         raise Unanswered(error.message, source=error.source, line=error.line, column=error.column)
-    fails = {row.name: row.fail for row in rows}
-    joints = [Joint(row.name, row.kind, AXIS, line=row.fail("").line) for row in rows if row.kind != "fixed"]
-    fixed = [row.name for row in rows if row.kind == "fixed"]
-    posture = Posture(joints, options, lambda joint, problem: fails[joint.name](problem), fixed=fixed)
-    options.tally.about = ", ".join(filter(None, (options.answers.dh, options.tally.about)))
     frames = options.answers.names(*(f"link{number}" for number in range(len(rows) + 1)))
-    for row, parent, child in zip(rows, frames, frames[1:], strict=False):
-        line = row.fail("").line
-        _tell_degrees(row, line, options)
-        before, behind = _parts(row, modified=options.answers.dh == "modified")
-        motions = posture.motions(row.name) if row.kind != "fixed" else [(None, (_IDENTITY,))]
-        for stamp_ns, (moved,) in motions:
-            pose = rigid.compose(*rigid.compose(*before, *moved), *behind)
-            yield Edge(parent, child, pose, stamp_ns, line)
+    links = [_link(row, parent, child, options) for row, parent, child in zip(rows, frames, frames[1:], strict=False)]
+    posture = Posture.of(links, options)
+    options.tally.about = ", ".join(filter(None, (options.answers.dh, options.tally.about)))
+    yield from posture.edges(links)
 
 
-def _parts(row: DhRow, *, modified: bool) -> tuple[Rigid, Rigid]:
-    """Return the poses before and behind the motion of a joint, which turns about z or shifts along it."""
-    along_z: Rigid = (0.0, 0.0, row.d.number, *_turned_by_hand((0.0, 0.0, row.theta.number), row.theta))
-    along_x: Rigid = (row.a, 0.0, 0.0, *_turned_by_hand((row.alpha.number, 0.0, 0.0), row.alpha))
-    return (along_x, along_z) if modified else (_IDENTITY, rigid.compose(*along_z, *along_x))
-
-
-def _turned_by_hand(angles: tuple[float, float, float], amount: Amount) -> tuple[float, float, float, float]:
-    return euler.to_quaternion(*angles, "sxyz", floats, degrees=amount.degrees)
-
-
-def _tell_degrees(row: DhRow, line: int, options: Options) -> None:
-    """Wonder about bare angles beyond a full turn."""
+def _link(row: DhRow, parent: str, child: str, options: Options) -> Link:
+    """Make a link of one row; its joint turns about z or shifts along it."""
+    line = row.fail("").line
     for name, amount in (("theta", row.theta), ("alpha", row.alpha)):
         if not amount.degrees and abs(amount.number) > TURN:
             message = f"{name} {amount.number:g} is more than a full turn in radians; degrees? write {name}_deg"
             options.tally.note_each(message, line, "degrees")
+    along_z: Rigid = (0.0, 0.0, row.d.number, *_turned_by_hand((0.0, 0.0, row.theta.number), row.theta))
+    along_x: Rigid = (row.a, 0.0, 0.0, *_turned_by_hand((row.alpha.number, 0.0, 0.0), row.alpha))
+    modified = options.answers.dh == "modified"
+    origin = rigid.compose(*along_x, *along_z) if modified else IDENTITY
+    after = IDENTITY if modified else rigid.compose(*along_z, *along_x)
+    joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, AXIS, line=line),)
+    return Link(parent, child, origin, joints, line, after, fixed="" if joints else row.name)
+
+
+def _turned_by_hand(angles: tuple[float, float, float], amount: Amount) -> tuple[float, float, float, float]:
+    return euler.to_quaternion(*angles, "sxyz", floats, degrees=amount.degrees)

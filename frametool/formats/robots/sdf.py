@@ -23,12 +23,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.xml import XmlFile, read_nodes
 from frametool.errors import FormatError, alternatives, shown
-from frametool.formats.robots.model import Joint, Mimic
+from frametool.formats.robots.model import Joint, Link, Mimic
 from frametool.formats.robots.posture import Posture
 from frametool.formats.robots.sdf_frames import HELD, IDENTITY, WORLD, SdfFrames
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.quaternion import unit_vector
-from frametool.grammar.edges import Edge
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,8 +35,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.documents.xml import XmlNode
     from frametool.formats.robots.sdf_frames import SdfFrame
-    from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
+    from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Vector
 
 KINDS = {  # how many axes each has
@@ -60,19 +58,14 @@ class SdfJoint(NamedTuple):
     motions: tuple[Joint, ...]
 
     @property
-    def turned(self) -> bool:
-        """Tell whether the parent hangs on the child: on the world everything hangs."""
-        return self.child.kind == WORLD
-
-    @property
     def hanging(self) -> SdfFrame:
-        """Return the body that hangs on the other one."""
-        return self.parent if self.turned else self.child
+        """Return the body that hangs on the other one: on the world everything hangs."""
+        return self.parent if self.child.kind == WORLD else self.child
 
     @property
     def outer(self) -> SdfFrame:
         """Return the body that it hangs on."""
-        return self.child if self.turned else self.parent
+        return self.child if self.child.kind == WORLD else self.parent
 
 
 class SdfJoints:
@@ -259,30 +252,28 @@ class _SdfTree:
         self._above.update(dict.fromkeys(way, link))
         return link
 
-    def _carrier(self, model: SdfFrame) -> SdfFrame | None:
-        """Return the link on which a model's frame hangs; None where its links hang on it."""
-        link = self.joints.body(model)
-        return link if link is not None and link.name in self.hung else None
-
-    def _around(self, frame: SdfFrame) -> SdfFrame:
-        """Return the frame of the nearest model around one that no joint moves, or the world."""
-        scope = frame.scope
-        while scope is not None and self.carried.get(scope.name):
-            scope = scope.scope
-        return scope or self.frames.top
-
     def edges(self) -> Iterator[Edge]:
         """Yield every edge, and the root where nothing stands in a world."""
-        posture = self._posture()
-        for frame in self.frames.all.values():
-            if frame.name in self.hung:
-                yield from self._across(self.hung[frame.name], posture)
-            elif frame is not self.frames.top:
-                yield self._edge(self._outer(frame), frame)
+        links = [self._link(frame) for frame in self.frames.all.values() if frame is not self.frames.top]
         for sensor in self.frames.sensors:
-            link = sensor.scope or self.frames.top
-            pose = rigid.compose(*self.frames.relative(link, sensor.relative_to or link), *sensor.pose)
-            yield Edge(link.name, sensor.name, pose, line=sensor.holder.element.line)
+            holder = sensor.scope or self.frames.top
+            pose = rigid.compose(*self.frames.relative(holder, sensor.relative_to or holder), *sensor.pose)
+            links.append(Link(holder.name, sensor.name, pose, line=sensor.holder.element.line))
+        return self._posture().edges(links)
+
+    def _link(self, frame: SdfFrame) -> Link:
+        """Return how a frame hangs: on the joint that holds it, if one does."""
+        line = frame.holder.element.line
+        relative = self.frames.relative
+        if joint := self.hung.get(frame.name):
+            line = joint.frame.holder.element.line
+            origin, after = relative(joint.parent, joint.frame), relative(joint.frame, joint.child)
+            rest, inverted = relative(joint.outer, frame), joint.child.kind == WORLD
+            return Link(joint.outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
+        outer = self._outer(frame)
+        if outer is self.frames.top and self._is_root(frame):
+            return Link(None, frame.name, line=line)
+        return Link(outer.name, frame.name, relative(outer, frame), line=line)
 
     def _outer(self, frame: SdfFrame) -> SdfFrame:
         """Return the frame on which one hangs that no joint holds."""
@@ -290,14 +281,17 @@ class _SdfTree:
             return self.frames.end(frame, "child")
         if frame.kind == "frame":
             return self.frames.attached(frame)
-        return self.carried.get(frame.name) or self._around(frame)
+        if link := self.carried.get(frame.name):
+            return link
+        scope = frame.scope  # the nearest model around it that no joint moves, or the world
+        while scope is not None and self.carried.get(scope.name):
+            scope = scope.scope
+        return scope or self.frames.top
 
-    def _edge(self, outer: SdfFrame, frame: SdfFrame) -> Edge:
-        """Return an edge that stands still."""
-        line = frame.holder.element.line
-        if outer is self.frames.top and self._is_root(frame):
-            return Edge(None, frame.name, IDENTITY, line=line)
-        return Edge(outer.name, frame.name, self.frames.relative(outer, frame), line=line)
+    def _carrier(self, model: SdfFrame) -> SdfFrame | None:
+        """Return the link on which a model's frame hangs; None where its links hang on it."""
+        link = self.joints.body(model)
+        return link if link is not None and link.name in self.hung else None
 
     def _is_root(self, frame: SdfFrame) -> bool:
         """Tell whether a frame has no parent: outside of any world, in a model without a pose in one."""
@@ -305,36 +299,13 @@ class _SdfTree:
         return not self.in_world and way[-1].kind == "model" and way[-1].in_scope == IDENTITY
 
     def _posture(self) -> Posture:
-        """Return where the joints stand."""
+        """Return where the joints stand; values have the names that we have for joints: `tip` for `arm::tip`."""
         places = {motion.name: joint.frame.holder.element for joint in self.joints.all for motion in joint.motions}
         moving = [motion for joint in self.joints.all for motion in joint.motions]
         fixed = [self.joints.names[joint.frame.name] for joint in self.joints.all if not joint.motions]
-        return Posture(
-            moving,
-            self._with_short_names(),
-            lambda joint, problem: self.frames.xml.error(places[joint.name], problem),
-            fixed=fixed,
-        )
-
-    def _with_short_names(self) -> Options:
-        """Return the options with values of joints under the names that we have for them: `tip` for `arm::tip`."""
         answers = self.options.answers
-        told = {self.joints.names.get(name, name): value for name, value in answers.joints.items()}
-        return self.options._replace(answers=answers._replace(joints=told))
-
-    def _across(self, joint: SdfJoint, posture: Posture) -> Iterator[Edge]:
-        """Yield the edge across a joint: for good, or a sample at each time."""
-        hanging = joint.hanging
-        outer = joint.outer
-        rest = self.frames.relative(outer, hanging)
-        line = joint.frame.holder.element.line
-        for stamp_ns, moved in posture.motions(*(motion.name for motion in joint.motions)):
-            pose = rest if all(each == IDENTITY for each in moved) else self._moved(joint, moved)
-            yield Edge(outer.name, hanging.name, pose, stamp_ns, line)
-
-    def _moved(self, joint: SdfJoint, moved: tuple[Rigid, ...]) -> Rigid:
-        """Return the pose of the body that hangs on a joint once that has moved."""
-        pose = self.frames.relative(joint.parent, joint.frame)
-        for each in (*moved, self.frames.relative(joint.frame, joint.child)):
-            pose = rigid.compose(*pose, *each)
-        return rigid.inverse(*pose) if joint.turned else pose
+        values = {self.joints.names.get(name, name): value for name, value in answers.joints.items()}
+        options = self.options._replace(answers=answers._replace(joints=values))
+        return Posture(
+            moving, options, lambda joint, text: self.frames.xml.error(places[joint.name], text), fixed=fixed
+        )

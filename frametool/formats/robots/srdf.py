@@ -17,14 +17,13 @@ from frametool.documents.xml import XmlFile, read_nodes
 from frametool.errors import FormatError, Unanswered, alternatives, shown
 from frametool.formats.robots.model import Joint, Link
 from frametool.formats.robots.posture import Posture, Setting
-from frametool.grammar.edges import Edge
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.documents.xml import Element
-    from frametool.grammar.edges import Options
+    from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Path
 
 KINDS = ("fixed", "planar", "floating")

@@ -253,9 +253,7 @@ def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
         message = "URDF holds one tree, and this has the roots"
         raise ValueInvalid(f"{message} {listing(tree.roots)}; --with FILE adds what connects them")
     links = "".join(f'  <link name="{_attribute(frame)}"/>\n' for frame in tree.frames)
-    joints = "".join(
-        _joint(parent, child, transform.components, style) for parent, child, transform in tree.edges()
-    )
+    joints = "".join(_joint(parent, child, transform.components, style) for parent, child, transform in tree.edges())
     return f'<?xml version="1.0"?>\n<robot name="robot">\n{links}{joints}</robot>\n'
 
 
