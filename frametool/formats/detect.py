@@ -257,7 +257,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if "tree" in reads and begin.xml:
         raise _unknown(begin, *reads, name=name)
     if form := by_suffix(name, readers(*reads)):
-        return form, f"the suffix {name[name.rfind('.'):].lower()}"
+        return form, f"the suffix {name[name.rfind('.') :].lower()}"
     if form := by_suffix(name, unread()):
         raise not_read(form, name)
     if (what := not_text(head)) and not head.startswith(UTF16):
