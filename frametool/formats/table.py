@@ -367,7 +367,7 @@ FORMATS = {
     "euroc-sensor": Format(
         "sensor.yaml of EuRoC",
         reads=("tree",),
-        reader="frametool.formats.trees.euroc_sensor",
+        reader="frametool.formats.trees.camchain",
         signs=(("yaml key", "T_BS"),),
         states="T_BS is body<-sensor, metres",
         asks=("frames",),

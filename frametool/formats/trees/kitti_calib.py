@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.source import pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid
-from frametool.formats.trees.matrix_keys import MATRIX
+from frametool.formats.trees.matrices import MATRIX
 from frametool.geometry import rigid
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Reading

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import parse_documents
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, bare, shown
-from frametool.formats.trees.matrix_keys import grid_of, read_turn
+from frametool.formats.trees.matrices import grid_of, read_turn
 from frametool.formats.trees.tree_reader import document_edges
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
