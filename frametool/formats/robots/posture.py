@@ -1,17 +1,12 @@
-"""Where the joints of one robot stand, at one time or over time: as told by options and files, else at rest.
-
-A joint that mimics another follows it, in chains too; only its own name overrides that.
-
-Files that say where joints stand: maps in YAML and JSON, JointState messages, tables, states of other forms.
+"""Where the joints of one robot stand, at one time or over time: as options and files say, else at rest.
 
     {shoulder: 30deg, gripper: 2cm, base: {xyz: [1, 0, 0]}}          with `stamp`, one of many: the joints move
     {name: [shoulder, gripper], position: [0.5, 0.02]}               JointState, of either ROS, one or many
-    t,shoulder_deg,gripper                                           a table; without a stamp its last row counts
+    t,shoulder_deg,elbow [deg],finger (mm)                           a table; without a stamp its last row counts
     robot.srdf:ready                                                 a state that another form has a name for
 
-Each statement keeps its place; what it means is for those who know the joint.
-
-Joints among the columns of a table, by name: `elbow`, `elbow_deg`, `elbow [deg]`, `finger (mm)`; also stamps.
+A joint that mimics another follows it, in chains too; only its own name overrides that.  Each statement keeps its
+place; what it means is for those who know the joint.
 """
 
 from __future__ import annotations
@@ -130,9 +125,6 @@ class Posture:
 
     def _take_files(self) -> None:
         """Read all files; the later one counts, and of one file all its samples."""
-        if not self._options.answers.joint_files:
-            return
-
         for path in self._options.answers.joint_files:
             found: dict[str, list[tuple[int | None, Value]]] = {}
             setting = None
@@ -186,12 +178,8 @@ class Posture:
             self._take(name, [(None, value)])
 
     def _follow(self, fail: Fail) -> None:
-        """Settle each joint that nobody told of: at its leader's value, along chains of any length, or at rest."""
-        for name, joint in self.joints.items():
-            if joint.mimic is None:
-                if name not in self.given:
-                    self.still[name] = joint.start
-                continue
+        """Settle each joint that has no value yet: at its leader's, along chains of any length, or at rest."""
+        for name in self.joints:
             chain = {name: None}
             last = name
             while (leader := self._leader(last, fail)) is not None:
@@ -207,9 +195,7 @@ class Posture:
     def _leader(self, name: str, fail: Fail) -> str | None:
         """Return the joint that decides over one which is not settled yet."""
         mimic = self.joints[name].mimic
-        if name in self.still or name in self.moving or mimic is None:
-            return None
-        if mimic.joint in self._fixed:
+        if name in self.still or name in self.moving or mimic is None or mimic.joint in self._fixed:
             return None
         if mimic.joint not in self.joints:
             raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is no joint")
@@ -236,20 +222,17 @@ class Posture:
     def _tell_limits(self) -> None:
         """Note the values told that lie beyond limits, and steps that a pose cannot follow."""
         for name in (*self.still, *self.moving):
-            joint = self.joints[name]
+            joint, tally = self.joints[name], self._options.tally
             series = self.moving.get(name) or {0: self.still[name]}
             values = [value.plain for value in series.values() if isinstance(value, JointValue)]
             if joint.lower is not None and joint.upper is not None and joint.lower <= joint.upper:
                 beyond = [value for value in values if not joint.lower - SLACK <= value <= joint.upper + SLACK]
                 if beyond:
-                    self._note("limit", _about_limits(joint, beyond, len(values)), joint)
+                    tally.note(Note("limit", _about_limits(joint, beyond, len(values)), ()), joint.line)
             steps = zip(series, values, values[1:], strict=False) if joint.kind == "revolute" else ()
             if wide := next((at for at, one, two in steps if abs(two - one) >= HALF_TURN), None):
                 far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide)}"
-                self._note("odd", f"{far}; poses between go the shorter way", joint)
-
-    def _note(self, rule: str, message: str, joint: Joint) -> None:
-        self._options.tally.note(Note(rule, message, ()), joint.line)
+                tally.note(Note("odd", f"{far}; poses between go the shorter way", ()), joint.line)
 
     def _about(self) -> str:
         """Say how many joints stand where nobody said."""
@@ -426,19 +409,19 @@ class JointFile:
         elif "rows" in FORMATS[form].reads:
             yield from self._table(form, head.decode("utf-8", "replace"))
         else:
-            for message in read_messages(self.file.stream, name, "echo", self.tally):
-                yield from self._message(message, self._values)
+            yield from self._messages(read_messages(self.file.stream, name, "echo", self.tally))
 
-    def _message(
-        self, message: Message | FormatError, read: Callable[[Any, Path, Message], Iterator[Setting]]
+    def _messages(
+        self, messages: Iterable[Message | FormatError], state_of: Callable[[Any], Any] | None = None
     ) -> Iterator[Setting]:
-        """Yield what one document or row says."""
-        if isinstance(message, FormatError):
-            raise message
-        try:
-            yield from read(message.value, (), message)
-        except Misfit as misfit:
-            raise message.error(misfit) from None
+        """Yield what documents or rows say; `state_of` makes a JointState of a row."""
+        for message in messages:
+            if isinstance(message, FormatError):
+                raise message
+            try:
+                yield from self._values(state_of(message.value) if state_of else message.value, (), message)
+            except Misfit as misfit:
+                raise message.error(misfit) from None
 
     def _values(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
         """Yield the settings of a plain value: a JointState, a map, or a list of either."""
@@ -477,19 +460,14 @@ class JointFile:
         first = next((line for line in head.split("\n") if line.strip()), "")
         name = self.file.name
         if first.startswith("%time,"):
-            for message in read_messages(self.file.stream, name, "csv1", self.tally):
-                yield from self._message(message, self._numbered)
+            rows = read_messages(self.file.stream, name, "csv1", self.tally)
+            yield from self._messages(rows, joint_state.of_numbered)
         elif joint_state.looks_like_row(first):
-            for line, text in line_texts(self.file.stream, name, self.tally):
-                yield from self._message(Message(text, Source(name, text), line, cells=True), self._row)
+            texts = line_texts(self.file.stream, name, self.tally)
+            rows = (Message(text, Source(name, text), line, cells=True) for line, text in texts)
+            yield from self._messages(rows, lambda row: joint_state.of_row(joint_state.unquoted(row)))
         else:
             yield from self._columns(form)
-
-    def _numbered(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
-        return self._state(joint_state.of_numbered(value), path, message)
-
-    def _row(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
-        return self._state(joint_state.of_row(joint_state.unquoted(value)), path, message)
 
     def _cells(self, form: str, line: str) -> list[str]:
         if form == "csv":
