@@ -202,11 +202,13 @@ _ENDS_EARLY = 3  # expat's code for "no element found", which it also says behin
 class XmlNode:
     """One element: its attributes and place, its text, and those of the elements in it that are kept."""
 
-    __slots__ = ("children", "element", "tag", "text")
+    __slots__ = ("children", "element", "line", "tag", "text", "xml")
 
-    def __init__(self, element: Element) -> None:
+    def __init__(self, element: Element, xml: XmlFile) -> None:
         """Create it as it begins."""
+        self.xml = xml
         self.element = element
+        self.line = element.line
         self.tag = element.tag
         self.children: list[XmlNode] = []
         self.text = ""
@@ -230,6 +232,14 @@ class XmlNode:
     def attribute(self, name: str) -> str:
         """Return an attribute; "" where it is missing."""
         return self.element.attributes.get(name, "").strip()
+
+    def error(self, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
+        """Make the error for it, or for the value of one of its attributes."""
+        return self.xml.error(self.element, message, attribute, rule=rule)
+
+    def numbers(self, count: int) -> tuple[float, ...]:
+        """Read its text as so many finite numbers."""
+        return self.xml.numbers_in(self.text, self.element, "", count)
 
 
 def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = "") -> XmlNode:
@@ -257,7 +267,7 @@ def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = ""
         elif opened and element.tag not in held.get(opened[-1].tag, ()):
             skipped = element.depth
         else:
-            made = XmlNode(element)
+            made = XmlNode(element, xml)
             if opened:
                 opened[-1].children.append(made)
             opened.append(made)

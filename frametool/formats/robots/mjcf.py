@@ -96,7 +96,7 @@ class MjcfModel:
         """Refuse what MuJoCo would have to expand first."""
         for child in node.all(*REFUSED):
             message = f"<{child.tag}> is not expanded here; {WHOLE}"
-            raise self.xml.error(child.element, message)
+            raise child.error(message)
 
     def _walk(self, section: XmlNode) -> None:
         """Read what stands in a world in the order of the file; a stack, for bodies may be deep."""
@@ -112,7 +112,7 @@ class MjcfModel:
         """Read one element; of a body or frame return what surrounds that which it holds."""
         if node.tag in MADE:
             message = f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}"
-            self.options.tally.note_each(message, node.element.line)
+            self.options.tally.note_each(message, node.line)
         elif node.tag == "frame":
             pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node.element)))
             return inside._replace(around=self._class(node, inside.around), frame=pose)
@@ -139,7 +139,7 @@ class MjcfModel:
         name = self._place(node, inside, pose)
         if "mode" in attributes and (mode := attributes["mode"].text.strip()) != "fixed":
             message = f"{name} has the mode {shown(mode)}, in which MuJoCo turns it over time; it stands as written"
-            self.options.tally.note_each(message, node.element.line)
+            self.options.tally.note_each(message, node.line)
 
     def _place(self, node: XmlNode, inside: _Inside, pose: Rigid) -> str:
         """Hang a body, site or camera where it is at rest; return its name, which shows whether it is a body."""
@@ -151,32 +151,32 @@ class MjcfModel:
         known = self.links.get(name)
         if known is not None or name == WORLD:
             first = f"; first in line {known.line}" if known else ", which is the name of the root"
-            raise self.xml.error(node.element, f"{node.tag} {shown(name)} twice{first}", "name")
+            raise node.error(f"{node.tag} {shown(name)} twice{first}", "name")
         pose = pose if inside.frame == IDENTITY else rigid.compose(*inside.frame, *pose)
-        self.links[name] = Link(inside.body, name, pose, line=node.element.line)
+        self.links[name] = Link(inside.body, name, pose, line=node.line)
         return name
 
     def _join(self, node: XmlNode, inside: _Inside) -> None:
         """Read a joint of a body."""
         if inside.body == WORLD:
-            raise self.xml.error(node.element, "the world has no joints; put it into a <body>")
+            raise node.error("the world has no joints; put it into a <body>")
         link = self.links[inside.body]
         free = node.tag == "freejoint"
         attributes = own_attributes(node.element) if free else self.classes.attributes(node.element, inside.around)
         kind = "free" if free else self.poses.word(attributes, "type", "hinge", tuple(TYPES))
         if kind == "free" and (node.attribute("align") or str(self.poses.aligns_free).lower()) == "true":
             message = "alignfree: MuJoCo moves this body's frame onto its inertia, which is not computed here"
-            raise self.xml.error(node.element, f'{message}; write align="false", or {WHOLE}')
+            raise node.error(f'{message}; write align="false", or {WHOLE}')
         name = node.attribute("name") or f"{link.child}/joint{len(link.joints) + 1}"
         if known := self.joints.get(name):
-            raise self.xml.error(node.element, f"joint {shown(name)} twice; first in line {known.line}", "name")
+            raise node.error(f"joint {shown(name)} twice; first in line {known.line}", "name")
         if kind == "free" and link.parent != WORLD:
             message = f"joint {shown(name)} is free: it belongs into a body directly in the world"
-            raise self.xml.error(node.element, message)
+            raise node.error(message)
         if link.joints and "floating" in (link.joints[0].kind, TYPES[kind]):
             message = f"joint {shown(name)} beside others in body {shown(link.child)}, one of them free; keep that"
-            raise self.xml.error(node.element, message)
-        joint = Joint(name, TYPES[kind], rest_pose=link.origin, line=node.element.line)  # free: its pose in the world
+            raise node.error(message)
+        joint = Joint(name, TYPES[kind], rest_pose=link.origin, line=node.line)  # free: its pose in the world
         if kind != "free":
             joint = self._hinged(joint._replace(rest_pose=IDENTITY), attributes, inside.frame)
         self.joints[name] = joint
@@ -221,12 +221,12 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
     joints = MjcfModel(root, xml, Options(Tally(), Topics())).in_qpos
     key = _key(root, xml, state)
     if not key.attribute("qpos"):
-        raise xml.error(key.element, f"key {shown(state)} has no qpos")
+        raise key.error(f"key {shown(state)} has no qpos")
     sizes = [SIZES.get(joint.kind, 1) for joint in joints]
     numbers = iter(xml.numbers(key.element, "qpos", sum(sizes)))
 
     def refuse(problem: str, _path: Path) -> FormatError:
-        return xml.error(key.element, problem, "qpos")
+        return key.error(problem, "qpos")
 
     for joint, size in zip(joints, sizes, strict=True):
         value = _value(joint, list(islice(numbers, size)), refuse)
@@ -292,7 +292,7 @@ class Classes:
             name = section.attribute("class") or MAIN
             if name != MAIN:
                 message = f"the outermost default class is called main, found {shown(name)}"
-                raise xml.error(section.element, message, "class")
+                raise section.error(message, "class")
             self._take(section, MAIN)
 
     def _take(self, section: XmlNode, name: str) -> None:
@@ -308,7 +308,7 @@ class Classes:
                 inner = child.attribute("class")
                 if not inner or inner in self.classes:
                     said = f"default class {shown(inner)} twice" if inner else "a <default> without class"
-                    raise self.xml.error(child.element, said, "class" if inner else "")
+                    raise child.error(said, "class" if inner else "")
                 self.classes[inner] = dict(mine)
                 pending.append((child, inner))
 
@@ -357,7 +357,7 @@ class PoseReader:
 
     def error(self, attribute: Attribute, name: str, message: str) -> FormatError:
         """Make the error for an attribute, in the element that has it: maybe a default."""
-        return self.xml.error(attribute.element, message, name)
+        return attribute.error(message, name)
 
     def numbers(self, attributes: Attributes, name: str, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
         """Read an attribute as so many numbers; without it the default."""

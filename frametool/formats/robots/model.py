@@ -25,12 +25,14 @@ from frametool.formats.load import Recording, refuse_unknown_joints
 from frametool.formats.table import FORMATS
 from frametool.frames.path import edges_between
 from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry.representations import notation
 from frametool.geometry.transform import Transform
 from frametool.geometry.trig import DEGREE, RADIAN
 from frametool.geometry.validation import as_numbers, scalars, single
 from frametool.grammar.edges import Options
 from frametool.grammar.pose import read_pose
-from frametool.grammar.readers import Misfit, Reading, as_mapping, kind
+from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind
+from frametool.grammar.rotation_spelling import rotation_of
 from frametool.text.numbers import parse_angle, parse_length
 
 TYPE_CHECKING = False
@@ -39,9 +41,10 @@ if TYPE_CHECKING:
     from os import PathLike
     from typing import Any, TypeAlias
 
+    from frametool.documents.xml import Element, XmlFile
     from frametool.formats.robots.posture import Posture
     from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
-    from frametool.grammar.readers import Vector
+    from frametool.grammar.readers import Quaternion, Vector
 
     Value: TypeAlias = "JointValue | Rigid"
     Values: TypeAlias = Mapping[str, Value]
@@ -52,6 +55,20 @@ TURNING = ("revolute", "continuous")
 POSED = ("planar", "floating", "ball")  # no single number says where these stand
 KINDS = (*TURNING, "prismatic", *POSED)
 OUT_OF_PLANE = 1e-9
+
+
+def read_quaternion(
+    xml: XmlFile, element: Element, texts: Sequence[str], options: Options, attribute: str = ""
+) -> Quaternion:
+    """Read x, y, z, w of an element by the rules of the grammar; what is odd is noted.  Raises FormatError."""
+    reading = Reading(Source(xml.name, ""), normalize=options.normalize)
+    try:
+        rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
+    except ValueInvalid as error:
+        raise xml.error(element, str(error), attribute, rule=error.rule) from None
+    for note in reading.notes:
+        options.tally.note(note, element.line)
+    return rotation
 
 
 class Mimic(NamedTuple):

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.source import UTF16, Source
+from frametool.documents.source import UTF16
 from frametool.documents.xml import XmlFile, read_nodes
 from frametool.errors import FormatError, ValueInvalid, alternatives, bare, listing, shown
-from frametool.formats.robots.model import IDENTITY, Joint, Link, Mimic
+from frametool.formats.robots.model import IDENTITY, Joint, Link, Mimic, read_quaternion
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
 from frametool.geometry import euler, floats, quaternion
@@ -26,9 +26,9 @@ from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
 from frametool.grammar.pose import Pose
-from frametool.grammar.readers import INDICES, Note, Reading
+from frametool.grammar.readers import Note
 from frametool.grammar.result import rotation_numbers
-from frametool.grammar.rotation_spelling import TURN, agreeing_rotation, rotation_of
+from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Quaternion, Vector
+    from frametool.grammar.readers import Vector
     from frametool.grammar.result import Style
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
@@ -178,24 +178,17 @@ class _Reader:
             self.options.tally.note(Note("degrees", message, ()), element.line)
         if roll or pitch or yaw:
             rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
-        if "quat_xyzw" in element.attributes:
-            rotation = self._quaternion(element, rotation if "rpy" in element.attributes else None)
-        return x, y, z, *rotation
-
-    def _quaternion(self, element: Element, other: Quaternion | None) -> Quaternion:
-        """Read quat_xyzw, which must agree with the angles if they stand beside it, and says more digits than they."""
-        self.xml.numbers(element, "quat_xyzw", 4)
-        reading = Reading(Source(self.xml.name, ""), normalize=self.options.normalize)
+        if "quat_xyzw" not in element.attributes:
+            return x, y, z, *rotation
+        numbers(element, "quat_xyzw", 4)
         texts = element.attributes["quat_xyzw"].split()
-        try:
-            rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
-            if other is not None:
-                agreeing_rotation(rotation, other)
-        except ValueInvalid as error:
-            raise self.xml.error(element, str(error), "quat_xyzw", rule=error.rule) from None
-        for note in reading.notes:
-            self.options.tally.note(note, element.line)
-        return rotation
+        exact = read_quaternion(self.xml, element, texts, self.options, "quat_xyzw")  # it says more digits than angles
+        if "rpy" in element.attributes:
+            try:
+                agreeing_rotation(exact, rotation)
+            except ValueInvalid as error:
+                raise self.xml.error(element, str(error), "quat_xyzw", rule=error.rule) from None
+        return x, y, z, *exact
 
     def _joint(self, name: str, kind: str, element: Element, parts: dict[str, Element]) -> Joint:
         """Read what moves: axis, limits, the joint that is followed."""
