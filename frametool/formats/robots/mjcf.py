@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.documents.source import InputFile
-    from frametool.documents.xml import Element, XmlNode
+    from frametool.documents.xml import XmlNode
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path, Quaternion, Vector
 
@@ -72,15 +72,14 @@ class _Inside(NamedTuple):
 class MjcfModel:
     """The frames of a model, bodies before what they hold."""
 
-    def __init__(self, root: XmlNode, xml: XmlFile, options: Options) -> None:
+    def __init__(self, root: XmlNode, options: Options) -> None:
         """Read a model; raises FormatError."""
-        self.xml = xml
         self.options = options
         self._refuse(root)
-        self.poses = PoseReader(root, xml)
+        self.poses = PoseReader(root)
         for section in root.all("default"):
             self._refuse(section)
-        self.classes = Classes(root, xml)
+        self.classes = Classes(root)
         self.links: dict[str, Link] = {}
         self.joints: dict[str, Joint] = {}
         self._counts: dict[tuple[str, str], int] = {}
@@ -95,8 +94,7 @@ class MjcfModel:
     def _refuse(self, node: XmlNode) -> None:
         """Refuse what MuJoCo would have to expand first."""
         for child in node.all(*REFUSED):
-            message = f"<{child.tag}> is not expanded here; {WHOLE}"
-            raise child.error(message)
+            raise child.error(f"<{child.tag}> is not expanded here; {WHOLE}")
 
     def _walk(self, section: XmlNode) -> None:
         """Read what stands in a world in the order of the file; a stack, for bodies may be deep."""
@@ -114,10 +112,10 @@ class MjcfModel:
             message = f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}"
             self.options.tally.note_each(message, node.line)
         elif node.tag == "frame":
-            pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node.element)))
+            pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node)))
             return inside._replace(around=self._class(node, inside.around), frame=pose)
         elif node.tag == "body":
-            name = self._place(node, inside, self.poses.pose(own_attributes(node.element)))
+            name = self._place(node, inside, self.poses.pose(own_attributes(node)))
             return _Inside(name, self._class(node, inside.around), IDENTITY)
         elif node.tag in JOINTS:
             self._join(node, inside)
@@ -129,12 +127,12 @@ class MjcfModel:
         """Return the class that a body or frame gives to what stands in it."""
         name = node.attribute("childclass")
         if name:
-            self.classes.check(name, node.element, "childclass")
+            self.classes.check(name, node, "childclass")
         return name or around
 
     def _mark(self, node: XmlNode, inside: _Inside) -> None:
         """Read a site or camera."""
-        attributes = self.classes.attributes(node.element, inside.around)
+        attributes = self.classes.attributes(node, inside.around)
         pose = self.poses.pose_of_site(attributes) if node.tag == "site" else self.poses.pose(attributes)
         name = self._place(node, inside, pose)
         if "mode" in attributes and (mode := attributes["mode"].text.strip()) != "fixed":
@@ -162,7 +160,7 @@ class MjcfModel:
             raise node.error("the world has no joints; put it into a <body>")
         link = self.links[inside.body]
         free = node.tag == "freejoint"
-        attributes = own_attributes(node.element) if free else self.classes.attributes(node.element, inside.around)
+        attributes = own_attributes(node) if free else self.classes.attributes(node, inside.around)
         kind = "free" if free else self.poses.word(attributes, "type", "hinge", tuple(TYPES))
         if kind == "free" and (node.attribute("align") or str(self.poses.aligns_free).lower()) == "true":
             message = "alignfree: MuJoCo moves this body's frame onto its inertia, which is not computed here"
@@ -203,8 +201,7 @@ SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others hav
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a model, its joints as told, else at their references."""
-    xml = XmlFile(file)
-    model = MjcfModel(read_nodes(xml, HELD), xml, options)
+    model = MjcfModel(read_nodes(XmlFile(file), HELD), options)
     yield from Posture.of(model.links.values(), options).edges(model.links.values())
 
 
@@ -218,8 +215,8 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
     finally:
         file.close()
     root = read_nodes(xml, HELD)
-    joints = MjcfModel(root, xml, Options(Tally(), Topics())).in_qpos
-    key = _key(root, xml, state)
+    joints = MjcfModel(root, Options(Tally(), Topics())).in_qpos
+    key = _key(root, state)
     if not key.attribute("qpos"):
         raise key.error(f"key {shown(state)} has no qpos")
     sizes = [SIZES.get(joint.kind, 1) for joint in joints]
@@ -233,18 +230,19 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
         yield Setting(joint.name, value, None, refuse, Source(xml.name, ""))
 
 
-def _key(root: XmlNode, xml: XmlFile, state: str) -> XmlNode:
+def _key(root: XmlNode, state: str) -> XmlNode:
     """Return the key of a name or number."""
     keys = [key for frames in root.all("keyframe") for key in frames.all("key")]
+    file = root.xml.name
     names = {key.attribute("name") or str(index): key for index, key in enumerate(keys)}
     numbered = {str(index): key for index, key in enumerate(keys)}
     if not keys:
-        raise FormatError("no <key> in it, which would say where joints stand", source=xml.name)
+        raise FormatError("no <key> in it, which would say where joints stand", source=file)
     if not state:
-        message = f"name one of its keys: {xml.name}:{next(iter(names))}"
-        raise FormatError(f"{message}{alternatives('', names, 'keys')}", source=xml.name)
+        message = f"name one of its keys: {file}:{next(iter(names))}"
+        raise FormatError(f"{message}{alternatives('', names, 'keys')}", source=file)
     if state not in names | numbered:
-        raise FormatError(f"no key {shown(state)}{alternatives(state, names, 'keys')}", source=xml.name)
+        raise FormatError(f"no key {shown(state)}{alternatives(state, names, 'keys')}", source=file)
     return names.get(state) or numbered[state]
 
 
@@ -260,15 +258,20 @@ def _value(joint: Joint, numbers: list[float], refuse: Callable[[str, Path], For
 
 
 class Attribute(NamedTuple):
-    """The text of an attribute, and the element that has it."""
+    """The text of an attribute, and the element that has it: maybe a default."""
 
+    name: str
     text: str
-    element: Element
+    node: XmlNode
+
+    def error(self, message: str) -> FormatError:
+        """Make the error for its place."""
+        return self.node.error(message, self.name)
 
 
-def own_attributes(element: Element) -> dict[str, Attribute]:
+def own_attributes(node: XmlNode) -> dict[str, Attribute]:
     """Return the attributes of an element; those that are empty count as missing."""
-    return {name: Attribute(text, element) for name, text in element.attributes.items() if text.strip()}
+    return {name: Attribute(name, text, node) for name, text in node.element.attributes.items() if text.strip()}
 
 
 def over(inner: Attributes, outer: Attributes) -> dict[str, Attribute]:
@@ -284,26 +287,24 @@ class Classes:
     A class may be used before it is defined.
     """
 
-    def __init__(self, root: XmlNode, xml: XmlFile) -> None:
+    def __init__(self, root: XmlNode) -> None:
         """Read all sections of defaults; raises FormatError."""
-        self.xml = xml
         self.classes: dict[str, dict[str, Attributes]] = {MAIN: {}}
         for section in root.all("default"):
             name = section.attribute("class") or MAIN
             if name != MAIN:
-                message = f"the outermost default class is called main, found {shown(name)}"
-                raise section.error(message, "class")
-            self._take(section, MAIN)
+                raise section.error(f"the outermost default class is called main, found {shown(name)}", "class")
+            self._take(section)
 
-    def _take(self, section: XmlNode, name: str) -> None:
+    def _take(self, section: XmlNode) -> None:
         """Read one section, then those in it, each from a copy; a stack, for they may be deep."""
-        pending = [(section, name)]
+        pending = [(section, MAIN)]
         while pending:
             node, name = pending.pop()
             mine = self.classes[name]
             for child in node.children:
                 if child.tag != "default":
-                    mine[child.tag] = over(own_attributes(child.element), mine.get(child.tag, {}))
+                    mine[child.tag] = over(own_attributes(child), mine.get(child.tag, {}))
             for child in node.all("default"):
                 inner = child.attribute("class")
                 if not inner or inner in self.classes:
@@ -312,39 +313,38 @@ class Classes:
                 self.classes[inner] = dict(mine)
                 pending.append((child, inner))
 
-    def attributes(self, element: Element, around: str) -> dict[str, Attribute]:
+    def attributes(self, node: XmlNode, around: str) -> dict[str, Attribute]:
         """Return the attributes of an element; `around` is the class that the bodies around it give it, if any."""
-        own = own_attributes(element)
+        own = own_attributes(node)
         name = own["class"].text if "class" in own else around or MAIN
-        self.check(name, element, "class")
-        return over(own, self.classes[name].get(element.tag, {}))
+        self.check(name, node, "class")
+        return over(own, self.classes[name].get(node.tag, {}))
 
-    def check(self, name: str, element: Element, attribute: str) -> None:
+    def check(self, name: str, node: XmlNode, attribute: str) -> None:
         """Raise FormatError for a class that is nowhere defined."""
         if name not in self.classes:
             message = f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}"
-            raise self.xml.error(element, message, attribute)
+            raise node.error(message, attribute)
 
 
 class PoseReader:
     """Reads numbers, angles and poses as the compiler section of a model says."""
 
-    def __init__(self, root: XmlNode, xml: XmlFile) -> None:
+    def __init__(self, root: XmlNode) -> None:
         """Read the compiler sections, wherever they stand: the last word on each setting counts; raises FormatError."""
-        self.xml = xml
         said: dict[str, Attribute] = {}
         for section in root.all("compiler"):
-            said.update(own_attributes(section.element))
+            said.update(own_attributes(section))
         self.degrees = self.word(said, "angle", "degree", ("degree", "radian")) == "degree"
         self.limits_apply = self.word(said, "autolimits", "true", ("true", "false")) == "true"
         self.aligns_free = self.word(said, "alignfree", "false", ("true", "false")) == "true"
         self.eulerseq = said["eulerseq"].text if "eulerseq" in said else "xyz"
         if len(self.eulerseq) != len("xyz") or not set(self.eulerseq) <= set("xyzXYZ"):
             message = f"eulerseq {shown(self.eulerseq)}; expected three of xyz (moving axes) and XYZ (fixed axes)"
-            raise self.error(said["eulerseq"], "eulerseq", message)
+            raise said["eulerseq"].error(message)
         if self.word(said, "coordinate", "local", ("local", "global")) == "global":
             message = "coordinate=global; MuJoCo reads it no more: save the model with MuJoCo 2.3.3 first"
-            raise self.error(said["coordinate"], "coordinate", message)
+            raise said["coordinate"].error(message)
 
     def word(self, attributes: Attributes, name: str, default: str, words: tuple[str, ...]) -> str:
         """Return an attribute that is one of some words."""
@@ -352,19 +352,15 @@ class PoseReader:
             return default
         text = attributes[name].text.strip()
         if text not in words:
-            raise self.error(attributes[name], name, f"{name} {shown(text)}; expected {', '.join(words)}")
+            raise attributes[name].error(f"{name} {shown(text)}; expected {', '.join(words)}")
         return text
-
-    def error(self, attribute: Attribute, name: str, message: str) -> FormatError:
-        """Make the error for an attribute, in the element that has it: maybe a default."""
-        return attribute.error(message, name)
 
     def numbers(self, attributes: Attributes, name: str, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
         """Read an attribute as so many numbers; without it the default."""
         if name not in attributes:
             return default
-        text, element = attributes[name]
-        return self.xml.numbers_in(text, element, name, count)
+        text, node = attributes[name][1:]
+        return node.xml.numbers_in(text, node.element, name, count)
 
     def direction(self, attributes: Attributes, name: str, default: Vector) -> Vector:
         """Read a vector of any length but zero, as a unit one."""
@@ -374,7 +370,7 @@ class PoseReader:
         x, y, z = vector
         if quaternion.magnitude(x, y, z, floats) < LEAST:
             message = f"{name}: {x:g} {y:g} {z:g} has no direction"
-            raise self.error(attributes[name], name, message)
+            raise attributes[name].error(message)
         return unit_vector(x, y, z, floats)
 
     def pose(self, attributes: Attributes) -> Rigid:
@@ -392,8 +388,8 @@ class PoseReader:
             return self.pose(attributes)
         fromto = attributes["fromto"]
         if "pos" in attributes:
-            raise self.error(fromto, "fromto", "pos and fromto in one site; keep one")
-        self.word({"type": Attribute("sphere", fromto.element), **attributes}, "type", "", STRAIGHT)
+            raise fromto.error("pos and fromto in one site; keep one")
+        self.word({"type": Attribute("type", "sphere", fromto.node), **attributes}, "type", "", STRAIGHT)
         ax, ay, az, bx, by, bz = self.numbers(attributes, "fromto", 6, ())
         along = self._unit(attributes, "fromto", (ax - bx, ay - by, az - bz))
         return 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), *_turning_z(*along)
@@ -402,14 +398,14 @@ class PoseReader:
         given = [name for name in ORIENTATIONS if name in attributes]
         if len(given) > 1:
             message = f"{' and '.join(given)} in one element; keep one"
-            raise self.error(attributes[given[1]], given[1], message)
+            raise attributes[given[1]].error(message)
         return getattr(self, f"_{given[0]}")(attributes) if given else (0.0, 0.0, 0.0, 1.0)
 
     def _quat(self, attributes: Attributes) -> Quaternion:
         """Read a quaternion, w first, of any length but zero."""
         w, x, y, z = self.numbers(attributes, "quat", 4, ())
         if w == x == y == z == 0.0:
-            raise self.error(attributes["quat"], "quat", "quat: 0 0 0 0 has no direction")
+            raise attributes["quat"].error("quat: 0 0 0 0 has no direction")
         if abs(w * w + x * x + y * y + z * z - 1.0) <= quaternion.UNIT:
             return x, y, z, w
         return quaternion.normalized(x, y, z, w, floats)
