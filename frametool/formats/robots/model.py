@@ -53,7 +53,6 @@ if TYPE_CHECKING:
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 TURNING = ("revolute", "continuous")
 POSED = ("planar", "floating", "ball")  # no single number says where these stand
-KINDS = (*TURNING, "prismatic", *POSED)
 OUT_OF_PLANE = 1e-9
 
 
@@ -82,7 +81,7 @@ class Mimic(NamedTuple):
 class Joint(NamedTuple):
     """A joint that can move.
 
-    kind: one of KINDS
+    kind: one of TURNING or POSED, or prismatic
     axis: unit, in the frame of the joint; of a planar one the normal of its plane
     lower, upper: limits in radians or metres, if it has any
     rest: the value where nothing has moved, which it has by default (MJCF's `ref`)
@@ -218,15 +217,12 @@ def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = Fa
     if isinstance(value, (JointValue, float)):
         return value if isinstance(value, JointValue) else JointValue(value)
     if type(value) is not str:
-        raise Misfit(f"joint {shown(joint.name)} is {joint.kind}: expected {_unit(joint)}, found {kind(value)}")
+        unit = "metres, or 2cm" if joint.kind == "prismatic" else "radians, or 30deg"
+        raise Misfit(f"joint {shown(joint.name)} is {joint.kind}: expected {unit}, found {kind(value)}")
     if joint.kind == "prismatic":
         return JointValue(parse_length(value))
     number, unit = parse_angle(value)
     return JointValue(number, degrees=unit == "deg")
-
-
-def _unit(joint: Joint) -> str:
-    return "metres, or 2cm" if joint.kind == "prismatic" else "radians, or 30deg"
 
 
 def _read_posed(joint: Joint, value: Any, source: Source, *, normalize: bool) -> Rigid:

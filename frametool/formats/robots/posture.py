@@ -350,11 +350,6 @@ def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
     return ""
 
 
-def no_joints(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
-    """Say that no column is called as a joint."""
-    return f"no column is a joint; columns: {', '.join(map(bare, names[:20]))}; joints: {listing(joints)}"
-
-
 TIMES = ("stamp", "stamp_ns", "time", "t")
 DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
 
@@ -378,7 +373,9 @@ class JointFile:
 
     def __init__(self, path: str, joints: Mapping[str, Joint]) -> None:
         """Open it: a file, or FILE:STATE for a state that it has a name for; raises FileProblem."""
-        self.path, self.state = _parted(path)
+        file, colon, state = path.rpartition(":")
+        has_state = colon and file and not os.path.exists(path) and os.path.exists(file)
+        self.path, self.state = (file, state) if has_state else (path, "")
         self.joints = joints
         self.tally = Tally()
         self.file = InputFile(self.path)
@@ -481,7 +478,10 @@ class JointFile:
         names = self._cells(form, header.strip("\r\ufeff"))
         try:
             columns = find_joint_columns(names, self.joints)
-            if problem := misspelt(names, self.joints) if columns else no_joints(names, self.joints):
+            if not columns:
+                named = ", ".join(map(bare, names[:20]))
+                raise ValueInvalid(f"no column is a joint; columns: {named}; joints: {listing(self.joints)}")
+            if problem := misspelt(names, self.joints):
                 raise ValueInvalid(problem)
         except ValueInvalid as error:
             raise FormatError(str(error), source=self.file.name, line=number) from None
@@ -494,7 +494,10 @@ class JointFile:
             if line.lstrip().startswith("#"):
                 continue
             cells = self._cells(form, line.rstrip("\r"))
-            refuse = partial(_refused_row, self.file.name, number)
+
+            def refuse(problem: str, _below: Path, line: int = number) -> FormatError:
+                return FormatError(problem, source=self.file.name, line=line)
+
             if len(cells) != len(names):
                 raise refuse(f"expected {len(names)} cells, found {len(cells)}", ())
             at = ""
@@ -508,12 +511,6 @@ class JointFile:
                     yield Setting(joint, value, stamp_ns if stamp else None, refuse, source)
             except ValueInvalid as error:
                 raise refuse(f"{at}: {error}", ()) from None
-
-
-def _parted(path: str) -> tuple[str, str]:
-    """Part FILE:STATE, unless there is a file of that name."""
-    file, colon, state = path.rpartition(":")
-    return (file, state) if colon and file and not os.path.exists(path) and os.path.exists(file) else (path, "")
 
 
 def _time(mapping: dict[str, Any], key: str) -> int:
@@ -538,10 +535,6 @@ def _finite(value: Any, path: Path) -> JointValue:
 
 def _refused(message: Message, path: Path, problem: str, below: Path) -> FormatError:
     return message.error(Misfit(problem, (*path, *below)))
-
-
-def _refused_row(name: str, line: int, problem: str, _below: Path) -> FormatError:
-    return FormatError(problem, source=name, line=line)
 
 
 def unknown_joint(joint: str, joints: Mapping[str, Joint], fixed: frozenset[str]) -> str:

@@ -135,7 +135,8 @@ class SdfFrames:
         self.top = SdfFrame(WORLD, WORLD, None, worlds[0] if worlds else root)
         self.all: dict[str, SdfFrame] = {WORLD: self.top}
         self.sensors: list[SdfFrame] = []
-        self.version = _version(root)
+        parts = root.attribute("version").split(".")  # what is not a number counts as the newest
+        self.version = tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else (2,)
         self.missing: FormatError | None = None  # the last error about a name that was left out
         self.gone: set[str] = set()
         self._take([self.top])
@@ -151,7 +152,11 @@ class SdfFrames:
                 raise scope.holder.error(f"more than {DEEPEST_MODEL} models inside one another")
             for holder in scope.holder.children:
                 if holder.tag == "include":
-                    self._leave_out(holder)
+                    name = shown(holder.text_of("name") or holder.text_of("uri"))
+                    message = (
+                        f"<include> {name} is left out, it needs other files; with them: gz sdf -p FILE > whole.sdf"
+                    )
+                    self.options.tally.note_each(message, holder.line)
                 elif holder.tag == "state":
                     message = "<state> is left out: every model stands where its own pose has it"
                     self.options.tally.note_each(message, holder.line)
@@ -184,11 +189,6 @@ class SdfFrames:
             raise holder.error(f"{holder.tag} {shown(frame.name)} twice; {first}", "name")
         self.all[frame.name] = frame
         return frame
-
-    def _leave_out(self, include: XmlNode) -> None:
-        name = shown(include.text_of("name") or include.text_of("uri"))
-        message = f"<include> {name} is left out, it needs other files; with them: gz sdf -p FILE > whole.sdf"
-        self.options.tally.note_each(message, include.line)
 
     def _read_all(self) -> bool:
         """Read every frame; return whether some were left out because they build on what is included."""
@@ -329,12 +329,6 @@ def _product(way: Sequence[SdfFrame]) -> Rigid:
     return reduce(lambda outer, inner: rigid.compose(*outer, *inner), poses) if poses else IDENTITY
 
 
-def _version(root: XmlNode) -> tuple[int, ...]:
-    """Return the version of SDF as numbers; what is none counts as the newest."""
-    parts = root.attribute("version").split(".")
-    return tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else (2,)
-
-
 KINDS = {  # how many axes each has
     "revolute": 1, "continuous": 1, "prismatic": 1, "universal": 2, "revolute2": 2, "ball": 0, "fixed": 0,
     "screw": 0, "gearbox": 0,
@@ -444,21 +438,15 @@ class SdfJoints:
         x, y, z = xyz.numbers(3)
         if not (x or y or z):
             raise xyz.error(f"joint {shown(frame.local)} has the axis 0 0 0, which is no direction")
-        outer = frame
+        outer, version = frame, self.frames.version
         if name := xyz.attribute("expressed_in"):
             outer = self.frames.find(name, frame.scope, xyz, "expressed_in")
-        elif self._in_model(axis):
-            outer = frame.scope
+        elif version < (1, 5) or (version < (1, 7) and axis.text_of("use_parent_model_frame").lower() in TRUE):
+            outer = frame.scope  # before 1.5 an axis is seen from the model, until 1.6 where it says so
         if outer is not frame:
             turned = self.frames.relative(frame, outer)[3:]
             x, y, z = quaternion.rotate(*turned, x, y, z)
         return unit_vector(x, y, z, floats)
-
-    def _in_model(self, axis: XmlNode) -> bool:
-        """Tell whether an axis is seen from the model: in SDF before 1.5 always, until 1.6 where it says so."""
-        version = self.frames.version
-        flag = axis.text_of("use_parent_model_frame").lower() in TRUE
-        return version < (1, 5) or (flag and version < (1, 7))
 
     def _limit(self, limit: XmlNode | None, which: str) -> float | None:
         """Read one limit; None for none, which SDF writes as 1e16 or inf."""
@@ -548,8 +536,9 @@ class _SdfTree:
             rest, inverted = relative(joint.outer, frame), frame is joint.parent
             return Link(joint.outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
         outer = self._outer(frame)
-        if outer is self.frames.top and self._is_root(frame):
-            return Link(None, frame.name, line=line)
+        model = frame.below(self.frames.top)[-1]
+        if not self.in_world and outer is self.frames.top and model.kind == "model" and model.in_scope == IDENTITY:
+            return Link(None, frame.name, line=line)  # outside of any world, in a model without a pose in one
         return Link(outer.name, frame.name, relative(outer, frame), line=line)
 
     def _outer(self, frame: SdfFrame) -> SdfFrame:
@@ -567,11 +556,6 @@ class _SdfTree:
         """Return the link on which a model's frame hangs; None where its links hang on it."""
         link = self.joints.body(model)
         return link if link is not None and link.name in self.hung else None
-
-    def _is_root(self, frame: SdfFrame) -> bool:
-        """Tell whether a frame has no parent: outside of any world, in a model without a pose in one."""
-        way = frame.below(self.frames.top)
-        return not self.in_world and way[-1].kind == "model" and way[-1].in_scope == IDENTITY
 
     def _posture(self) -> Posture:
         """Return where the joints stand; values have the names that we have for joints: `tip` for `arm::tip`."""

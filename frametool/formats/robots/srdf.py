@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.documents.xml import Element
+    from frametool.documents.xml import Element, XmlNode
     from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Path
 
@@ -71,7 +71,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
                 groups = " or ".join(f"{file.name}:{group}/{state}" for group in states.get(state, ()))
                 message = f"joint {shown(joint)} has another value in line {before.line}; say which: {groups}"
                 raise xml.error(each.element, message, "value")
-            refuse = partial(_refused, xml, each.element)
+            refuse = partial(_refused, each)
             yield Setting(joint, _value(xml, each.element, value), None, refuse, Source(xml.name, ""), loose=True)
     if not first:
         raise _not_chosen(file.name, state, states)
@@ -89,8 +89,8 @@ def _value(xml: XmlFile, element: Element, text: str) -> Any:
     return {"xyz": texts[:3], "xyzw": texts[3:]}
 
 
-def _refused(xml: XmlFile, element: Element, problem: str, _below: Path) -> FormatError:
-    return xml.error(element, problem, "value")
+def _refused(node: XmlNode, problem: str, _below: Path) -> FormatError:
+    return node.error(problem, "value")
 
 
 def _not_chosen(name: str, state: str, states: dict[str, list[str]]) -> FormatError:
