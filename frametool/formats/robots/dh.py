@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.json import looks_like_json
-from frametool.documents.source import pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, shown
 from frametool.formats.robots.model import IDENTITY, Joint, Link
 from frametool.formats.robots.posture import Posture
+from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import euler, floats, rigid
 from frametool.grammar.readers import kind
 from frametool.text.csv_line import LineCell, split_line
@@ -209,18 +209,18 @@ def _of_lines(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
     columns = _columns(header)
     names = [column.name for column in columns.values()]
     if twice := next((name for name in names if names.count(name) > 1), None):
-        raise _line_error(file, number, 1, f"two columns for {twice}; keep one")
+        raise line_error(file, number, 1, f"two columns for {twice}; keep one")
     for number, line in lines[begin + 1 :]:
         if line.lstrip().startswith("#"):
             continue
         words = _split(line)
         if len(words) != len(_split(header)):
-            raise _line_error(file, number, 1, f"expected {len(_split(header))} cells, found {len(words)}")
+            raise line_error(file, number, 1, f"expected {len(_split(header))} cells, found {len(words)}")
         cells = {
-            column.name: Cell(words[at].text, column.unit, partial(_line_error, file, number, words[at].column))
+            column.name: Cell(words[at].text, column.unit, partial(line_error, file, number, words[at].column))
             for at, column in columns.items()
         }
-        yield cells, partial(_line_error, file, number, 1)
+        yield cells, partial(line_error, file, number, 1)
 
 
 def _columns(line: str) -> dict[int, Column]:
@@ -238,11 +238,6 @@ def _split(line: str) -> list[LineCell]:
     pattern = rf"[^{mark}]*" if mark else r"[^\s\[(]+(?: ?[\[(]\S+[\])])?(?: [-+] \S+)?"
     found = [LineCell(match[0].strip(), match.start() + 1) for match in re.finditer(pattern, line)]
     return found[:: 2 if mark and line.count(mark) + 1 < len(found) else 1]
-
-
-def _line_error(file: InputFile, line: int, column: int, message: str) -> FormatError:
-    text = file.text.split("\n")[line - 1].rstrip("\r")
-    return FormatError(message, source=file.name, line=line, column=column, snippet=pointer(text, column))
 
 
 def _of_documents(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:

@@ -23,7 +23,7 @@ from frametool.documents.source import Source, paused_collector
 from frametool.errors import BadTopology, FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
 from frametool.formats.load import Recording, refuse_unknown_joints
 from frametool.formats.table import FORMATS
-from frametool.frames.path import edges_between
+from frametool.frames.path import IDENTITY, edges_between
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.transform import Transform
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     Values: TypeAlias = Mapping[str, Value]
     Fail: TypeAlias = Callable[["Joint", str], FormatError]
 
-IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 TURNING = ("revolute", "continuous")
 POSED = ("planar", "floating", "ball")  # no single number says where these stand
 OUT_OF_PLANE = 1e-9

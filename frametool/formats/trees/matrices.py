@@ -18,6 +18,7 @@ from frametool.documents.yaml import TAG
 from frametool.errors import bare, shown
 from frametool.formats.table import DIRECTIONS
 from frametool.formats.trees.tree_reader import Unclear, dotted
+from frametool.frames.path import IDENTITY
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
@@ -338,7 +339,7 @@ class _Forest:
 
     def _above(self, frame: str) -> tuple[str, Rigid]:
         """Return the root above a frame, and the pose of the frame in it."""
-        pose: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        pose = IDENTITY
         while frame in self.edges:
             edge = self.edges[frame]
             pose, frame = rigid.compose(*edge.components, *pose), edge.parent or ""
