@@ -25,6 +25,7 @@ from frametool.formats.robots.model import TURNING, JointValue, followed, read_v
 from frametool.formats.table import FORMATS, readers
 from frametool.frames.stamps import format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
+from frametool.grammar import names as names_table
 from frametool.grammar.edges import Edge, Tally
 from frametool.grammar.readers import Misfit, Note, as_mapping, kind
 from frametool.ros import joint_state, messages
@@ -266,9 +267,6 @@ def _between(one: Value, two: Value, fraction: float) -> Value:
     return JointValue(one.plain + (two.plain - one.plain) * fraction)
 
 
-_STAMP = re.compile(
-    r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_(n?s))?(?:\s*[\[(]\s*(n?s)\s*[\])])?", re.IGNORECASE
-)
 _HOLDERS = ("joint", "joints", "position", "positions", "joint_positions")  # before a dot
 _UNIT = re.compile(rf"_({'|'.join((*ANGLES, *filter(None, LENGTHS)))})$")
 
@@ -309,13 +307,11 @@ def _joint_column(place: int, name: str, joints: Mapping[str, Joint]) -> JointCo
         return None
     if joint.posed:
         raise ValueInvalid(f"column {shown(name)}: joint {shown(joint.name)} is {joint.kind}, which no number says")
-    units = ("rad", "deg") if joint.kind in TURNING else tuple(filter(None, LENGTHS))
-    known = ANGLES if joint.kind in TURNING else LENGTHS
-    if unit and unit not in known:
+    turns = joint.kind in TURNING
+    if unit and unit not in (ANGLES if turns else LENGTHS):
+        units = ("rad", "deg") if turns else tuple(filter(None, LENGTHS))
         raise ValueInvalid(f"column {shown(name)}: joint {shown(joint.name)} is {joint.kind}; units: {listing(units)}")
-    if joint.kind in TURNING:
-        return JointColumn(place, bare_name, degrees=ANGLES.get(unit, False))
-    return JointColumn(place, bare_name, per_metre=LENGTHS[unit])
+    return JointColumn(place, bare_name, ANGLES.get(unit, False), 1.0 if turns else LENGTHS[unit])
 
 
 def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
@@ -334,10 +330,8 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
 
 def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, bool] | None:
     """Find the column of stamps: its place, and whether they are nanoseconds; None if there is none."""
-    for place, name in enumerate(names):
-        if name.strip() not in joints and (match := _STAMP.fullmatch(name.strip())):
-            return place, "ns" in (match[1], match[2])
-    return None
+    place = names_table.stamp_column("" if name.strip() in joints else name.strip() for name in names)
+    return None if place is None else (place, names_table.in_nanoseconds(names[place].strip()))
 
 
 def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
@@ -350,7 +344,6 @@ def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
     return ""
 
 
-TIMES = ("stamp", "stamp_ns", "time", "t")
 DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
 
 
@@ -443,7 +436,7 @@ class JointFile:
 
     def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
         """Yield what a map says, or the one map in it, as under `joints:`."""
-        times = [key for key in TIMES if key in mapping and key not in self.joints]
+        times = [key for key in names_table.STAMP_KEYS if key in mapping and key not in self.joints]
         stamp_ns = _time(mapping, times[0]) if times else None
         keys = [key for key in mapping if key not in times]
         if len(keys) == 1 and keys[0] not in self.joints and type(mapping[keys[0]]) is dict:
@@ -518,7 +511,7 @@ def _time(mapping: dict[str, Any], key: str) -> int:
     if type(text) is not str:
         raise Misfit(f"expected a time like 12.5, found {kind(text)}", (key,))
     try:
-        return parse_stamp(f"{text}ns" if key.endswith("_ns") else text)
+        return parse_stamp(f"{text}ns" if names_table.in_nanoseconds(key) else text)
     except ValueInvalid as error:
         raise Misfit(str(error), (key,)) from None
 
