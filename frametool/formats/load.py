@@ -13,7 +13,7 @@ from io import BytesIO
 from itertools import islice
 from operator import lt
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple, Protocol
 
 from frametool.documents.document import format_error, locate, locate_many
 from frametool.documents.source import InputFile, Source, paused_collector
@@ -38,7 +38,6 @@ TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from typing import BinaryIO, Protocol
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.types import Rigid

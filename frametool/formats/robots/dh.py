@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.json import looks_like_json
 from frametool.errors import FormatError, Unanswered, ValueInvalid, shown
-from frametool.formats.robots.model import IDENTITY, Joint, Link
+from frametool.formats.robots.model import Joint, Link
 from frametool.formats.robots.posture import Posture
 from frametool.formats.trees.tree_reader import line_error
+from frametool.frames.path import IDENTITY
 from frametool.geometry import euler, floats, rigid
 from frametool.grammar.readers import kind
 from frametool.text.csv_line import LineCell, split_line

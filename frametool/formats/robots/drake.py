@@ -21,7 +21,7 @@ from frametool.formats.trees.matrices import Stated, edges_of
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named
 from frametool.frames.path import IDENTITY
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import read_name
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, read_texts, within
 from frametool.grammar.rotation_spelling import rotation_of
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path, Quaternion, Reading
 
 TAGS = frozenset(("!Rpy", "!AngleAxis", "!Identity"))

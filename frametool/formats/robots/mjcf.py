@@ -16,13 +16,14 @@ puts aside that of its class.
 from __future__ import annotations
 
 from itertools import islice
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.source import Source
-from frametool.documents.xml import XmlFile, read_nodes
+from frametool.documents.source import InputFile, Source
+from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
-from frametool.formats.robots.model import IDENTITY, Joint, JointValue, Link
+from frametool.formats.robots.model import Joint, JointValue, Link
 from frametool.formats.robots.posture import Posture, Setting
+from frametool.frames.path import IDENTITY
 from frametool.geometry import axis_angle, floats, matrix, quaternion, rigid
 from frametool.geometry.quaternion import cross, unit_vector
 from frametool.geometry.trig import DEGREE, half_sincos, half_sincos_deg
@@ -30,10 +31,7 @@ from frametool.grammar.edges import Edge, Options, Tally, Topics
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
-    from typing import Any
 
-    from frametool.documents.source import InputFile
-    from frametool.documents.xml import XmlNode
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path, Quaternion, Vector
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 from functools import reduce
 from itertools import repeat
 from operator import and_
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source, paused_collector
@@ -39,7 +39,6 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
     from os import PathLike
-    from typing import Any, TypeAlias
 
     from frametool.documents.xml import Element, XmlFile
     from frametool.formats.robots.posture import Posture
@@ -137,17 +136,18 @@ def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
         value = rigid.turned(*joint.axis, number, xp, degrees=degrees)
     if not any(joint.anchor):
         return value
-    tx, ty, tz, *turn = value
+    tx, ty, tz, *_ = value
     px, py, pz = joint.anchor
-    mx, my, mz = quaternion.rotate(*turn, px, py, pz)
-    return tx + px - mx, ty + py - my, tz + pz - mz, *turn
+    mx, my, mz = quaternion.rotate(*value[3:], px, py, pz)
+    return tx + px - mx, ty + py - my, tz + pz - mz, *value[3:]
 
 
 def _is_at_rest(joint: Joint, value: Value) -> Condition:
     """Tell whether, or where, a joint moves nothing."""
     if not isinstance(value, JointValue):
         return value == IDENTITY
-    return value.number == (joint.rest * RADIAN if value.degrees else joint.rest)
+    at_rest: Condition = value.number == (joint.rest * RADIAN if value.degrees else joint.rest)
+    return at_rest
 
 
 class Link(NamedTuple):
@@ -216,8 +216,8 @@ def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = Fa
     if isinstance(value, (JointValue, float)):
         return value if isinstance(value, JointValue) else JointValue(value)
     if type(value) is not str:
-        unit = "metres, or 2cm" if joint.kind == "prismatic" else "radians, or 30deg"
-        raise Misfit(f"joint {shown(joint.name)} is {joint.kind}: expected {unit}, found {kind(value)}")
+        expected = "metres, or 2cm" if joint.kind == "prismatic" else "radians, or 30deg"
+        raise Misfit(f"joint {shown(joint.name)} is {joint.kind}: expected {expected}, found {kind(value)}")
     if joint.kind == "prismatic":
         return JointValue(parse_length(value))
     number, unit = parse_angle(value)

@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from frametool.documents.source import InputFile, Source
 from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
 from frametool.formats.detect import detect
-from frametool.formats.robots.model import TURNING, JointValue, followed, read_value
+from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
 from frametool.formats.table import FORMATS, readers
 from frametool.frames.stamps import format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar import names as names_table
-from frametool.grammar.edges import Edge, Tally
+from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.readers import Misfit, Note, as_mapping, kind
 from frametool.ros import joint_state, messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
@@ -36,9 +36,8 @@ from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.formats.robots.model import Fail, Joint, Link, Value
+    from frametool.formats.robots.model import Fail, Value
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path
 
     Series = Mapping[int, Value]

@@ -21,10 +21,11 @@ from functools import reduce
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.xml import XmlFile, read_nodes
+from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
-from frametool.formats.robots.model import IDENTITY, Joint, Link, Mimic, read_quaternion
+from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
 from frametool.formats.robots.posture import Posture
+from frametool.frames.path import IDENTITY
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.quaternion import unit_vector
 
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
-    from frametool.documents.xml import XmlNode
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Vector
@@ -75,11 +75,11 @@ def read_pose(holder: XmlNode, options: Options) -> tuple[Rigid, str]:
     relative_to = pose.attribute("relative_to")
     if not pose.text:
         return IDENTITY, relative_to
-    x, y, z, *turned = pose.numbers(7 if form == "quat_xyzw" else 6)
+    x, y, z, roll, pitch, yaw = pose.numbers(7 if form == "quat_xyzw" else 6)[:6]
     if form == "quat_xyzw":
         rotation = read_quaternion(pose.xml, pose.element, pose.text.split()[3:], options)
     else:
-        rotation = euler.to_quaternion(*turned, "sxyz", floats, degrees=degrees)
+        rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats, degrees=degrees)
     return (x, y, z, *rotation), relative_to
 
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.source import Source
-from frametool.documents.xml import XmlFile, read_nodes
+from frametool.documents.source import InputFile, Source
+from frametool.documents.xml import Element, XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, Unanswered, alternatives, shown
 from frametool.formats.robots.model import Joint, Link
 from frametool.formats.robots.posture import Posture, Setting
@@ -21,8 +21,6 @@ from frametool.formats.robots.posture import Posture, Setting
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.documents.source import InputFile
-    from frametool.documents.xml import Element, XmlNode
     from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Path
 

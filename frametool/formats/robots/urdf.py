@@ -15,32 +15,28 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.source import UTF16
-from frametool.documents.xml import XmlFile, read_nodes
+from frametool.documents.source import UTF16, InputFile
+from frametool.documents.xml import Element, XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, ValueInvalid, alternatives, bare, listing, shown
-from frametool.formats.robots.model import IDENTITY, Joint, Link, Mimic, read_quaternion
+from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
+from frametool.frames.path import IDENTITY
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import Note
-from frametool.grammar.result import rotation_numbers
+from frametool.grammar.result import Style, rotation_numbers
 from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.documents.source import InputFile
-    from frametool.documents.xml import Element, XmlNode
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Vector
-    from frametool.grammar.result import Style
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
@@ -235,7 +231,7 @@ class _Reader:
 _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return the robot.
 
     Raises ValueInvalid for what URDF cannot hold: frames that move, several roots, names that XML has no letters for.

@@ -15,17 +15,15 @@ from frametool.errors import listing, shown, warn
 from frametool.formats.trees.tree_reader import XYZ, document_edges, read_flat_pose
 from frametool.formats.trees.written_poses import Precision, angles_of, standing_edges, tell_lonely_roots
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
-from frametool.grammar.readers import Misfit, as_mapping, within
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.readers import Misfit, Reading, as_mapping, within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Path, Reading
+    from frametool.frames.lookups import Frames
+    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
 NAME = "autoware"
@@ -58,7 +56,7 @@ def _edge(parent: str, child: str, pose: Any, reading: Reading) -> Edge:
     return Edge(parent, child, read_flat_pose(pose, _RPY, reading), path=(parent, child))
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return a map a parent; raises ValueInvalid for frames that move."""
     precision = Precision(NAME, "x y z roll pitch yaw")
     texts: dict[str, list[str]] = {}

@@ -24,17 +24,15 @@ from frametool.formats.trees.matrices import TAGS, FrameNames, Matrices, made_or
 from frametool.formats.trees.tree_reader import document_edges
 from frametool.formats.trees.written_poses import Precision, rows_of, standing_edges
 from frametool.geometry import rigid
-from frametool.grammar.readers import as_mapping
+from frametool.grammar.readers import Reading, as_mapping
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.formats.load import Recording
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge, Options
-    from frametool.grammar.readers import Reading
     from frametool.grammar.result import Style
 
 NAME = "camchain"
@@ -71,7 +69,7 @@ def sensor_name(path: str) -> str:
     return (os.path.basename(folder) if stem == "sensor" else stem) or "sensor"
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return a block a camera; raises ValueInvalid for several trees, and for frames that move.
 
     Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of cameras alone,
@@ -101,7 +99,7 @@ def _tell(root: str, edges: list[tuple[str, str, Rigid]]) -> None:
         warn(f"Kalibr calls cameras cam0, cam1 ..; these keep their names: {listing(others)}")
 
 
-def _star(tree: FrameTree | TransformBuffer, root: str, precision: Precision, style: Style) -> str:
+def _star(tree: Frames, root: str, precision: Precision, style: Style) -> str:
     """Write every frame as seen from the root, in both directions."""
     text = ""
     for frame in tree.frames:
@@ -114,7 +112,7 @@ def _star(tree: FrameTree | TransformBuffer, root: str, precision: Precision, st
     return text
 
 
-def _chain(tree: FrameTree | TransformBuffer, cameras: list[str], precision: Precision, style: Style) -> str:
+def _chain(tree: Frames, cameras: list[str], precision: Precision, style: Style) -> str:
     """Write every camera as seen from the next; Kalibr's first camera has no pose."""
     text, before = "", ""
     for frame in sorted(cameras, key=lambda name: int(name[3:])):

@@ -11,13 +11,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.frames.edge_log import cache_entries
-from frametool.grammar.result import edge_label, graphviz
+from frametool.frames.edge_log import CacheEntry, cache_entries
+from frametool.grammar.result import Style, edge_label, graphviz
 
 if TYPE_CHECKING:
-    from frametool.frames.edge_log import CacheEntry
     from frametool.frames.lookups import Frames
-    from frametool.grammar.result import Style
 
 
 def write_tree(tree: Frames, style: Style) -> str:

@@ -19,19 +19,16 @@ from frametool.formats.trees.tree_reader import XYZ, document_edges, named, read
 from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
-from frametool.grammar.readers import Misfit, as_mapping, kind, within
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, within
 from frametool.ros.message_parts import only, read_rigid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Reading
     from frametool.grammar.result import Style
 
 NAME = "handeye"
@@ -91,7 +88,7 @@ def _pose(pose: dict[str, Any], reading: Reading) -> Rigid:
     return read_flat_pose(pose, _XYZW, reading)
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return the one edge of a tree as easy_handeye has it, as if on the hand; raises ValueInvalid for other trees."""
     edges = standing_edges(tree, NAME)
     if len(edges) != 1:

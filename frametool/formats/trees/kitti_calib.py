@@ -20,7 +20,7 @@ from frametool.formats.trees.matrices import MATRIX
 from frametool.formats.trees.tree_reader import line_error
 from frametool.frames.path import IDENTITY
 from frametool.geometry import rigid
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Reading
 from frametool.grammar.rotation_spelling import rotation_of
 from frametool.text.numbers import parse_number
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Quaternion
 
 CAMERAS = ("cam0", "cam1", "cam2", "cam3")

@@ -15,20 +15,18 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, locate_many, parse_documents
-from frametool.documents.source import Source
+from frametool.documents.source import InputFile, Source
 from frametool.documents.xml import XmlFile
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.detect import Beginning
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Misfit, Reading, kind
 from frametool.ros import publisher
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
-    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
@@ -110,20 +108,22 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 def _edge(action: Action, file: InputFile, options: Options) -> Edge | None:
     """Read the arguments of one call; None if they are wrong and reading goes on behind the error."""
     reading = Reading(Source(file.name, ""), normalize=options.normalize)
-    read_arguments = publisher.read_call if isinstance(action.arguments, str) else publisher.read_words
+    arguments, line = action.arguments, action.line
     try:
-        pose = read_arguments(action.arguments, reading)  # type: ignore[operator]
+        if isinstance(arguments, str):
+            pose = publisher.read_call(arguments, reading)
+        else:
+            pose = publisher.read_words(arguments, reading)
     except ValueInvalid as error:
-        place = {"line": action.line, "column": action.column}
-        options.report(FormatError(str(error), source=file.name, rule=error.rule, **place))
+        options.report(FormatError(str(error), source=file.name, line=line, column=action.column, rule=error.rule))
         return None
     parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
     for note in reading.notes:
-        options.tally.note(note, action.line)
+        options.tally.note(note, line)
     if action.conditions:
         conditions = " and ".join(dict.fromkeys(action.conditions))
-        options.tally.note_each(f"frame {shown(child)} is published under a condition: {conditions}", action.line)
-    return Edge(parent, child, pose.components, line=action.line)
+        options.tally.note_each(f"frame {shown(child)} is published under a condition: {conditions}", line)
+    return Edge(parent, child, pose.components, line=line)
 
 
 def _actions(file: InputFile) -> Iterator[Action]:

@@ -106,8 +106,10 @@ def evaluate(node: ast.expr, scope: Bindings) -> Literal:
                 value = -number if isinstance(sign, ast.USub) else number
         case ast.BinOp(op=ast.Add(), left=left, right=right):  # of texts or lists; sums are arithmetic
             match evaluate(left, scope), evaluate(right, scope):
-                case (str() as one, str() as other) | (list() as one, list() as other):
+                case str() as one, str() as other:
                     value = one + other
+                case list() as first, list() as second:
+                    value = first + second
         case ast.Call(func=ast.Name(id="str"), args=[argument], keywords=[]):
             value = _text_of(evaluate(argument, scope))
         case ast.Call(func=ast.Attribute(attr="split", value=text), args=arguments, keywords=[]):

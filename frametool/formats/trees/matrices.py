@@ -21,8 +21,8 @@ from frametool.formats.trees.tree_reader import Unclear, dotted
 from frametool.frames.path import IDENTITY
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
-from frametool.grammar.readers import Misfit, kind, read_numbers, within
+from frametool.grammar.edges import Answers, Edge, Tally
+from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AGREEMENT, read_spelled, rotation_of
 
 if TYPE_CHECKING:
@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Answers, Tally
-    from frametool.grammar.readers import Path, Quaternion, Reading
+    from frametool.grammar.readers import Path, Quaternion
 
 # pattern of the key, target, source; <a> and <b> stand for names in it, {..} for what the file or the user names:
 # {me} the block that the key stands in, {before} the camera before it, {imu} {body} what all of them are seen from

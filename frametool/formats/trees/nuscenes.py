@@ -21,16 +21,15 @@ from frametool.formats.trees.matrices import grid_of, read_turn
 from frametool.formats.trees.tree_reader import document_edges
 from frametool.frames.path import IDENTITY
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
-from frametool.grammar.readers import INDICES, Misfit, as_mapping, kind, read_numbers, within
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Path, Quaternion, Reading
+    from frametool.grammar.readers import Path, Quaternion
 
 NAMES = "sensor.json"
 _WXYZ = notation("wxyz")

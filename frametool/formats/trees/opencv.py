@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.xml import XmlFile
+from frametool.documents.xml import Element, XmlFile
 from frametool.documents.yaml_writer import flow
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.trees.matrices import HEAD, TAGS, FrameNames, Matrices, Meaning, made_ordinary, meaning_of
@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.documents.xml import Element
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
@@ -119,7 +117,7 @@ class StoredXml:
         return found
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return a matrix an edge, called `parent_T_child`; raises ValueInvalid for names that OpenCV does not take."""
     precision = Precision(NAME, "matrices")
     text = f"{HEAD}\n---\n"

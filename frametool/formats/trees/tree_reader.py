@@ -16,24 +16,22 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.documents.source import Pasted, pointer
+from frametool.documents.source import InputFile, Pasted, Source, pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown, warn
 from frametool.frames.path import IDENTITY
 from frametool.frames.stamps import parse_stamp
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
-from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, read_numbers, within
+from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import rotation_of
 from frametool.ros import messages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
 
-    from frametool.documents.source import InputFile, Source
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options, Tally
-    from frametool.grammar.readers import Note, Path
+    from frametool.grammar.readers import Path
 
     Take = Callable[[Any, Reading], Iterable[Edge]]
 

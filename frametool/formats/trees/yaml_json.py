@@ -12,13 +12,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.grammar.result import tree_entries
+from frametool.grammar.result import Result, Style, tree_entries
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frametool.frames.lookups import Frames
-    from frametool.grammar.result import Result, Style
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
