@@ -282,8 +282,9 @@ class Assembly:
                 self._record(self._moving(), parent, child, components, stamp_ns, place)
         except BadTopology as error:
             raise self._placed(error, parent, child, place) from None
-        except Refused as refused:
-            tell_rejected(refused.lines)
+        except Refused as refused:  # in the words that tf2 logs when it drops a transform
+            for line in refused.lines:
+                warn(line, kind=Tf2Warning)
         except ValueInvalid as error:
             raise place.error(str(error), FormatError) from None
 
@@ -418,12 +419,6 @@ class Assembly:
             else:
                 message = f"{error}: {first} and {second}"
         return place.error(message, BadTopology)
-
-
-def tell_rejected(lines: list[str]) -> None:
-    """Warn in the words that tf2 logs when it drops a transform."""
-    for line in lines:
-        warn(line, kind=Tf2Warning)
 
 
 class EdgePlace(NamedTuple):

@@ -299,7 +299,7 @@ TURN = 6.283185307179586
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a row, its joint as told, else at 0."""
+    """Yield an edge a row, its joint as options say, else at 0."""
     rows = rows_of(file)
     if not options.answers.dh:
         choice = "--dh standard (a and alpha behind the joint) or --dh modified (Craig: before it)"

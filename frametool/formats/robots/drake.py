@@ -53,7 +53,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             raise Misfit(f"expected directives as a list, found {kind(listed)}", ("directives",))
         for index, entry in enumerate(listed):
             within(("directives", index), scene.take, entry, ("directives", index))
-        options.tally.about = scene.about
+        about = f"without the frames of {listing(scene.missing, 3)} (--with their files, by name)"
+        options.tally.about = about if scene.missing else f"{len(scene.poses)} poses"
         # of directives that only add models something is known too: Drake's world is always there
         return edges_of(scene.poses, reading) or [Edge(None, WORLD, IDENTITY)]
 
@@ -69,13 +70,6 @@ class _Scene:
         self.poses: list[Stated] = []
         self.missing: list[str] = []
         self.aliases: dict[str, str] = {}  # an added frame with the scope of what it is fixed to -> as it was written
-
-    @property
-    def about(self) -> str:
-        """Say which models are not there."""
-        if not self.missing:
-            return f"{len(self.poses)} poses"
-        return f"without the frames of {listing(self.missing, 3)} (--with their files, by name)"
 
     def take(self, entry: Any, path: Path) -> None:
         """Read one directive; raises Misfit."""
@@ -164,18 +158,14 @@ class _Scene:
     def _state(self, parent: str, child: str, pose: dict[str, Any], path: Path, depth: int) -> None:
         """Keep a pose; misfits in it are placed below the directive."""
         self.reading.here = path
-        self._add(parent, child, within(path[depth:], _pose, pose, self.reading), path)
+        within(path[depth:], only, pose, ("base_frame", "translation", "rotation"))
+        shift = within((*path[depth:], "translation"), read_numbers, pose.get("translation", _ZEROS), XYZ)
+        turn = within((*path[depth:], "rotation"), _rotation, pose.get("rotation", {}), self.reading)
+        self._add(parent, child, (*shift, *turn), path)
 
     def _add(self, parent: str, child: str, pose: Rigid, path: Path) -> None:
         parent, child = (self.aliases.get(name, name) for name in (parent, child))
         self.poses.append(Stated(parent, child, child, pose, path, firm=True))
-
-
-def _pose(pose: dict[str, Any], reading: Reading) -> Rigid:
-    """Read {translation, rotation}; what is missing is 0 and the identity."""
-    only(pose, ("base_frame", "translation", "rotation"))
-    shift = within(("translation",), read_numbers, pose.get("translation", _ZEROS), XYZ)
-    return (*shift, *within(("rotation",), _rotation, pose.get("rotation", {}), reading))
 
 
 def _rotation(value: Any, reading: Reading) -> Quaternion:

@@ -84,11 +84,6 @@ class MjcfModel:
         for section in root.all("worldbody"):
             self._walk(section)
 
-    @property
-    def in_qpos(self) -> list[Joint]:
-        """Return all joints in their order there: those of a body before those of the bodies in it."""
-        return [joint for link in self.links.values() for joint in link.joints]
-
     def _refuse(self, node: XmlNode) -> None:
         """Refuse what MuJoCo would have to expand first."""
         for child in node.all(*REFUSED):
@@ -198,7 +193,7 @@ SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others hav
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a model, its joints as told, else at their references."""
+    """Yield the edges of a model, its joints as options say, else at their references."""
     model = MjcfModel(read_nodes(XmlFile(file), HELD), options)
     yield from Posture.of(model.links.values(), options).edges(model.links.values())
 
@@ -213,7 +208,8 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
     finally:
         file.close()
     root = read_nodes(xml, HELD)
-    joints = MjcfModel(root, Options(Tally(), Topics())).in_qpos
+    links = MjcfModel(root, Options(Tally(), Topics())).links.values()
+    joints = [joint for link in links for joint in link.joints]  # a body's before those of the bodies in it
     key = _key(root, state)
     if not key.attribute("qpos"):
         raise key.error(f"key {shown(state)} has no qpos")

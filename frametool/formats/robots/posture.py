@@ -422,16 +422,15 @@ class JointFile:
         else:
             try:
                 mapping = as_mapping(value, "a map of joints, or a JointState")
-                read = self._state if joint_state.is_joint_state(mapping) else self._map
-                yield from read(mapping, path, message)
+                if not joint_state.is_joint_state(mapping):
+                    yield from self._map(mapping, path, message)
+                    return
+                stamp_ns = joint_state.stamp_of_state(mapping)
+                for joint, position, place in joint_state.positions(mapping):
+                    refuse = partial(_refused, message, (*path, *place))
+                    yield Setting(joint, _finite(position, place), stamp_ns, refuse, message.source)
             except Misfit as misfit:
                 raise misfit.below(*path) from None
-
-    def _state(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
-        stamp_ns = joint_state.stamp_of_state(mapping)
-        for joint, position, place in joint_state.positions(mapping):
-            number = _finite(position, place)
-            yield Setting(joint, number, stamp_ns, partial(_refused, message, (*path, *place)), message.source)
 
     def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
         """Yield what a map says, or the one map in it, as under `joints:`."""

@@ -237,35 +237,35 @@ class SdfFrames:
             return self.top
         return self.find(holder.text, joint.scope, holder, "")
 
-    def find(self, told: str, scope: SdfFrame, holder: XmlNode, attribute: str) -> SdfFrame:
-        """Return the frame that a name means in a scope.
+    def find(self, name: str, scope: SdfFrame, holder: XmlNode, attribute: str) -> SdfFrame:
+        """Return the frame that a full means in a scope.
 
         Raises FormatError with the names there are.
         """
-        if told == (INSIDE if scope.kind == "model" else WORLD):
+        if name == (INSIDE if scope.kind == "model" else WORLD):
             return scope
-        name = told if scope.kind == WORLD else f"{scope.name}::{told}"
-        found = self.all.get(name) or self.all.get(name.removesuffix(f"::{INSIDE}"))
+        full = name if scope.kind == WORLD else f"{scope.name}::{name}"
+        found = self.all.get(full) or self.all.get(full.removesuffix(f"::{INSIDE}"))
         if found is not None and found is not self.top:
             return found
         place = "the world" if scope.kind == WORLD else f"model {shown(scope.name)}"
-        message = f"no frame {shown(told)} in {place}"
-        if self._is_left_out(told, name, scope):
+        message = f"no frame {shown(name)} in {place}"
+        if self._is_left_out(name, full, scope):
             self.missing = holder.error(message, attribute)
             raise self.missing
-        if told == WORLD:
+        if name == WORLD:
             raise holder.error(f"{message}; poses in a model are relative to frames of the model", attribute)
         inside = [frame.local for frame in self.all.values() if frame.scope is scope and frame is not scope]
-        raise holder.error(f"{message}{alternatives(told, inside, 'frames')}", attribute)
+        raise holder.error(f"{message}{alternatives(name, inside, 'frames')}", attribute)
 
-    def _is_left_out(self, told: str, name: str, scope: SdfFrame) -> bool:
-        """Tell whether a name is one that was left out, or begins with that of an included model."""
-        if any(name == gone or name.startswith(f"{gone}::") for gone in self.gone):
+    def _is_left_out(self, name: str, full: str, scope: SdfFrame) -> bool:
+        """Tell whether a full is one that was left out, or begins with that of an included model."""
+        if any(full == gone or full.startswith(f"{gone}::") for gone in self.gone):
             return True
         for include in scope.holder.all("include"):
             file = include.text_of("uri").rstrip("/").rsplit("/", 1)[-1]
             names = (include.text_of("name"), file, file.rsplit(".", 1)[0])
-            if told.split("::", maxsplit=1)[0] in names or include.attribute("merge") == "true":
+            if name.split("::", maxsplit=1)[0] in names or include.attribute("merge") == "true":
                 return True
         return False
 
@@ -280,7 +280,10 @@ class SdfFrames:
             if current.in_scope is not None:
                 pending.pop()
                 continue
-            needed = [each for each in self._needed(current) if each.in_scope is None]
+            needed = self._between(current.relative_to, current.scope)
+            if current.placement:
+                needed = needed + current.placement.below(current)
+            needed = [each for each in needed if each.in_scope is None]
             if not needed:
                 current.in_scope = self._worked_out(current)
             elif current.open or any(each.open for each in needed):
@@ -290,11 +293,6 @@ class SdfFrames:
             else:
                 current.open = True
                 pending += needed
-
-    def _needed(self, frame: SdfFrame) -> list[SdfFrame]:
-        """Return the frames whose poses make up that of a frame."""
-        needed = self._between(frame.relative_to, frame.scope)
-        return needed + (frame.placement.below(frame) if frame.placement else [])
 
     def _between(self, frame: SdfFrame, scope: SdfFrame) -> list[SdfFrame]:
         """Return the frames between one and a scope: those below that, or above it where the frame is the world."""
@@ -386,9 +384,9 @@ class SdfJoints:
 
     def canonical(self, model: SdfFrame) -> SdfFrame | None:
         """Return the link that a model's frame is attached to: the one it names, or the first, also of nested ones."""
-        if told := model.holder.attribute("canonical_link"):
+        if name := model.holder.attribute("canonical_link"):
             try:
-                return self.frames.find(told, model, model.holder, "canonical_link")
+                return self.frames.find(name, model, model.holder, "canonical_link")
             except FormatError as error:
                 if error is not self.frames.missing:
                     raise
@@ -475,7 +473,7 @@ class SdfJoints:
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a world or model, its joints as told, else where the file has them."""
+    """Yield the edges of a world or model, its joints as options say, else where the file has them."""
     yield from _SdfTree(SdfFrames(read_nodes(XmlFile(file), HELD), options)).edges()
 
 
@@ -492,10 +490,14 @@ class _SdfTree:
             self._hang(joint)
         ends = [end for joint in joints.all for end in (joint.parent, joint.child)]
         self.in_world = frames.top.holder.tag == "world" or frames.top in ends
-        self.carried = {model.name: self._carrier(model) for model in frames.all.values() if model.kind == "model"}
+        self.carried: dict[str, SdfFrame] = {}  # model -> the link on which its frame hangs, not its links on it
+        for model in frames.all.values():
+            link = joints.body(model) if model.kind == "model" else None
+            if link is not None and link.name in self.hung:
+                self.carried[model.name] = link
 
     def _hang(self, joint: SdfJoint) -> None:
-        """Let a link hang on a joint; one that would close a loop is left out, and told."""
+        """Let a link hang on a joint; one that would close a loop is left out, with a note."""
         link = joint.hanging.name
         if link in self.hung:
             where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
@@ -548,14 +550,9 @@ class _SdfTree:
         if link := self.carried.get(frame.name):
             return link
         scope = frame.scope  # the nearest model around it that no joint moves, or the world
-        while self.carried.get(scope.name):
+        while scope.name in self.carried:
             scope = scope.scope
         return scope
-
-    def _carrier(self, model: SdfFrame) -> SdfFrame | None:
-        """Return the link on which a model's frame hangs; None where its links hang on it."""
-        link = self.joints.body(model)
-        return link if link is not None and link.name in self.hung else None
 
     def _posture(self) -> Posture:
         """Return where the joints stand; values have the names that we have for joints: `tip` for `arm::tip`."""

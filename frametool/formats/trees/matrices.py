@@ -239,12 +239,6 @@ def whole_pose(grid: Grid | None, *, twelve: bool) -> Grid | None:
     return Grid(4, 4, [*grid.texts, *LAST_ROW[:missing]], [*grid.places, *[()] * missing])
 
 
-def read_whole(grid: Grid, reading: Reading) -> Rigid:
-    """Read a 4x4 matrix as x, y, z, qx, qy, qz, qw, checked by the rules of the grammar; raises Misfit."""
-    position, rotation = read_spelled(MATRIX, grid.texts, grid.places, reading)
-    return (*(position or (0.0, 0.0, 0.0)), *rotation)
-
-
 def read_turn(grid: Grid, reading: Reading) -> Quaternion:
     """Read a 3x3 matrix, or a rotation vector of three numbers in radians; raises Misfit."""
     if grid.holds(3):
@@ -456,15 +450,15 @@ class Matrices:
         if whole is None or (not says and no_pose(key)):
             self._leave(path, value, grid)
             return None
-        if meaning is None or not says:
+        if not says and not isinstance(meaning, Ambiguous):
             meaning = self._directed(block, key, path, meaning)
         if isinstance(meaning, Ambiguous):
             ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
             raise Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {ways}", path, key=True)
         if "" in (meaning.target, meaning.source):
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
-        components = within(path, read_whole, whole, self.reading)
-        return Stated(*meaning[:3], components, path, chained=key == "T_cn_cnm1")
+        position, rotation = within(path, read_spelled, MATRIX, whole.texts, whole.places, self.reading)
+        return Stated(*meaning[:3], (*(position or IDENTITY[:3]), *rotation), path, chained=key == "T_cn_cnm1")
 
     def _known(self, block: MatrixBlock) -> dict[str, str]:
         """Return the names that the templates of the table stand for."""
@@ -483,12 +477,8 @@ class Matrices:
         earlier = [*beside.values()][: [*beside].index(own)] if own in beside else []
         return earlier[-1] if earlier else ""
 
-    def _directed(
-        self, block: MatrixBlock, key: str, path: Path, named: Meaning | Ambiguous | None
-    ) -> Meaning | Ambiguous:
-        """Return what a key means that does not say its direction, as it was told; raises Unclear if it was not."""
-        if isinstance(named, Ambiguous):
-            return named
+    def _directed(self, block: MatrixBlock, key: str, path: Path, named: Meaning | None) -> Meaning:
+        """Return what a key means that does not say its direction, as options say; raises Unclear if they do not."""
         if named is not None:
             parent, child = named.target, named.source
         else:

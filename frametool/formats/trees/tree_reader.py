@@ -5,9 +5,8 @@
     {name: lidar, parent: base, xyz: [0.9, 0, 2]}                             one edge, as `lookup` prints it
     {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a frame that moves; seconds
 
-Metres, radians unless said; every pose is that of the frame in its parent: parent_from_child.
-
-What forms in YAML and JSON share: each document through one function, what is wrong or odd with its place.
+Metres, radians unless a key says degrees; every pose is that of the frame in its parent: parent_from_child.  What other
+forms in YAML and JSON read their documents with stands below, and knows nothing of their keys.
 """
 
 from __future__ import annotations
