@@ -238,7 +238,7 @@ class SdfFrames:
         return self.find(holder.text, joint.scope, holder, "")
 
     def find(self, name: str, scope: SdfFrame, holder: XmlNode, attribute: str) -> SdfFrame:
-        """Return the frame that a full means in a scope.
+        """Return the frame that a name means in a scope.
 
         Raises FormatError with the names there are.
         """
@@ -259,7 +259,7 @@ class SdfFrames:
         raise holder.error(f"{message}{alternatives(name, inside, 'frames')}", attribute)
 
     def _is_left_out(self, name: str, full: str, scope: SdfFrame) -> bool:
-        """Tell whether a full is one that was left out, or begins with that of an included model."""
+        """Tell whether a name is one that was left out, or begins with that of an included model."""
         if any(full == gone or full.startswith(f"{gone}::") for gone in self.gone):
             return True
         for include in scope.holder.all("include"):

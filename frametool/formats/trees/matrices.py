@@ -450,11 +450,11 @@ class Matrices:
         if whole is None or (not says and no_pose(key)):
             self._leave(path, value, grid)
             return None
-        if not says and not isinstance(meaning, Ambiguous):
-            meaning = self._directed(block, key, path, meaning)
         if isinstance(meaning, Ambiguous):
             ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
             raise Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {ways}", path, key=True)
+        if meaning is None or not meaning.said:
+            meaning = self._directed(block, key, path, meaning)
         if "" in (meaning.target, meaning.source):
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
         position, rotation = within(path, read_spelled, MATRIX, whole.texts, whole.places, self.reading)
