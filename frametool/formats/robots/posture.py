@@ -25,7 +25,6 @@ from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, fol
 from frametool.formats.table import FORMATS, readers
 from frametool.frames.stamps import format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
-from frametool.grammar import names as names_table
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.readers import Misfit, Note, as_mapping, kind
 from frametool.ros import joint_state, messages
@@ -329,8 +328,10 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
 
 def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, bool] | None:
     """Find the column of stamps: its place, and whether they are nanoseconds; None if there is none."""
-    place = names_table.stamp_column("" if name.strip() in joints else name.strip() for name in names)
-    return None if place is None else (place, names_table.in_nanoseconds(names[place].strip()))
+    from frametool.grammar import names as known
+
+    place = known.stamp_column("" if name.strip() in joints else name.strip() for name in names)
+    return None if place is None else (place, known.in_nanoseconds(names[place].strip()))
 
 
 def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
@@ -434,7 +435,9 @@ class JointFile:
 
     def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
         """Yield what a map says, or the one map in it, as under `joints:`."""
-        times = [key for key in names_table.STAMP_KEYS if key in mapping and key not in self.joints]
+        from frametool.grammar.names import STAMP_KEYS
+
+        times = [key for key in STAMP_KEYS if key in mapping and key not in self.joints]
         stamp_ns = _time(mapping, times[0]) if times else None
         keys = [key for key in mapping if key not in times]
         if len(keys) == 1 and keys[0] not in self.joints and type(mapping[keys[0]]) is dict:
@@ -509,7 +512,7 @@ def _time(mapping: dict[str, Any], key: str) -> int:
     if type(text) is not str:
         raise Misfit(f"expected a time like 12.5, found {kind(text)}", (key,))
     try:
-        return parse_stamp(f"{text}ns" if names_table.in_nanoseconds(key) else text)
+        return parse_stamp(f"{text}ns" if key.endswith("_ns") else text)
     except ValueInvalid as error:
         raise Misfit(str(error), (key,)) from None
 
