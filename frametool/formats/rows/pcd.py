@@ -450,7 +450,9 @@ class PcdFile:
         same = same_columns(columns, self.width)
         fields = self.head.fields if same else self._fields(columns)
         kind = self.record if same else _columns_of(fields, padded=True)[1]
-        return PcdWriter(columns, self.record.names or (), kind, count=count, head=_Rewritten(self, fields), cloud=self)
+        return PcdWriter(
+            columns, self.record.names or (), kind, count=count, head=_Rewritten(self, fields), cloud=self
+        )
 
     def _fields(self, columns: Sequence[OutColumn]) -> tuple[PcdField, ...]:
         """Return the fields of an output; columns of one field that stay together stay one."""
