@@ -314,11 +314,12 @@ def test_a_step_of_half_a_turn_is_told_because_poses_between_go_the_other_way(ar
 def test_joints_that_move_together_are_interpolated_at_each_others_times() -> None:
     series = {"a": {0: 0.0, 10: 1.0}, "b": {5: 0.5, 15: 2.5}}
     options = Options(Tally(), Topics())
-    found = Posture([Joint(name, "prismatic") for name in "ab"], options, lambda *_: FormatError(""))
+    joints = [Joint(name, "prismatic") for name in "ab"]
+    found = Posture(joints, options, lambda *_: FormatError(""))
     for name, values in series.items():
         found.still.pop(name)
         found.moving[name] = {at: JointValue(value) for at, value in values.items()}
-    steps = {at: tuple(value.number for value in both) for at, both in found.values("a", "b")}
+    steps = {at: tuple(motion(joint, value)[0] for joint, value in zip(joints, both, strict=True)) for at, both in found.values("a", "b")}
     assert steps == {5: (0.5, 0.5), 10: (1.0, 1.5)}
     found.moving["b"] = {20: JointValue(0.0), 30: JointValue(1.0)}
     with pytest.raises(FormatError, match="joints a, b move one frame and have no time in common"):

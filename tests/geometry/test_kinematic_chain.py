@@ -22,12 +22,19 @@ POSES = [
 ]
 
 
+def moved(axis: Any, value: Any, xp: Any, *, degrees: bool = False) -> Any:
+    """Give what a joint that turns and one that slides do."""
+    x, y, z = axis
+    return turned(x, y, z, value, xp, degrees=degrees), slid(x, y, z, value)
+
+
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("pose", POSES)
 @pytest.mark.parametrize("value", ANGLES)
 def test_a_step_is_the_product_to_the_bit(axis: Any, pose: Any, value: float) -> None:
-    for piece in (turned(*axis, value, floats), slid(*axis, value), *POSES):
-        assert go_on(pose, piece) == rigid.compose(*pose, *piece)
+    both: Any = rigid.compose
+    for piece in (*moved(axis, value, floats), *POSES):
+        assert go_on(pose, piece) == both(*pose, *piece)
 
 
 @pytest.mark.parametrize("unit", ["degrees", "radians"])
@@ -38,7 +45,7 @@ def test_floats_and_arrays_take_the_same_steps_to_the_bit(axis: Any, unit: str) 
     def walk(value: Any, xp: Any) -> Any:
         pose = POSES[0]
         for piece in POSES:
-            for step in (turned(*axis, value, xp, degrees=unit == "degrees"), slid(*axis, value), piece):
+            for step in (*moved(axis, value, xp, degrees=unit == "degrees"), piece):
                 pose = go_on(pose, step)
         return pose
 
