@@ -242,33 +242,37 @@ class XmlNode:
         return self.xml.numbers_in(self.text, self.element, "", count)
 
 
-def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = "") -> XmlNode:
+def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = "", *, texts: bool = True) -> XmlNode:
     """Return the root element with what is kept below it.
 
     held: the elements that are kept in each element, the root first; of all others nothing is.
-    form: what a file with another root is not
+    form: what a file with another root is not.  texts: without them it is faster.
     Raises FormatError.
     """
     top = next(iter(held))
+    root: XmlNode | None = None
     opened: list[XmlNode] = []
     skipped = 0  # the depth below which nothing is kept
-    for element in xml.elements():
+    for element in xml.elements(DEEPEST_ELEMENT if texts else len(held) + 1, ends=texts):
         if skipped and element.depth > skipped:
             continue
         skipped = 0
+        if element.ends and opened and opened[-1].element.depth == element.depth:
+            opened[-1].text = element.text.strip()
+        while opened and opened[-1].element.depth >= element.depth:
+            opened.pop()
         if element.ends:
-            if opened and opened[-1].element.depth == element.depth:
-                ended = opened.pop()
-                ended.text = element.text.strip()
-                root = ended
-        elif not opened and element.tag != top:
+            continue
+        if root is None and element.tag != top:
             expected = f"{form} begins with <{top}>" if form else f"expected <{top}>"
             raise xml.error(element, f"{expected}, found <{bare(element.tag)}>")
-        elif opened and element.tag not in held.get(opened[-1].tag, ()):
+        if opened and element.tag not in held.get(opened[-1].tag, ()):
             skipped = element.depth
-        else:
-            made = XmlNode(element, xml)
-            if opened:
-                opened[-1].children.append(made)
-            opened.append(made)
+            continue
+        node = XmlNode(element, xml)
+        if opened:
+            opened[-1].children.append(node)
+        opened.append(node)
+        root = root or node
+    assert root is not None  # noqa: S101 - XML without an element is an error of its own
     return root

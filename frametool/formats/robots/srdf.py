@@ -32,7 +32,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of the virtual joints."""
     xml = XmlFile(file)
     links: dict[str, Link] = {}
-    for node in read_nodes(xml, HELD, "SRDF").all("virtual_joint"):
+    for node in read_nodes(xml, HELD, "SRDF", texts=False).all("virtual_joint"):
         element = node.element
         name, kind = xml.required(element, "name"), xml.required(element, "type")
         if kind not in KINDS:
@@ -59,7 +59,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
     xml = XmlFile(file)
     states: dict[str, list[str]] = {}
     first: dict[str, tuple[str, Element]] = {}
-    for node in read_nodes(xml, HELD, "SRDF").all("group_state"):
+    for node in read_nodes(xml, HELD, "SRDF", texts=False).all("group_state"):
         name, group = xml.required(node.element, "name"), node.element.attributes.get("group", "")
         states.setdefault(name, []).append(group)
         for each in node.children if state in (name, f"{group}/{name}") else ():

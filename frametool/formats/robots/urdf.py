@@ -82,7 +82,7 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
         for element in xml.elements(deepest=3, ends=False):
             _refuse_xacro(xml, element)
     reader = _Reader(xml, options)
-    for node in read_nodes(xml, HELD, "URDF").children:
+    for node in read_nodes(xml, HELD, "URDF", texts=False).children:
         try:
             reader.take(node)
         except FormatError as error:
