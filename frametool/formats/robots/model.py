@@ -19,17 +19,14 @@ from operator import and_
 from typing import Any, NamedTuple, TypeAlias
 
 from frametool.documents.document import parse_documents
-from frametool.documents.source import Source, paused_collector
-from frametool.errors import BadTopology, FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
-from frametool.formats.load import Recording, refuse_unknown_joints
-from frametool.formats.table import FORMATS
+from frametool.documents.source import Source
+from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
 from frametool.frames.path import IDENTITY, edges_between
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.transform import Transform
 from frametool.geometry.trig import DEGREE, RADIAN
 from frametool.geometry.validation import as_numbers, scalars, single
-from frametool.grammar.edges import Options
 from frametool.grammar.pose import read_pose
 from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind
 from frametool.grammar.rotation_spelling import rotation_of
@@ -38,11 +35,10 @@ from frametool.text.numbers import parse_angle, parse_length
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-    from os import PathLike
 
     from frametool.documents.xml import Element, XmlFile
-    from frametool.formats.robots.posture import Posture
     from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
+    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Quaternion, Vector
 
     Value: TypeAlias = "JointValue | Rigid"
@@ -409,36 +405,3 @@ class Chain:
         for each in reversed(followers):
             value = followed(self._joints[each], value)
         return value
-
-
-def load_robot(path: str | PathLike[str]) -> Robot:
-    """Read the robot of a URDF file, `-` for standard input.
-
-    Raises FormatError and BadTopology with file, line and column; FileProblem.
-    """
-    return robot_of(Recording(path))[0]
-
-
-def robot_of(file: Recording) -> tuple[Robot, Posture]:
-    """Return the robot of a file, and where its joints stand as the file's answers say; otherwise as `load_robot`."""
-    if file.form != "urdf":
-        file.close()
-        raise FormatError(f"expected a URDF robot, found {FORMATS[file.form].summary}", source=file.name)
-    from frametool.formats.robots.urdf import describe
-
-    options = Options(file.tally, file.topics, answers=file.answers)
-    try:
-        with paused_collector():
-            described = describe(file, options)
-    finally:
-        file.close()
-    refuse_unknown_joints([file])
-    links: dict[str, Link] = {}
-    for link in described.links:
-        if link.child in links:
-            parents = f"{shown(links[link.child].parent)} and {shown(link.parent)}"
-            problem = f"frame {shown(link.child)} has two parents: {parents}"
-            raise BadTopology(problem, source=file.name, line=link.line, rule="two-parents")
-        links[link.child] = link
-    file.tell()
-    return Robot(file.name, links, described.frames), described.posture

@@ -15,10 +15,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.source import UTF16, InputFile
+from frametool.documents.source import UTF16, InputFile, paused_collector
 from frametool.documents.xml import Element, XmlFile, XmlNode, read_nodes
-from frametool.errors import FormatError, ValueInvalid, alternatives, bare, listing, shown
-from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
+from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, listing, shown
+from frametool.formats.load import Recording, refuse_unknown_joints
+from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
 from frametool.frames.path import IDENTITY
@@ -33,6 +34,7 @@ from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from os import PathLike
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
@@ -226,6 +228,37 @@ class _Reader:
                 continue
             message = f"joint {shown(name)}: no link {shown(missing)}{alternatives(missing, self.frames, 'links')}"
             self.options.report(self.xml.error(element, message))
+
+
+def load_robot(path: str | PathLike[str]) -> Robot:
+    """Read the robot of a URDF file, `-` for standard input.
+
+    Raises FormatError and BadTopology with file, line and column; FileProblem.
+    """
+    return robot_of(Recording(path))[0]
+
+
+def robot_of(file: Recording) -> tuple[Robot, Posture]:
+    """Return the robot of a file, and where its joints stand as the file's answers say; otherwise as `load_robot`."""
+    if file.form != "urdf":
+        file.close()
+        raise FormatError(f"expected a URDF robot, found {FORMATS[file.form].summary}", source=file.name)
+    options = Options(file.tally, file.topics, answers=file.answers)
+    try:
+        with paused_collector():
+            described = describe(file, options)
+    finally:
+        file.close()
+    refuse_unknown_joints([file])
+    links: dict[str, Link] = {}
+    for link in described.links:
+        if link.child in links:
+            parents = f"{shown(links[link.child].parent)} and {shown(link.parent)}"
+            problem = f"frame {shown(link.child)} has two parents: {parents}"
+            raise BadTopology(problem, source=file.name, line=link.line, rule="two-parents")
+        links[link.child] = link
+    file.tell()
+    return Robot(file.name, links, described.frames), described.posture
 
 
 _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}

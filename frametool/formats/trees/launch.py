@@ -12,66 +12,36 @@ read, included files are named, and calls that start under a condition are read 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, locate_many, parse_documents
 from frametool.documents.source import InputFile, Source
 from frametool.documents.xml import XmlFile
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.detect import Beginning
+from frametool.formats.trees.launch_actions import (
+    COMPOSABLE,
+    PACKAGES,
+    Action,
+    composed,
+    not_followed,
+    not_read,
+    runs_publisher,
+)
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Misfit, Reading, kind
 from frametool.ros import publisher
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from frametool.frames.lookups import Frames
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
-PACKAGES = ("tf", "tf2_ros")
-COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"
 _SUBSTITUTION = re.compile(r"\$\([^()]*\)?")
 _NO, _YES = ("0", "false"), ("1", "true")
-
-
-class Action(NamedTuple):
-    """One thing in a launch file that is told or read.
-
-    arguments: of a call, as one text that a shell would part or as words
-    unread: why there is nothing to read; "" if there is
-    conditions: under which it starts, as they are written
-    key: the attribute that holds the arguments
-    """
-
-    arguments: str | Sequence[str] = ()
-    unread: str = ""
-    conditions: Sequence[str] = ()
-    key: str = ""
-    line: int = 0
-    column: int = 0
-
-
-def not_read(why: str) -> Action:
-    """Make the action for a call that cannot be read."""
-    return Action(unread=f"{publisher.CALL} not read: {why}")
-
-
-def not_followed(what: str, named: object) -> Action:
-    """Make the action for a file that is included."""
-    return Action(unread=f"{what} {shown(named)} is not followed; read that file too: --with FILE")
-
-
-def composed() -> Action:
-    """Make the action for a node that publishes without a call."""
-    return not_read("it is a composable node, whose transform stands in its parameters")
-
-
-def runs_publisher(words: Sequence[str]) -> bool:
-    """Tell whether a command line starts the publisher."""
-    return any(word.rsplit("/", 1)[-1] == publisher.CALL for word in words)
 
 
 def write_tree(tree: Frames, style: Style) -> str:

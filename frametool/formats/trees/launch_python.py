@@ -12,7 +12,7 @@ import ast
 import warnings
 
 from frametool.errors import FormatError, shown
-from frametool.formats.trees.launch import (
+from frametool.formats.trees.launch_actions import (
     COMPOSABLE,
     PACKAGES,
     Action,
