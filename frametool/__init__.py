@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.explain.api import explain as explain
     from frametool.formats.load import load as load
-    from frametool.formats.robots.robot import load_robot as load_robot
+    from frametool.formats.robots.urdf import load_robot as load_robot
     from frametool.formats.table import FORMATS as FORMATS
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.lookups import FrameTree as FrameTree
@@ -58,7 +58,7 @@ _HOMES = {
     "explain": "frametool.explain",
     "follow_steps": "frametool.sim.followed",
     "load": "frametool.formats.load",
-    "load_robot": "frametool.formats.robots.robot",
+    "load_robot": "frametool.formats.robots.urdf",
     "polars_exprs": "frametool.stream.engines",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",

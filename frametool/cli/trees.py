@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import FileState
     from frametool.formats.load import Place, Recording, Rules
-    from frametool.formats.robots.robot import Robot
+    from frametool.formats.robots.model import Robot
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import FrameTree
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 from frametool.documents.source import MOST_CHARACTERS, Source, line_of, not_text, pointer
-from frametool.errors import FileProblem, FormatError, shown
+from frametool.errors import FileProblem, FormatError, bare, shown
 from frametool.text.numbers import parse_number
 
 TYPE_CHECKING = False
@@ -157,6 +157,13 @@ class XmlFile:
         snippet = pointer(line_of(text[0], 1), column)
         return FormatError(message, source=self.name, line=line, column=column, snippet=snippet, rule=rule)
 
+    def required(self, element: Element, attribute: str) -> str:
+        """Return an attribute that must be there and say something."""
+        value = element.attributes.get(attribute)
+        if not value:
+            raise self.error(element, f"<{element.tag}> has no {attribute}", attribute if value is not None else "")
+        return value
+
     def numbers(self, element: Element, attribute: str, count: int, default: str | None = None) -> tuple[float, ...]:
         """Read an attribute as so many finite numbers between blanks; without it the default."""
         text = element.attributes.get(attribute, default)
@@ -195,11 +202,13 @@ _ENDS_EARLY = 3  # expat's code for "no element found", which it also says behin
 class XmlNode:
     """One element: its attributes and place, its text, and those of the elements in it that are kept."""
 
-    __slots__ = ("children", "element", "tag", "text")
+    __slots__ = ("children", "element", "line", "tag", "text", "xml")
 
-    def __init__(self, element: Element) -> None:
+    def __init__(self, element: Element, xml: XmlFile) -> None:
         """Create it as it begins."""
+        self.xml = xml
         self.element = element
+        self.line = element.line
         self.tag = element.tag
         self.children: list[XmlNode] = []
         self.text = ""
@@ -224,32 +233,46 @@ class XmlNode:
         """Return an attribute; "" where it is missing."""
         return self.element.attributes.get(name, "").strip()
 
+    def error(self, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
+        """Make the error for it, or for the value of one of its attributes."""
+        return self.xml.error(self.element, message, attribute, rule=rule)
 
-def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]]) -> XmlNode:
+    def numbers(self, count: int) -> tuple[float, ...]:
+        """Read its text as so many finite numbers."""
+        return self.xml.numbers_in(self.text, self.element, "", count)
+
+
+def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = "", *, texts: bool = True) -> XmlNode:
     """Return the root element with what is kept below it.
 
     held: the elements that are kept in each element, the root first; of all others nothing is.
+    form: what a file with another root is not.  texts: without them it is faster.
     Raises FormatError.
     """
     top = next(iter(held))
+    root: XmlNode | None = None
     opened: list[XmlNode] = []
     skipped = 0  # the depth below which nothing is kept
-    for element in xml.elements():
+    for element in xml.elements(DEEPEST_ELEMENT if texts else len(held) + 1, ends=texts):
         if skipped and element.depth > skipped:
             continue
         skipped = 0
+        if element.ends and opened and opened[-1].element.depth == element.depth:
+            opened[-1].text = element.text.strip()
+        while opened and opened[-1].element.depth >= element.depth:
+            opened.pop()
         if element.ends:
-            if opened and opened[-1].element.depth == element.depth:
-                ended = opened.pop()
-                ended.text = element.text.strip()
-                root = ended
-        elif not opened and element.tag != top:
-            raise xml.error(element, f"expected <{top}>, found <{element.tag}>")
-        elif opened and element.tag not in held.get(opened[-1].tag, ()):
+            continue
+        if root is None and element.tag != top:
+            expected = f"{form} begins with <{top}>" if form else f"expected <{top}>"
+            raise xml.error(element, f"{expected}, found <{bare(element.tag)}>")
+        if opened and element.tag not in held.get(opened[-1].tag, ()):
             skipped = element.depth
-        else:
-            made = XmlNode(element)
-            if opened:
-                opened[-1].children.append(made)
-            opened.append(made)
+            continue
+        node = XmlNode(element, xml)
+        if opened:
+            opened[-1].children.append(node)
+        opened.append(node)
+        root = root or node
+    assert root is not None  # noqa: S101 - XML without an element is an error of its own
     return root

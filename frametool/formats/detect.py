@@ -160,9 +160,9 @@ _STRONG: dict[str, Shows] = {
     "xml": lambda begin, what: begin.elements[:1] == [what],
     "json path": lambda begin, what: any(_leads(path, what.split("/")) for path in begin.json_paths),
     "json key": lambda begin, what: (what,) in begin.json_paths,
-    "own key": lambda begin, what: _any_is(begin.yaml_keys, what),
-    "yaml key": lambda begin, what: _any_is(begin.yaml_keys, what),
-    "yaml inner": lambda begin, what: _any_is(begin.yaml_inner_keys, what),
+    "own key": lambda begin, what: _count(begin.yaml_keys, what) > 0,
+    "yaml key": lambda begin, what: _count(begin.yaml_keys, what) > 0,
+    "yaml inner": lambda begin, what: _count(begin.yaml_inner_keys, what) > 0,
     "text": lambda begin, what: re.search(what, begin.text) is not None,
     "line": lambda begin, what: re.match(what, begin.data_line) is not None,
     "leaves": lambda begin, what: 5 * _count(begin.leaves, what) >= 4 * max(1, len(begin.leaves)),
@@ -179,10 +179,6 @@ def _leads(path: tuple[str, ...], way: list[str]) -> bool:
 
 def _count(keys: set[str], pattern: str) -> int:
     return sum(re.fullmatch(pattern, key) is not None for key in keys)
-
-
-def _any_is(keys: set[str], pattern: str) -> bool:
-    return any(re.fullmatch(pattern, key) for key in keys)
 
 
 def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> tuple[list[str], str]:
@@ -257,7 +253,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if "tree" in reads and begin.xml:
         raise _unknown(begin, *reads, name=name)
     if form := by_suffix(name, readers(*reads)):
-        return form, f"the suffix {name[name.rfind('.'):].lower()}"
+        return form, f"the suffix {name[name.rfind('.') :].lower()}"
     if form := by_suffix(name, unread()):
         raise not_read(form, name)
     if (what := not_text(head)) and not head.startswith(UTF16):

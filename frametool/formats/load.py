@@ -1,10 +1,7 @@
 """Files of frames in, one tree out: merges what several files say and names the places where they disagree.
 
-Files of frames: trees, recordings, bags, standard input; each read by the module of its form's row.
-
-Edges put together: a FrameTree while everything stands still, a TransformBuffer once something moves.
-
-Knows nothing of text: whoever reads says where each edge stood.
+Each file is read by the module of its form's row; edges make a FrameTree while everything stands still, and a
+TransformBuffer once something moves.  The forms themselves are not known here.
 """
 
 from __future__ import annotations
@@ -16,7 +13,7 @@ from io import BytesIO
 from itertools import islice
 from operator import lt
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple, Protocol
 
 from frametool.documents.document import format_error, locate, locate_many
 from frametool.documents.source import InputFile, Source, paused_collector
@@ -41,7 +38,6 @@ TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from typing import BinaryIO, Protocol
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.types import Rigid
@@ -219,47 +215,28 @@ def _about_folder(path: str) -> str:
     return f"a folder without metadata.yaml; name a file in it: {', '.join(files)}" if files else "is a directory"
 
 
-class Rules:
-    """How frames are taken that move, and rotations that are none."""
+class Rules(NamedTuple):
+    """How frames are taken that move, and rotations that are not quite rotations.
 
-    __slots__ = ("keep_ns", "moving", "normalize", "policy")
+    moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still
+    policy, keep_ns: as TransformBuffer has them
+    normalize: any non-zero quaternion and any matrix near a rotation is taken
+    """
 
-    def __init__(
-        self, *, moving: bool = False, policy: str = "frametool", keep_ns: int | None = None, normalize: bool = False
-    ) -> None:
-        """Keep the rules.
-
-        moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still.
-        policy, keep_ns: as TransformBuffer has them.
-        normalize: any non-zero quaternion and any matrix near a rotation is taken.
-        """
-        self.moving = moving
-        self.normalize = normalize
-        self.policy = policy
-        self.keep_ns = keep_ns
-
-    def __repr__(self) -> str:
-        """Name the rules with their values."""
-        return f"Rules({', '.join(f'{name}={getattr(self, name)!r}' for name in self.__slots__)})"
+    moving: bool = False
+    policy: str = "frametool"
+    keep_ns: int | None = None
+    normalize: bool = False
 
 
-class Replaced:
+class Replaced(NamedTuple):
     """A sample that took the place of another one at the same stamp."""
 
-    __slots__ = ("child", "earlier", "later", "parent", "stamp_ns")
-
-    def __init__(self, parent: str, child: str, stamp_ns: int, earlier: Place, later: Place) -> None:
-        """Keep what was said last, and where the two stood."""
-        self.parent = parent
-        self.child = child
-        self.stamp_ns = stamp_ns
-        self.earlier = earlier
-        self.later = later
-
-    @property
-    def places(self) -> str:
-        """Name both places."""
-        return f"{self.earlier.seen_from(self.later)} and {self.later.seen_from(self.later)}"
+    parent: str
+    child: str
+    stamp_ns: int
+    earlier: Place
+    later: Place
 
 
 class Assembly:
@@ -299,13 +276,15 @@ class Assembly:
         """
         try:
             if self.buffer is None and stamp_ns is None and self.rules.policy == "frametool":
-                self._hang(parent, child, components, place)
+                self._first.setdefault(child, (parent, components, place))
+                self.tree.add_components(parent, child, components)
             else:
                 self._record(self._moving(), parent, child, components, stamp_ns, place)
         except BadTopology as error:
             raise self._placed(error, parent, child, place) from None
-        except Refused as refused:
-            tell_rejected(refused.lines)
+        except Refused as refused:  # in the words that tf2 logs when it drops a transform
+            for line in refused.lines:
+                warn(line, kind=Tf2Warning)
         except ValueInvalid as error:
             raise place.error(str(error), FormatError) from None
 
@@ -349,29 +328,21 @@ class Assembly:
 
     def finish(self) -> FrameTree | TransformBuffer:
         """Return the tree, or the buffer if anything moves."""
-        made = self._finished()
+        made: FrameTree | TransformBuffer = self.tree
+        if self.buffer is not None:
+            made = self.buffer
+            standing = set()
+            if not self.rules.moving:
+                moving = [track.child for track in made.tracks() if not track.standing]
+                standing = {child for child in moving if child not in self._moves}
+            for child in standing:
+                made.make_stand(child)
+            self._tell_replaced(standing)
+            if self.rules.policy == "frametool":
+                tree = self._standing_tree(made)
+                made = made if made.moves else tree
         made.camera_axes |= self.axes
         return made
-
-    def _finished(self) -> FrameTree | TransformBuffer:
-        if self.buffer is None:
-            return self.tree
-        standing = set()
-        if not self.rules.moving:
-            moving = [track.child for track in self.buffer.tracks() if not track.standing]
-            standing = {child for child in moving if child not in self._moves}
-        for child in standing:
-            self.buffer.make_stand(child)
-        self._tell_replaced(standing)
-        if self.rules.policy != "frametool":
-            return self.buffer
-        tree = self._standing_tree(self.buffer)
-        return self.buffer if self.buffer.moves else tree
-
-    def _hang(self, parent: str, child: str, components: Rigid, place: Place) -> None:
-        """Add an edge that stands still."""
-        self._first.setdefault(child, (parent, components, place))
-        self.tree.add_components(parent, child, components)
 
     def _moving(self) -> TransformBuffer:
         """Return the buffer; at the first stamp it takes over what stands still."""
@@ -415,7 +386,8 @@ class Assembly:
             if each.child in standing:
                 raise self._placed(BadTopology("", rule="two-poses"), each.parent, each.child, each.later)
         for each in self._replaced[:most]:
-            what = f"frame {shown(each.child)} has two poses at {format_stamp(each.stamp_ns)}: {each.places}"
+            places = f"{each.earlier.seen_from(each.later)} and {each.later.seen_from(each.later)}"
+            what = f"frame {shown(each.child)} has two poses at {format_stamp(each.stamp_ns)}: {places}"
             warn(f"{self.name}: {what}; the last one holds")
         if len(self._replaced) > most:
             warn(f"{self.name}: {len(self._replaced) - most} more stamps with two poses of one frame")
@@ -447,12 +419,6 @@ class Assembly:
             else:
                 message = f"{error}: {first} and {second}"
         return place.error(message, BadTopology)
-
-
-def tell_rejected(lines: list[str]) -> None:
-    """Warn in the words that tf2 logs when it drops a transform."""
-    for line in lines:
-        warn(line, kind=Tf2Warning)
 
 
 class EdgePlace(NamedTuple):

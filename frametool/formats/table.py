@@ -113,7 +113,7 @@ FORMATS = {
         reads=("tree", "records"),
         reader=_TREE,
         writes=("poses", "points", "tree", "report"),
-        writer="frametool.formats.trees.yaml_format",
+        writer="frametool.formats.trees.yaml_json",
         signs=(
             ("own key", "frames|children"),
             ("line", r"\{ *[A-Za-z_][\w.]*: "),  # no JSON, whatever the suffix says: its keys have quotes
@@ -127,7 +127,7 @@ FORMATS = {
         reads=("tree", "records"),
         reader=_TREE,
         writes=("poses", "points", "tree", "report"),
-        writer="frametool.formats.trees.json_format",
+        writer="frametool.formats.trees.yaml_json",
         signs=(("json key", "frames"), ("begin", r"""\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))""")),
     ),
     "csv": Format(
@@ -231,8 +231,8 @@ FORMATS = {
         "static_transform_publisher of ROS 2", writes=("poses", "tree"), writer="frametool.ros.publisher"
     ),
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
-    "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.trees.dot"),
-    "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.mermaid"),
+    "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.trees.drawings"),
+    "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "euroc": Format(
         "EuRoC ground truth",
         reads=("tree", "trajectory", "rows"),
@@ -367,7 +367,7 @@ FORMATS = {
     "euroc-sensor": Format(
         "sensor.yaml of EuRoC",
         reads=("tree",),
-        reader="frametool.formats.trees.euroc_sensor",
+        reader="frametool.formats.trees.camchain",
         signs=(("yaml key", "T_BS"),),
         states="T_BS is body<-sensor, metres",
         asks=("frames",),

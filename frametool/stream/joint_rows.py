@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
-from frametool.formats.robots.joints import TURNING, JointValue
+from frametool.formats.robots.model import TURNING, JointValue
 from frametool.formats.robots.posture import find_joint_columns
 from frametool.formats.table import FORMATS
 from frametool.geometry import floats
@@ -30,9 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import BinaryIO
 
-    from frametool.formats.robots.joints import Joint
+    from frametool.formats.robots.model import Joint, Robot
     from frametool.formats.robots.posture import Posture
-    from frametool.formats.robots.robot import Robot
     from frametool.geometry.types import Components, Namespace, Number
     from frametool.stream.faults import BadRows
 

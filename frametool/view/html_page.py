@@ -18,15 +18,14 @@ from json import dumps
 from typing import TYPE_CHECKING, Any
 
 from frametool import __version__
-from frametool.formats.robots.joints import JointValue
+from frametool.formats.robots.model import JointValue
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.formats.robots.joints import Value
-    from frametool.formats.robots.robot import Robot
+    from frametool.formats.robots.model import Robot, Value
     from frametool.sim.simulate import SimulationStep
     from frametool.view.frame_scene import FrameScene
 
@@ -128,12 +127,12 @@ def joint_sliders(robot: Robot, values: Mapping[str, Value], names: Sequence[str
     values: of the joints, by name.  names: of the frames of the page, in its order.
     """
     index = {name: number for number, name in enumerate(names)}
-    links = {child: link for child, link in robot.links.items() if link.joint and child in index}
+    links = {child: link for child, link in robot.links.items() if link.joints and child in index}
     found: list[dict[str, Any]] = []
     for child, link in links.items():
-        joint = link.joint
-        value = values.get(joint.name) if joint else None
-        if joint and not joint.posed and isinstance(value, JointValue):
+        (joint,) = link.joints
+        value = values.get(joint.name)
+        if not joint.posed and isinstance(value, JointValue):
             found.append({
                 "name": joint.name, "frame": index[child], "kind": joint.kind, "axis": joint.axis,
                 "origin": link.origin, "lower": joint.lower, "upper": joint.upper, "value": float(value.plain),

@@ -9,7 +9,7 @@ import pytest
 
 import frametool
 from frametool.errors import BadAnswer, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
-from frametool.formats.robots.joints import Joint, JointValue, Mimic, motion, read_value
+from frametool.formats.robots.model import Joint, JointValue, Mimic, motion, read_value
 from frametool.formats.robots.posture import Posture, find_joint_columns, stamp_column
 from frametool.grammar.edges import Answers, Options, Tally, Topics
 
@@ -314,15 +314,16 @@ def test_a_step_of_half_a_turn_is_told_because_poses_between_go_the_other_way(ar
 def test_joints_that_move_together_are_interpolated_at_each_others_times() -> None:
     series = {"a": {0: 0.0, 10: 1.0}, "b": {5: 0.5, 15: 2.5}}
     options = Options(Tally(), Topics())
-    found = Posture([Joint(name, "prismatic") for name in "ab"], options, lambda *_: FormatError(""))
+    joints = [Joint(name, "prismatic") for name in "ab"]
+    found = Posture(joints, options, lambda *_: FormatError(""))
     for name, values in series.items():
         found.still.pop(name)
         found.moving[name] = {at: JointValue(value) for at, value in values.items()}
-    steps = {at: tuple(moved[0] for moved in both) for at, both in found.motions("a", "b")}
+    steps = {at: tuple(motion(joint, value)[0] for joint, value in zip(joints, both, strict=True)) for at, both in found.values("a", "b")}
     assert steps == {5: (0.5, 0.5), 10: (1.0, 1.5)}
     found.moving["b"] = {20: JointValue(0.0), 30: JointValue(1.0)}
     with pytest.raises(FormatError, match="joints a, b move one frame and have no time in common"):
-        list(found.motions("a", "b"))
+        list(found.values("a", "b"))
 
 
 def test_columns_are_found_by_name_and_unit() -> None:

@@ -10,7 +10,7 @@ from calibrations import matrix, read
 from scipy.spatial.transform import Rotation as Peer
 
 from frametool.errors import FormatError, Unanswered
-from frametool.formats.trees.matrix_keys import Ambiguous, Meaning, meaning_of
+from frametool.formats.trees.matrices import Ambiguous, Meaning, meaning_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

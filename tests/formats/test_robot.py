@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,11 @@ import frametool
 from frametool.errors import FormatError, NotConnected, UnknownFrame, ValueInvalid
 
 if TYPE_CHECKING:
-    from frametool.formats.robots.robot import Robot
+    from collections.abc import Callable
+
+    from conftest import Outcome
+
+    from frametool.formats.robots.model import Robot
 
 ARM = Path(__file__).resolve().parent.parent.parent / "examples" / "arm.urdf"
 
@@ -51,6 +56,45 @@ def test_arrays_give_the_bits_of_floats(seed: int, tmp_path: Path) -> None:
         for each in (many, by_name):
             found = [part[place] if chain.needs else part for part in each.components]
             assert np.array(found).tobytes() == np.array(one.components).tobytes()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_tree_and_a_robot_give_the_same_bits_at_the_same_joints(seed: int, tmp_path: Path) -> None:
+    made = RandomRobot(seed)
+    (tmp_path / "r.urdf").write_text(made.urdf)
+    robot = frametool.load_robot(tmp_path / "r.urdf")
+    rng = np.random.default_rng(seed)
+    for base, tip in (("link0", "link12"), ("link12", "link5"), ("link3", "link11")):
+        needs = robot.chain(base, tip).needs
+        rows = rng.uniform(-4.0, 4.0, (12, len(needs)))
+        rows[rng.random(rows.shape) < 0.3] = 0.0  # where a joint is at rest the bits of the file stand
+        many = robot.fk(base, tip, rows).as_matrix()
+        for row, values in enumerate(rows.tolist()):
+            joints = dict(zip(needs, values, strict=True))
+            tree = frametool.load(tmp_path / "r.urdf", joints=joints).lookup(base, tip)
+            assert tree.components == robot.fk(base, tip, joints).components
+            assert np.array_equal(tree.as_matrix(), many[row] if needs else many)
+
+
+@pytest.mark.parametrize("unit", ["", "deg"])
+def test_lookup_and_fk_print_the_same_numbers(unit: str, run: Callable[..., Outcome]) -> None:
+    names = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_roll")
+    rows = [*np.random.default_rng(3).uniform(-2.0, 2.0, (20, 4)).tolist(), [0.0] * 4, [0.5, 0.0, -0.0, 0.25]]
+    header = ",".join(f"{name}{'_deg' * bool(unit)}" for name in names)
+    text = "\n".join([header, *(",".join(map(repr, row)) for row in rows), ""])
+    ways = {
+        name: run("fk", str(ARM), *name, "-f", "json", stdin=text).out
+        for name in (("arm_base", "tool"), ("tool", "shoulder"))
+    }
+    for (base, tip), out in ways.items():
+        for row, line in zip(rows, out.splitlines(), strict=True):
+            joints = [
+                each for name, value in zip(names, row, strict=True) for each in ("-j", f"{name}={value!r}{unit}")
+            ]
+            found = json.loads(run("lookup", str(ARM), base, tip, *joints, "-f", "json").out)
+            assert [json.loads(line)[key] for key in ("xyz", "quaternion")] == [
+                found[key] for key in ("xyz", "quaternion")
+            ]
 
 
 def test_values_may_be_text_numbers_and_arrays_together(arm: Robot) -> None:

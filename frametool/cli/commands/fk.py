@@ -19,7 +19,7 @@ from frametool.cli.output import Output
 from frametool.cli.streaming import RECORDS, Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, opened, state
 from frametool.formats.detect import detect
-from frametool.formats.robots.robot import robot_of
+from frametool.formats.robots.urdf import robot_of
 from frametool.formats.table import holds_arrays
 from frametool.stream.faults import ROWS_SKIPPED
 from frametool.stream.joint_rows import JointRows, echoed, names_in

@@ -156,7 +156,7 @@ def _content(
 def _joints(tree: str, scene: FrameScene) -> list[dict[str, Any]]:
     """Return the joints of a robot's file that get a slider; its warnings came when its frames were read."""
     from frametool.errors import overheard
-    from frametool.formats.robots.robot import robot_of
+    from frametool.formats.robots.urdf import robot_of
     from frametool.view.html_page import joint_sliders
 
     (robot, posture), _ = overheard(robot_of, opened([tree])[0])

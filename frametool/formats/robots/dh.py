@@ -7,8 +7,6 @@ standard: turn by theta about z and shift by d along it, then shift by a along x
 modified (Craig): alpha and a first, of the joint before, then theta and d.  Nothing in a table says which: `--dh` does.
 Metres and radians; a column that ends in deg or mm has that unit, a cell may have its own.  Joints stand at 0, which is
 added to what theta says, or d of a sliding one.  link0 carries link1 and so on: parent<-child.
-
-The rows of a table of Denavit-Hartenberg parameters, whatever it is written in, each number with its place.
 """
 
 from __future__ import annotations
@@ -20,22 +18,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.json import looks_like_json
-from frametool.documents.source import pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, shown
-from frametool.formats.robots.joints import Joint
+from frametool.formats.robots.model import Joint, Link
 from frametool.formats.robots.posture import Posture
+from frametool.formats.trees.tree_reader import line_error
+from frametool.frames.path import IDENTITY
 from frametool.geometry import euler, floats, rigid
-from frametool.grammar.edges import Edge
 from frametool.grammar.readers import kind
 from frametool.text.csv_line import LineCell, split_line
-from frametool.text.numbers import NotFinite, parse_angle, parse_length, parse_number
+from frametool.text.numbers import LENGTHS, NotFinite, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
+    from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Path
 
     Fail = Callable[[str], FormatError]
@@ -51,12 +48,10 @@ COLUMNS = {
     "name": ("name", "joint", "joint_name", "link", "i", "j", "id", "#", "no", "frame", "index"),
 }
 NEEDED = ("d", "a", "alpha")
-ANGLES = ("deg", "rad")
 UNITS = {
     "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radians": "rad",
     "m": "m", "cm": "cm", "mm": "mm",
 }  # fmt: skip
-LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0}
 KINDS = {
     "r": "revolute", "revolute": "revolute", "rotational": "revolute", "rotary": "revolute", "0": "revolute",
     "continuous": "revolute", "p": "prismatic", "prismatic": "prismatic", "linear": "prismatic", "1": "prismatic",
@@ -116,15 +111,15 @@ def rows_of(file: InputFile) -> list[DhRow]:
     text = file.text
     is_document = looks_like_json(text) or re.search(r"(?m)^ *(?:- *)?[{\[]|^ *(?:- +)?[\w.-]+:(?:\s|$)", text)
     cells = _of_documents(file) if is_document else _of_lines(file)
-    rows = [_row(number, each, fail) for number, (each, fail) in enumerate(cells, 1)]
+    rows: dict[str, DhRow] = {}
+    for number, (each, fail) in enumerate(cells, 1):
+        row = _row(number, each, fail)
+        if row.name in rows:
+            raise fail(f"two joints are called {shown(row.name)}: rows {[*rows].index(row.name) + 1} and {number}")
+        rows[row.name] = row
     if not rows:
         raise FormatError("a table without rows", source=file.name)
-    seen: dict[str, int] = {}
-    for number, row in enumerate(rows, 1):
-        if row.name in seen:
-            raise row.fail(f"two joints are called {shown(row.name)}: rows {seen[row.name]} and {number}")
-        seen[row.name] = number
-    return rows
+    return [*rows.values()]
 
 
 def column_of(written: str) -> Column | None:
@@ -144,31 +139,28 @@ def _row(number: int, cells: dict[str, Cell], fail: Fail) -> DhRow:
     """Read one row."""
     if missing := [name for name in NEEDED if name not in cells]:
         raise fail(f"missing {', '.join(missing)}; a row has theta, d, a, alpha, maybe offset, type and joint")
-    none = Cell("0", "", fail)
-    theta = _read(cells.get("theta", none), _angle)
+    zero = Cell("0", "", fail)
+    theta = _read(cells.get("theta", zero), _angle)
     d = _read(cells["d"], _length)
-    kind = _kind(cells.get("type"), "prismatic" if d.variable is not None else "revolute")
+    kind = "prismatic" if d.variable is not None else "revolute"
+    if "type" in cells and (written := cells["type"].text):
+        if written.lower() not in KINDS:
+            message = f"unknown type {shown(written)}; known: revolute (R, 0), prismatic (P, 1), fixed"
+            raise cells["type"].fail(message)
+        kind = KINDS[written.lower()]
     if (d.variable if kind != "prismatic" else theta.variable) is not None:
         raise fail(f"a {kind} joint with a variable {'d' if kind != 'prismatic' else 'theta'}")
     if kind == "fixed" and theta.variable is not None:
         raise fail("a fixed joint with a variable theta")
-    offset = _read(cells.get("offset", none), _length if kind == "prismatic" else _angle)
+    offset = _read(cells.get("offset", zero), _length if kind == "prismatic" else _angle)
     theta, d = (theta, d.plus(offset)) if kind == "prismatic" else (theta.plus(offset), d)
-    told = cells["name"].text if "name" in cells else ""
-    name = theta.variable or d.variable or (f"joint{number}" if not told or told.isdecimal() else told)
+    written = cells["name"].text if "name" in cells else ""
+    name = theta.variable or d.variable or (f"joint{number}" if not written or written.isdecimal() else written)
     a, alpha = _read(cells["a"], _length), _read(cells["alpha"], _angle)
     for column, amount in (("a", a), ("alpha", alpha)):
         if amount.variable is not None:
             raise cells[column].fail(f"{shown(cells[column].text)} is not a number; only theta or d vary")
     return DhRow(name, kind, theta, d, a.number, alpha, fail)
-
-
-def _kind(cell: Cell | None, otherwise: str) -> str:
-    if cell is None or not cell.text:
-        return otherwise
-    if cell.text.lower() not in KINDS:
-        raise cell.fail(f"unknown type {shown(cell.text)}; known: revolute (R, 0), prismatic (P, 1), fixed")
-    return KINDS[cell.text.lower()]
 
 
 def _read(cell: Cell, read: Callable[[str, str], Amount]) -> Amount:
@@ -193,7 +185,7 @@ def _read(cell: Cell, read: Callable[[str, str], Amount]) -> Amount:
 
 
 def _angle(text: str, unit: str) -> Amount:
-    if unit and unit not in ANGLES:
+    if unit not in ("", "deg", "rad"):
         raise ValueInvalid(f"an angle in {unit}")
     number, own = parse_angle(text)
     return Amount(number, degrees=(own or unit) == "deg")
@@ -216,21 +208,20 @@ def _of_lines(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
         )
     number, header = lines[begin]
     columns = _columns(header)
-    twice = [column.name for column in columns.values()]
-    for name in twice:
-        if twice.count(name) > 1:
-            raise _line_error(file, number, 1, f"two columns for {name}; keep one")
+    names = [column.name for column in columns.values()]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise line_error(file, number, 1, f"two columns for {twice}; keep one")
     for number, line in lines[begin + 1 :]:
         if line.lstrip().startswith("#"):
             continue
         words = _split(line)
         if len(words) != len(_split(header)):
-            raise _line_error(file, number, 1, f"expected {len(_split(header))} cells, found {len(words)}")
+            raise line_error(file, number, 1, f"expected {len(_split(header))} cells, found {len(words)}")
         cells = {
-            column.name: Cell(words[at].text, column.unit, partial(_line_error, file, number, words[at].column))
+            column.name: Cell(words[at].text, column.unit, partial(line_error, file, number, words[at].column))
             for at, column in columns.items()
         }
-        yield cells, partial(_line_error, file, number, 1)
+        yield cells, partial(line_error, file, number, 1)
 
 
 def _columns(line: str) -> dict[int, Column]:
@@ -250,11 +241,6 @@ def _split(line: str) -> list[LineCell]:
     return found[:: 2 if mark and line.count(mark) + 1 < len(found) else 1]
 
 
-def _line_error(file: InputFile, line: int, column: int, message: str) -> FormatError:
-    text = file.text.split("\n")[line - 1].rstrip("\r")
-    return FormatError(message, source=file.name, line=line, column=column, snippet=pointer(text, column))
-
-
 def _of_documents(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
     """Yield the rows of YAML or JSON."""
     source = file.source
@@ -272,10 +258,10 @@ def _of_documents(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
                     raise fail(f"expected a number, found {kind(value)}")
                 if column is not None:
                     cells[column.name] = Cell(value or "0", column.unit, fail)
-            place = next(iter(row.values()))[1]
+            fail = partial(format_error, source, (document.index, *next(iter(row.values()))[1][:-1]))
             if name and "name" not in cells:
-                cells["name"] = Cell(name, "", partial(format_error, source, (document.index, *place[:-1])))
-            yield cells, partial(format_error, source, (document.index, *place[:-1]))
+                cells["name"] = Cell(name, "", fail)
+            yield cells, fail
 
 
 def _find_rows(value: Any, path: Path, depth: int = 0) -> list[tuple[str, dict[str, tuple[Any, Path]]]] | None:
@@ -283,11 +269,22 @@ def _find_rows(value: Any, path: Path, depth: int = 0) -> list[tuple[str, dict[s
     if depth > 4 or type(value) not in (dict, list) or not value:
         return None
     items = list(value.items() if type(value) is dict else enumerate(value))
-    if all(_is_row(each) for _, each in items[:1]) and all(type(each) is dict for _, each in items):
-        named = type(value) is dict
-        return [(str(key) if named else "", _placed(each, (*path, key))) for key, each in items]
-    if _is_row(value):
-        return _turned(value, path)
+    if _is_row(items[0][1]) and all(type(each) is dict for _, each in items):
+        rows = []
+        for name, row in items:
+            cells = {key: (cell, (*path, name, key)) for key, cell in row.items()}
+            rows.append((name if type(value) is dict else "", cells))
+        return rows
+    if _is_row(value):  # a map of columns, or of the numbers of one row
+        columns: dict[str, list[tuple[Any, Path]]] = {}
+        for key, each in items:
+            if column_of(key):
+                listed = type(each) is list
+                columns[key] = (
+                    [(cell, (*path, key, at)) for at, cell in enumerate(each)] if listed else [(each, (*path, key))]
+                )
+        count = max(map(len, columns.values()))
+        return [("", {key: cells[at] for key, cells in columns.items() if at < len(cells)}) for at in range(count)]
     found = (_find_rows(each, (*path, key), depth + 1) for key, each in items)
     return next((rows for rows in found if rows is not None), None)
 
@@ -297,65 +294,36 @@ def _is_row(value: Any) -> bool:
     return {"a", "alpha"} <= names
 
 
-def _placed(row: dict[str, Any], path: Path) -> dict[str, tuple[Any, Path]]:
-    return {key: (each, (*path, key)) for key, each in row.items()}
-
-
-def _turned(columns: dict[str, Any], path: Path) -> list[tuple[str, dict[str, tuple[Any, Path]]]]:
-    """Make rows of a map of columns; of a map of single numbers one row."""
-    known = {key: each for key, each in columns.items() if column_of(key)}
-    if not any(type(each) is list for each in known.values()):
-        return [("", _placed(known, path))]
-    lists = {key: each if type(each) is list else [each] for key, each in known.items()}
-    count = max(map(len, lists.values()))
-    return [
-        ("", {key: (each[at], (*path, key, at)) for key, each in lists.items() if at < len(each)})
-        for at in range(count)
-    ]
-
-
 AXIS = (0.0, 0.0, 1.0)
 TURN = 6.283185307179586
-_IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a row, its joint as told, else at 0."""
+    """Yield an edge a row, its joint as options say, else at 0."""
     rows = rows_of(file)
     if not options.answers.dh:
         choice = "--dh standard (a and alpha behind the joint) or --dh modified (Craig: before it)"
         error = rows[0].fail(f"nothing in a table of Denavit-Hartenberg parameters says which they are: give {choice}")
         raise Unanswered(error.message, source=error.source, line=error.line, column=error.column)
-    fails = {row.name: row.fail for row in rows}
-    joints = [Joint(row.name, row.kind, AXIS, line=row.fail("").line) for row in rows if row.kind != "fixed"]
-    fixed = [row.name for row in rows if row.kind == "fixed"]
-    posture = Posture(joints, options, lambda joint, problem: fails[joint.name](problem), fixed=fixed)
-    options.tally.about = ", ".join(filter(None, (options.answers.dh, options.tally.about)))
     frames = options.answers.names(*(f"link{number}" for number in range(len(rows) + 1)))
-    for row, parent, child in zip(rows, frames, frames[1:], strict=False):
-        line = row.fail("").line
-        _tell_degrees(row, line, options)
-        before, behind = _parts(row, modified=options.answers.dh == "modified")
-        motions = posture.motions(row.name) if row.kind != "fixed" else [(None, (_IDENTITY,))]
-        for stamp_ns, (moved,) in motions:
-            pose = rigid.compose(*rigid.compose(*before, *moved), *behind)
-            yield Edge(parent, child, pose, stamp_ns, line)
+    links = [_link(row, parent, child, options) for row, parent, child in zip(rows, frames, frames[1:], strict=False)]
+    posture = Posture.of(links, options)
+    options.tally.about = ", ".join(filter(None, (options.answers.dh, options.tally.about)))
+    yield from posture.edges(links)
 
 
-def _parts(row: DhRow, *, modified: bool) -> tuple[Rigid, Rigid]:
-    """Return the poses before and behind the motion of a joint, which turns about z or shifts along it."""
-    along_z: Rigid = (0.0, 0.0, row.d.number, *_turned_by_hand((0.0, 0.0, row.theta.number), row.theta))
-    along_x: Rigid = (row.a, 0.0, 0.0, *_turned_by_hand((row.alpha.number, 0.0, 0.0), row.alpha))
-    return (along_x, along_z) if modified else (_IDENTITY, rigid.compose(*along_z, *along_x))
-
-
-def _turned_by_hand(angles: tuple[float, float, float], amount: Amount) -> tuple[float, float, float, float]:
-    return euler.to_quaternion(*angles, "sxyz", floats, degrees=amount.degrees)
-
-
-def _tell_degrees(row: DhRow, line: int, options: Options) -> None:
-    """Wonder about bare angles beyond a full turn."""
+def _link(row: DhRow, parent: str, child: str, options: Options) -> Link:
+    """Make a link of one row; its joint turns about z or shifts along it."""
+    line = row.fail("").line
     for name, amount in (("theta", row.theta), ("alpha", row.alpha)):
         if not amount.degrees and abs(amount.number) > TURN:
             message = f"{name} {amount.number:g} is more than a full turn in radians; degrees? write {name}_deg"
             options.tally.note_each(message, line, "degrees")
+    theta = euler.to_quaternion(0.0, 0.0, row.theta.number, "sxyz", floats, degrees=row.theta.degrees)
+    alpha = euler.to_quaternion(row.alpha.number, 0.0, 0.0, "sxyz", floats, degrees=row.alpha.degrees)
+    along_z, along_x = (0.0, 0.0, row.d.number, *theta), (row.a, 0.0, 0.0, *alpha)
+    modified = options.answers.dh == "modified"
+    origin = rigid.compose(*along_x, *along_z) if modified else IDENTITY
+    after = IDENTITY if modified else rigid.compose(*along_z, *along_x)
+    joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, AXIS, line=line),)
+    return Link(parent, child, origin, joints, line, after, fixed="" if joints else row.name)

@@ -18,9 +18,10 @@ from frametool.documents.yaml import TAG
 from frametool.errors import did_you_mean, listing, shown
 from frametool.formats.load import Recording
 from frametool.formats.trees.matrices import Stated, edges_of
-from frametool.formats.trees.tree_reader import document_edges
+from frametool.formats.trees.tree_reader import XYZ, document_edges, named
+from frametool.frames.path import IDENTITY
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import read_name
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, read_texts, within
 from frametool.grammar.rotation_spelling import rotation_of
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path, Quaternion, Reading
 
 TAGS = frozenset(("!Rpy", "!AngleAxis", "!Identity"))
@@ -40,9 +40,7 @@ JOINTS, BODIES = "default_joint_positions", "default_free_body_pose"
 WORLD = "world"
 _RPY = notation("rpy_deg")
 _AXIS_ANGLE = notation("axis_angle_deg")
-_XYZ = ("x", "y", "z")
 _ZEROS = ["0", "0", "0"]
-_IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -55,9 +53,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             raise Misfit(f"expected directives as a list, found {kind(listed)}", ("directives",))
         for index, entry in enumerate(listed):
             within(("directives", index), scene.take, entry, ("directives", index))
-        options.tally.about = scene.about
+        about = f"without the frames of {listing(scene.missing, 3)} (--with their files, by name)"
+        options.tally.about = about if scene.missing else f"{len(scene.poses)} poses"
         # of directives that only add models something is known too: Drake's world is always there
-        return edges_of(scene.poses, reading) or [Edge(None, WORLD, _IDENTITY)]
+        return edges_of(scene.poses, reading) or [Edge(None, WORLD, IDENTITY)]
 
     yield from document_edges(file, options, take, TAGS)
 
@@ -71,13 +70,6 @@ class _Scene:
         self.poses: list[Stated] = []
         self.missing: list[str] = []
         self.aliases: dict[str, str] = {}  # an added frame with the scope of what it is fixed to -> as it was written
-
-    @property
-    def about(self) -> str:
-        """Say which models are not there."""
-        if not self.missing:
-            return f"{len(self.poses)} poses"
-        return f"without the frames of {listing(self.missing, 3)} (--with their files, by name)"
 
     def take(self, entry: Any, path: Path) -> None:
         """Read one directive; raises Misfit."""
@@ -102,9 +94,9 @@ class _Scene:
 
     def _model(self, model: dict[str, Any], path: Path) -> None:
         """Take a model: put its scope on its file, tell its joints' values, and keep its free pose."""
-        name = _named(model, "name")
+        name = named(model, "name")
         only(model, ("name", "file", JOINTS, BODIES))
-        found = self._beside(_named(model, "file"), name)
+        found = self._beside(named(model, "file"), name)
         positions = within((JOINTS,), as_mapping, model.get(JOINTS, {}), "positions of joints")
         if positions and isinstance(found, Recording):
             self._say_joints(found, positions, (*path, JOINTS))
@@ -130,7 +122,7 @@ class _Scene:
     def _include(self, include: dict[str, Any], _: Path) -> None:
         """Put their scope on other directives beside this file."""
         only(include, ("file", "model_namespace"))
-        self._beside(_named(include, "file"), read_name(include, "model_namespace") or "")
+        self._beside(named(include, "file"), read_name(include, "model_namespace") or "")
 
     def _beside(self, address: str, scope: str) -> InputFile | None:
         """Put a scope before the names of a file that is read together with this one."""
@@ -145,9 +137,9 @@ class _Scene:
 
     def _frame(self, frame: dict[str, Any], path: Path) -> None:
         only(frame, ("name", "X_PF"))
-        name = _named(frame, "name")
+        name = named(frame, "name")
         pose = within(("X_PF",), as_mapping, frame.get("X_PF"), "X_PF as {base_frame: .., translation: ..}")
-        base = within(("X_PF",), _named, pose, "base_frame")
+        base = within(("X_PF",), named, pose, "base_frame")
         scope, colons, _ = base.rpartition("::")
         if colons and "::" not in name:
             self.aliases[f"{scope}::{name}"] = name
@@ -155,10 +147,10 @@ class _Scene:
 
     def _weld(self, weld: dict[str, Any], path: Path) -> None:
         only(weld, ("parent", "child", "X_PC"))
-        parent, child = _named(weld, "parent"), _named(weld, "child")
+        parent, child = named(weld, "parent"), named(weld, "child")
         pose = weld.get("X_PC")
         if pose is None:
-            self._add(parent, child, _IDENTITY, path)
+            self._add(parent, child, IDENTITY, path)
         else:
             within(("X_PC",), only, within(("X_PC",), as_mapping, pose, "X_PC as a pose"), ("translation", "rotation"))
             self._state(parent, child, pose, (*path, "X_PC"), len(path))
@@ -166,26 +158,14 @@ class _Scene:
     def _state(self, parent: str, child: str, pose: dict[str, Any], path: Path, depth: int) -> None:
         """Keep a pose; misfits in it are placed below the directive."""
         self.reading.here = path
-        self._add(parent, child, within(path[depth:], _pose, pose, self.reading), path)
+        within(path[depth:], only, pose, ("base_frame", "translation", "rotation"))
+        shift = within((*path[depth:], "translation"), read_numbers, pose.get("translation", _ZEROS), XYZ)
+        turn = within((*path[depth:], "rotation"), _rotation, pose.get("rotation", {}), self.reading)
+        self._add(parent, child, (*shift, *turn), path)
 
     def _add(self, parent: str, child: str, pose: Rigid, path: Path) -> None:
         parent, child = (self.aliases.get(name, name) for name in (parent, child))
         self.poses.append(Stated(parent, child, child, pose, path, firm=True))
-
-
-def _named(fields: dict[str, Any], key: str) -> str:
-    """Return the name under a key; raises Misfit."""
-    name = read_name(fields, key)
-    if name is None:
-        raise Misfit(f"missing {key}")
-    return name
-
-
-def _pose(pose: dict[str, Any], reading: Reading) -> Rigid:
-    """Read {translation, rotation}; what is missing is 0 and the identity."""
-    only(pose, ("base_frame", "translation", "rotation"))
-    shift = within(("translation",), read_numbers, pose.get("translation", _ZEROS), _XYZ)
-    return (*shift, *within(("rotation",), _rotation, pose.get("rotation", {}), reading))
 
 
 def _rotation(value: Any, reading: Reading) -> Quaternion:
@@ -200,7 +180,7 @@ def _rotation(value: Any, reading: Reading) -> Quaternion:
         only(fields, (TAG, "angle_deg", "axis"))
         if "angle_deg" not in fields:
             raise Misfit("missing angle_deg")
-        texts = [*within(("axis",), read_texts, fields.get("axis", ["0", "0", "1"]), _XYZ), fields["angle_deg"]]
+        texts = [*within(("axis",), read_texts, fields.get("axis", ["0", "0", "1"]), XYZ), fields["angle_deg"]]
         places: list[Path] = [*(("axis", index) for index in range(3)), ("angle_deg",)]
         return rotation_of(_AXIS_ANGLE, texts, places, reading)
     if keys := [key for key in fields if key != TAG]:

@@ -9,35 +9,34 @@ Metres; degrees unless the compiler says radian; quaternions w first, of any len
 and fixed ones in upper case. Values of a key: --joints FILE.xml:KEY. <include>, <replicate>, <attach> are refused.
 Source: MuJoCo 3 and 4, XML reference and engine_core_smooth.c (mj_kinematics).
 
-The bodies, sites, cameras and joints of an MJCF model, in the order in which MuJoCo counts them.
+Of the five ways to write an orientation (quat, axisangle, euler, xyaxes, zaxis) an element has one at most, and its own
+puts aside that of its class.
 """
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.source import Source
-from frametool.documents.xml import XmlFile, read_nodes
+from frametool.documents.source import InputFile, Source
+from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
-from frametool.formats.robots.joints import Joint, JointValue
-from frametool.formats.robots.mjcf_attributes import Classes, PoseReader, own_attributes
+from frametool.formats.robots.model import Joint, JointValue, Link
 from frametool.formats.robots.posture import Posture, Setting
-from frametool.geometry import floats, quaternion, rigid
-from frametool.geometry.trig import DEGREE
+from frametool.frames.path import IDENTITY
+from frametool.geometry import axis_angle, floats, matrix, quaternion, rigid
+from frametool.geometry.quaternion import cross, unit_vector
+from frametool.geometry.trig import DEGREE, half_sincos, half_sincos_deg
 from frametool.grammar.edges import Edge, Options, Tally, Topics
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from typing import Any
+    from collections.abc import Callable, Iterator, Mapping
 
-    from frametool.documents.source import InputFile
-    from frametool.documents.xml import XmlNode
-    from frametool.formats.robots.mjcf_attributes import Attributes
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Path, Vector
+    from frametool.grammar.readers import Path, Quaternion, Vector
 
-IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    Attributes = Mapping[str, "Attribute"]
+
 WORLD = "world"
 WHOLE = "save it whole: mujoco.mj_saveLastXML('whole.xml', mujoco.MjModel.from_xml_path('FILE'))"
 REFUSED = ("include", "replicate", "attach")
@@ -53,30 +52,17 @@ HELD = {
     "keyframe": ("key", "include"),
 }
 TYPES = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "floating"}
-
-
-class Anchored(NamedTuple):
-    """A joint of a body, and the point of the body that it turns about."""
-
-    joint: Joint
-    anchor: Vector
-    node: XmlNode
-
-
-class Placed(NamedTuple):
-    """A body, site or camera: its pose in its parent where every joint is at its reference, and its joints in order."""
-
-    parent: str
-    name: str
-    pose: Rigid
-    joints: list[Anchored]
-    node: XmlNode
+ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+MAIN = "main"
+STRAIGHT = ("capsule", "cylinder", "box", "ellipsoid")  # sites that may be written from end to end
+LEAST = 1e-14  # what MuJoCo takes for a vector without a direction
+SAME_LINE = 1e-10  # what MuJoCo takes for a zaxis along z
 
 
 class _Inside(NamedTuple):
     """What surrounds an element: its body, the default class, and the frames in the body that it stands in."""
 
-    body: Placed
+    body: str
     around: str
     frame: Rigid
 
@@ -84,37 +70,29 @@ class _Inside(NamedTuple):
 class MjcfModel:
     """The frames of a model, bodies before what they hold."""
 
-    def __init__(self, root: XmlNode, xml: XmlFile, options: Options) -> None:
+    def __init__(self, root: XmlNode, options: Options) -> None:
         """Read a model; raises FormatError."""
-        self.xml = xml
         self.options = options
         self._refuse(root)
-        self.poses = PoseReader(root, xml)
+        self.poses = PoseReader(root)
         for section in root.all("default"):
             self._refuse(section)
-        self.classes = Classes(root, xml)
-        self.placed: dict[str, Placed] = {}
-        self.joint_names: dict[str, XmlNode] = {}
+        self.classes = Classes(root)
+        self.links: dict[str, Link] = {}
+        self.joints: dict[str, Joint] = {}
         self._counts: dict[tuple[str, str], int] = {}
-        self.world = Placed("", WORLD, IDENTITY, [], root)
         for section in root.all("worldbody"):
             self._walk(section)
-
-    @property
-    def joints(self) -> list[Anchored]:
-        """Return all joints in the order of qpos: body by body, those of a body before those of the bodies in it."""
-        return [joint for placed in self.placed.values() for joint in placed.joints]
 
     def _refuse(self, node: XmlNode) -> None:
         """Refuse what MuJoCo would have to expand first."""
         for child in node.all(*REFUSED):
-            message = f"<{child.tag}> is not expanded here; {WHOLE}"
-            raise self.xml.error(child.element, message)
+            raise child.error(f"<{child.tag}> is not expanded here; {WHOLE}")
 
     def _walk(self, section: XmlNode) -> None:
         """Read what stands in a world in the order of the file; a stack, for bodies may be deep."""
         self._refuse(section)
-        pending = [(child, _Inside(self.world, "", IDENTITY)) for child in reversed(section.children)]
+        pending = [(child, _Inside(WORLD, "", IDENTITY)) for child in reversed(section.children)]
         while pending:
             node, around = pending.pop()
             if (inside := self._take(node, around)) is not None:
@@ -125,13 +103,13 @@ class MjcfModel:
         """Read one element; of a body or frame return what surrounds that which it holds."""
         if node.tag in MADE:
             message = f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}"
-            self.options.tally.note_each(message, node.element.line)
+            self.options.tally.note_each(message, node.line)
         elif node.tag == "frame":
-            pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node.element)))
+            pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node)))
             return inside._replace(around=self._class(node, inside.around), frame=pose)
         elif node.tag == "body":
-            body = self._place(node, inside, self.poses.pose(own_attributes(node.element)))
-            return _Inside(body, self._class(node, inside.around), IDENTITY)
+            name = self._place(node, inside, self.poses.pose(own_attributes(node)))
+            return _Inside(name, self._class(node, inside.around), IDENTITY)
         elif node.tag in JOINTS:
             self._join(node, inside)
         else:
@@ -142,119 +120,82 @@ class MjcfModel:
         """Return the class that a body or frame gives to what stands in it."""
         name = node.attribute("childclass")
         if name:
-            self.classes.check(name, node.element, "childclass")
+            self.classes.check(name, node, "childclass")
         return name or around
 
     def _mark(self, node: XmlNode, inside: _Inside) -> None:
         """Read a site or camera."""
-        attributes = self.classes.attributes(node.element, inside.around)
+        attributes = self.classes.attributes(node, inside.around)
         pose = self.poses.pose_of_site(attributes) if node.tag == "site" else self.poses.pose(attributes)
-        placed = self._place(node, inside, pose)
+        name = self._place(node, inside, pose)
         if "mode" in attributes and (mode := attributes["mode"].text.strip()) != "fixed":
-            message = f"{placed.name} has the mode {shown(mode)}, in which MuJoCo turns it over time"
-            self.options.tally.note_each(f"{message}; it stands as written", node.element.line)
+            message = f"{name} has the mode {shown(mode)}, in which MuJoCo turns it over time; it stands as written"
+            self.options.tally.note_each(message, node.line)
 
-    def _place(self, node: XmlNode, inside: _Inside, pose: Rigid) -> Placed:
-        """Register a body, site or camera; sites and cameras have names of their own, and show it."""
-        name = self._name(node, inside.body.name)
+    def _place(self, node: XmlNode, inside: _Inside, pose: Rigid) -> str:
+        """Hang a body, site or camera where it is at rest; return its name, which shows whether it is a body."""
+        name = node.attribute("name")
+        if not name:  # counted in its body
+            count = self._counts[inside.body, node.tag] = self._counts.get((inside.body, node.tag), 0) + 1
+            name = f"{inside.body}/{node.tag}{count}"
         name = name if node.tag == "body" else f"{node.tag}:{name}"
-        known = self.placed.get(name)
+        known = self.links.get(name)
         if known is not None or name == WORLD:
-            first = f"; first in line {known.node.element.line}" if known else ", which is the name of the root"
-            raise self.xml.error(node.element, f"{node.tag} {shown(name)} twice{first}", "name")
+            first = f"; first in line {known.line}" if known else ", which is the name of the root"
+            raise node.error(f"{node.tag} {shown(name)} twice{first}", "name")
         pose = pose if inside.frame == IDENTITY else rigid.compose(*inside.frame, *pose)
-        self.placed[name] = Placed(inside.body.name, name, pose, [], node)
-        return self.placed[name]
-
-    def _name(self, node: XmlNode, body: str) -> str:
-        """Return the name of an element; one without is counted in its body."""
-        if name := node.attribute("name"):
-            return name
-        count = self._counts[body, node.tag] = self._counts.get((body, node.tag), 0) + 1
-        return f"{body}/{node.tag}{count}"
+        self.links[name] = Link(inside.body, name, pose, line=node.line)
+        return name
 
     def _join(self, node: XmlNode, inside: _Inside) -> None:
         """Read a joint of a body."""
-        body = inside.body
-        if body is self.world:
-            raise self.xml.error(node.element, "the world has no joints; put it into a <body>")
+        if inside.body == WORLD:
+            raise node.error("the world has no joints; put it into a <body>")
+        link = self.links[inside.body]
         free = node.tag == "freejoint"
-        attributes = own_attributes(node.element) if free else self.classes.attributes(node.element, inside.around)
+        attributes = own_attributes(node) if free else self.classes.attributes(node, inside.around)
         kind = "free" if free else self.poses.word(attributes, "type", "hinge", tuple(TYPES))
         if kind == "free" and (node.attribute("align") or str(self.poses.aligns_free).lower()) == "true":
             message = "alignfree: MuJoCo moves this body's frame onto its inertia, which is not computed here"
-            raise self.xml.error(node.element, f'{message}; write align="false", or {WHOLE}')
-        name = node.attribute("name") or f"{body.name}/joint{len(body.joints) + 1}"
-        if known := self.joint_names.get(name):
-            raise self.xml.error(node.element, f"joint {shown(name)} twice; first in line {known.element.line}", "name")
-        if kind == "free" and body.parent != WORLD:
+            raise node.error(f'{message}; write align="false", or {WHOLE}')
+        name = node.attribute("name") or f"{link.child}/joint{len(link.joints) + 1}"
+        if known := self.joints.get(name):
+            raise node.error(f"joint {shown(name)} twice; first in line {known.line}", "name")
+        if kind == "free" and link.parent != WORLD:
             message = f"joint {shown(name)} is free: it belongs into a body directly in the world"
-            raise self.xml.error(node.element, message)
-        if body.joints and "floating" in (body.joints[0].joint.kind, TYPES[kind]):
-            message = f"joint {shown(name)} beside others in body {shown(body.name)}, one of them free; keep that"
-            raise self.xml.error(node.element, message)
-        self.joint_names[name] = node
-        body.joints.append(self._anchored(node, name, kind, attributes, inside.frame))
+            raise node.error(message)
+        if link.joints and "floating" in (link.joints[0].kind, TYPES[kind]):
+            message = f"joint {shown(name)} beside others in body {shown(link.child)}, one of them free; keep that"
+            raise node.error(message)
+        joint = Joint(name, TYPES[kind], rest_pose=link.origin, line=node.line)  # free: its pose in the world
+        if kind != "free":
+            joint = self._hinged(joint._replace(rest_pose=IDENTITY), attributes, inside.frame)
+        self.joints[name] = joint
+        origin = IDENTITY if kind == "free" else link.origin
+        self.links[link.child] = link._replace(origin=origin, joints=(*link.joints, joint))
 
-    def _anchored(self, node: XmlNode, name: str, kind: str, attributes: Attributes, frame: Rigid) -> Anchored:
+    def _hinged(self, joint: Joint, attributes: Attributes, frame: Rigid) -> Joint:
         """Read the axis, anchor, limits and reference of a joint; frames around it move axis and anchor."""
-        if kind == "free":
-            return Anchored(Joint(name, "floating", line=node.element.line), (0.0, 0.0, 0.0), node)
-        px, py, pz = self.poses.numbers(attributes, "pos", 3, (0.0, 0.0, 0.0))
-        anchor = rigid.apply(*frame, px, py, pz)
-        if kind == "ball":
-            return Anchored(Joint(name, "ball", line=node.element.line), anchor, node)
+        anchor = rigid.apply(*frame, *self.poses.vector(attributes, "pos"))
+        if joint.kind == "ball":
+            return joint._replace(anchor=anchor)
         axis = quaternion.rotate(*frame[3:], *self.poses.direction(attributes, "axis", (0.0, 0.0, 1.0)))
-        degrees = kind == "hinge" and self.poses.degrees
-        (rest,) = (value * DEGREE if degrees else value for value in self.poses.numbers(attributes, "ref", 1, (0.0,)))
-        lower, upper = self._limits(attributes, degrees=degrees)
-        return Anchored(Joint(name, TYPES[kind], axis, lower, upper, rest=rest, line=node.element.line), anchor, node)
-
-    def _limits(self, attributes: Attributes, *, degrees: bool) -> tuple[float | None, float | None]:
-        """Read the range of a joint, where it is limited: by default where it has one."""
+        unit = DEGREE if joint.kind == "revolute" and self.poses.degrees else 1.0
+        rest = unit * self.poses.numbers(attributes, "ref", 1, (0.0,))[0]
         limited = self.poses.word(attributes, "limited", "auto", ("auto", "true", "false"))
-        applies = limited == "true" or (limited == "auto" and self.poses.limits_apply)
-        if "range" not in attributes or not applies:
-            return None, None
-        lower, upper = self.poses.numbers(attributes, "range", 2, ())
-        return (lower * DEGREE, upper * DEGREE) if degrees else (lower, upper)
+        lower = upper = None
+        if "range" in attributes and (limited == "true" or (limited == "auto" and self.poses.limits_apply)):
+            lower, upper = (unit * limit for limit in self.poses.numbers(attributes, "range", 2, ()))
+        return joint._replace(axis=axis, lower=lower, upper=upper, rest=rest, anchor=anchor)
 
 
 SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others have one
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a model, its joints as told, else at their references."""
-    xml = XmlFile(file)
-    model = MjcfModel(read_nodes(xml, HELD), xml, options)
-    joints = [each.joint for each in model.joints]
-    posture = Posture(joints, options, lambda joint, problem: xml.error(model.joint_names[joint.name].element, problem))
-    for placed in model.placed.values():
-        line = placed.node.element.line
-        if not placed.joints:
-            yield Edge(placed.parent, placed.name, placed.pose, line=line)
-            continue
-        for stamp_ns, moved in posture.motions(*(each.joint.name for each in placed.joints)):
-            yield Edge(placed.parent, placed.name, _moved(placed, moved, posture), stamp_ns, line)
-
-
-def _moved(placed: Placed, moved: Sequence[Rigid], posture: Posture) -> Rigid:
-    """Return the pose of a body whose joints have moved; the value of a free one is the pose itself, in the world."""
-    pose = placed.pose
-    for (joint, anchor, _), motion in zip(placed.joints, moved, strict=True):
-        if joint.kind == "floating":
-            pose = motion if joint.name in posture.told else pose
-        elif motion != IDENTITY:
-            pose = rigid.compose(*pose, *_about(anchor, motion))
-    return pose
-
-
-def _about(anchor: tuple[float, float, float], motion: Rigid) -> Rigid:
-    """Return a motion about a point: what turns leaves the point where it is."""
-    tx, ty, tz, qx, qy, qz, qw = motion
-    px, py, pz = anchor
-    mx, my, mz = quaternion.rotate(qx, qy, qz, qw, px, py, pz)
-    return tx + px - mx, ty + py - my, tz + pz - mz, qx, qy, qz, qw
+    """Yield the edges of a model, its joints as options say, else at their references."""
+    model = MjcfModel(read_nodes(XmlFile(file), HELD), options)
+    yield from Posture.of(model.links.values(), options).edges(model.links.values())
 
 
 def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
@@ -267,48 +208,232 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
     finally:
         file.close()
     root = read_nodes(xml, HELD)
-    joints = MjcfModel(root, xml, Options(Tally(), Topics())).joints
-    key = _key(root, xml, state)
+    links = MjcfModel(root, Options(Tally(), Topics())).links.values()
+    joints = [joint for link in links for joint in link.joints]  # a body's before those of the bodies in it
+    key = _key(root, state)
     if not key.attribute("qpos"):
-        raise xml.error(key.element, f"key {shown(state)} has no qpos")
-    count = sum(_size(each.joint) for each in joints)
-    numbers = iter(xml.numbers(key.element, "qpos", count))
-    refuse = partial(_refused, xml, key)
-    for anchored in joints:
-        mine = [next(numbers) for _ in range(_size(anchored.joint))]
-        yield Setting(anchored.joint.name, _value(anchored, mine, refuse), None, refuse, Source(xml.name, ""))
+        raise key.error(f"key {shown(state)} has no qpos")
+    sizes = [SIZES.get(joint.kind, 1) for joint in joints]
+    numbers = iter(xml.numbers(key.element, "qpos", sum(sizes)))
+
+    def refuse(problem: str, _path: Path) -> FormatError:
+        return key.error(problem, "qpos")
+
+    for joint, size in zip(joints, sizes, strict=True):
+        value = _value(joint, list(islice(numbers, size)), refuse)
+        yield Setting(joint.name, value, None, refuse, Source(xml.name, ""))
 
 
-def _size(joint: Joint) -> int:
-    return SIZES.get(joint.kind, 1)
-
-
-def _key(root: XmlNode, xml: XmlFile, state: str) -> XmlNode:
+def _key(root: XmlNode, state: str) -> XmlNode:
     """Return the key of a name or number."""
     keys = [key for frames in root.all("keyframe") for key in frames.all("key")]
+    file = root.xml.name
     names = {key.attribute("name") or str(index): key for index, key in enumerate(keys)}
     numbered = {str(index): key for index, key in enumerate(keys)}
     if not keys:
-        raise FormatError("no <key> in it, which would say where joints stand", source=xml.name)
+        raise FormatError("no <key> in it, which would say where joints stand", source=file)
     if not state:
-        message = f"name one of its keys: {xml.name}:{next(iter(names))}"
-        raise FormatError(f"{message}{alternatives('', names, 'keys')}", source=xml.name)
+        message = f"name one of its keys: {file}:{next(iter(names))}"
+        raise FormatError(f"{message}{alternatives('', names, 'keys')}", source=file)
     if state not in names | numbered:
-        raise FormatError(f"no key {shown(state)}{alternatives(state, names, 'keys')}", source=xml.name)
+        raise FormatError(f"no key {shown(state)}{alternatives(state, names, 'keys')}", source=file)
     return names.get(state) or numbered[state]
 
 
-def _value(anchored: Anchored, numbers: list[float], refuse: Any) -> Any:
+def _value(joint: Joint, numbers: list[float], refuse: Callable[[str, Path], FormatError]) -> Any:
     """Return the value of a joint as files have it: a number, or the mapping that is a pose; quaternions w first."""
-    if anchored.joint.kind not in SIZES:
+    if joint.kind not in SIZES:
         return JointValue(numbers[0])
     w, x, y, z = numbers[-4:]
     if w == x == y == z == 0.0:
-        raise refuse(f"qpos of joint {shown(anchored.joint.name)}: 0 0 0 0 has no direction", ())
-    turned = quaternion.normalized(x, y, z, w, floats)
-    pose: dict[str, Any] = {"xyzw": [repr(part) for part in turned]}
-    return pose | {"xyz": [repr(part) for part in numbers[:3]]} if anchored.joint.kind == "floating" else pose
+        raise refuse(f"qpos of joint {shown(joint.name)}: 0 0 0 0 has no direction", ())
+    pose: dict[str, Any] = {"xyzw": [repr(part) for part in quaternion.normalized(x, y, z, w, floats)]}
+    return pose | {"xyz": [repr(part) for part in numbers[:3]]} if joint.kind == "floating" else pose
 
 
-def _refused(xml: XmlFile, key: XmlNode, problem: str, _path: Path) -> FormatError:
-    return xml.error(key.element, problem, "qpos")
+class Attribute(NamedTuple):
+    """The text of an attribute, and the element that has it: maybe a default."""
+
+    name: str
+    text: str
+    node: XmlNode
+
+    def error(self, message: str) -> FormatError:
+        """Make the error for its place."""
+        return self.node.error(message, self.name)
+
+
+def own_attributes(node: XmlNode) -> dict[str, Attribute]:
+    """Return the attributes of an element; those that are empty count as missing."""
+    return {name: Attribute(name, text, node) for name, text in node.element.attributes.items() if text.strip()}
+
+
+def over(inner: Attributes, outer: Attributes) -> dict[str, Attribute]:
+    """Return the attributes of an element on top of those of its class: one orientation puts all others aside."""
+    turned = any(name in inner for name in ORIENTATIONS)
+    kept = {name: each for name, each in outer.items() if not (turned and name in ORIENTATIONS)}
+    return {**kept, **inner}
+
+
+class Classes:
+    """The default classes of a model: class -> kind of element -> attributes; nested ones have those around them too.
+
+    A class may be used before it is defined.
+    """
+
+    def __init__(self, root: XmlNode) -> None:
+        """Read all sections of defaults; raises FormatError."""
+        self.classes: dict[str, dict[str, Attributes]] = {MAIN: {}}
+        for section in root.all("default"):
+            name = section.attribute("class") or MAIN
+            if name != MAIN:
+                raise section.error(f"the outermost default class is called main, found {shown(name)}", "class")
+            self._take(section)
+
+    def _take(self, section: XmlNode) -> None:
+        """Read one section, then those in it, each from a copy; a stack, for they may be deep."""
+        pending = [(section, MAIN)]
+        while pending:
+            node, name = pending.pop()
+            mine = self.classes[name]
+            for child in node.children:
+                if child.tag != "default":
+                    mine[child.tag] = over(own_attributes(child), mine.get(child.tag, {}))
+            for child in node.all("default"):
+                inner = child.attribute("class")
+                if not inner or inner in self.classes:
+                    said = f"default class {shown(inner)} twice" if inner else "a <default> without class"
+                    raise child.error(said, "class" if inner else "")
+                self.classes[inner] = dict(mine)
+                pending.append((child, inner))
+
+    def attributes(self, node: XmlNode, around: str) -> dict[str, Attribute]:
+        """Return the attributes of an element; `around` is the class that the bodies around it give it, if any."""
+        own = own_attributes(node)
+        name = own["class"].text if "class" in own else around or MAIN
+        self.check(name, node, "class")
+        return over(own, self.classes[name].get(node.tag, {}))
+
+    def check(self, name: str, node: XmlNode, attribute: str) -> None:
+        """Raise FormatError for a class that is nowhere defined."""
+        if name not in self.classes:
+            message = f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}"
+            raise node.error(message, attribute)
+
+
+class PoseReader:
+    """Reads numbers, angles and poses as the compiler section of a model says."""
+
+    def __init__(self, root: XmlNode) -> None:
+        """Read the compiler sections, wherever they stand: the last word on each setting counts; raises FormatError."""
+        said: dict[str, Attribute] = {}
+        for section in root.all("compiler"):
+            said.update(own_attributes(section))
+        self.degrees = self.word(said, "angle", "degree", ("degree", "radian")) == "degree"
+        self.limits_apply = self.word(said, "autolimits", "true", ("true", "false")) == "true"
+        self.aligns_free = self.word(said, "alignfree", "false", ("true", "false")) == "true"
+        self.eulerseq = said["eulerseq"].text if "eulerseq" in said else "xyz"
+        if len(self.eulerseq) != len("xyz") or not set(self.eulerseq) <= set("xyzXYZ"):
+            message = f"eulerseq {shown(self.eulerseq)}; expected three of xyz (moving axes) and XYZ (fixed axes)"
+            raise said["eulerseq"].error(message)
+        if self.word(said, "coordinate", "local", ("local", "global")) == "global":
+            message = "coordinate=global; MuJoCo reads it no more: save the model with MuJoCo 2.3.3 first"
+            raise said["coordinate"].error(message)
+
+    def word(self, attributes: Attributes, name: str, default: str, words: tuple[str, ...]) -> str:
+        """Return an attribute that is one of some words."""
+        if name not in attributes:
+            return default
+        text = attributes[name].text.strip()
+        if text not in words:
+            raise attributes[name].error(f"{name} {shown(text)}; expected {', '.join(words)}")
+        return text
+
+    def numbers(self, attributes: Attributes, name: str, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Read an attribute as so many numbers; without it the default."""
+        if name not in attributes:
+            return default
+        text, node = attributes[name][1:]
+        return node.xml.numbers_in(text, node.element, name, count)
+
+    def direction(self, attributes: Attributes, name: str, default: Vector) -> Vector:
+        """Read a vector of any length but zero, as a unit one."""
+        return self._unit(attributes, name, self.numbers(attributes, name, 3, default))
+
+    def _unit(self, attributes: Attributes, name: str, vector: tuple[float, ...]) -> Vector:
+        x, y, z = vector
+        if quaternion.magnitude(x, y, z, floats) < LEAST:
+            message = f"{name}: {x:g} {y:g} {z:g} has no direction"
+            raise attributes[name].error(message)
+        return unit_vector(x, y, z, floats)
+
+    def pose(self, attributes: Attributes) -> Rigid:
+        """Read position and orientation."""
+        return (*self.vector(attributes, "pos"), *self._orientation(attributes))
+
+    def vector(self, attributes: Attributes, name: str, default: Vector = (0.0, 0.0, 0.0)) -> Vector:
+        """Read three numbers."""
+        x, y, z = self.numbers(attributes, name, 3, default)
+        return x, y, z
+
+    def pose_of_site(self, attributes: Attributes) -> Rigid:
+        """Read the pose of a site, which may be written from end to end: its z axis looks to the first end."""
+        if "fromto" not in attributes:
+            return self.pose(attributes)
+        fromto = attributes["fromto"]
+        if "pos" in attributes:
+            raise fromto.error("pos and fromto in one site; keep one")
+        self.word({"type": Attribute("type", "sphere", fromto.node), **attributes}, "type", "", STRAIGHT)
+        ax, ay, az, bx, by, bz = self.numbers(attributes, "fromto", 6, ())
+        along = self._unit(attributes, "fromto", (ax - bx, ay - by, az - bz))
+        return 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), *_turning_z(*along)
+
+    def _orientation(self, attributes: Attributes) -> Quaternion:
+        given = [name for name in ORIENTATIONS if name in attributes]
+        if len(given) > 1:
+            message = f"{' and '.join(given)} in one element; keep one"
+            raise attributes[given[1]].error(message)
+        return getattr(self, f"_{given[0]}")(attributes) if given else (0.0, 0.0, 0.0, 1.0)
+
+    def _quat(self, attributes: Attributes) -> Quaternion:
+        """Read a quaternion, w first, of any length but zero."""
+        w, x, y, z = self.numbers(attributes, "quat", 4, ())
+        if w == x == y == z == 0.0:
+            raise attributes["quat"].error("quat: 0 0 0 0 has no direction")
+        if abs(w * w + x * x + y * y + z * z - 1.0) <= quaternion.UNIT:
+            return x, y, z, w
+        return quaternion.normalized(x, y, z, w, floats)
+
+    def _axisangle(self, attributes: Attributes) -> Quaternion:
+        x, y, z, angle = self.numbers(attributes, "axisangle", 4, ())
+        axis = self._unit(attributes, "axisangle", (x, y, z))
+        return axis_angle.to_quaternion(*axis, angle, floats, degrees=self.degrees)
+
+    def _euler(self, attributes: Attributes) -> Quaternion:
+        """Multiply the turns about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""
+        turned = (0.0, 0.0, 0.0, 1.0)
+        for letter, angle in zip(self.eulerseq, self.numbers(attributes, "euler", 3, ()), strict=True):
+            sine, cosine = half_sincos_deg(angle, floats) if self.degrees else half_sincos(angle, floats)
+            x, y, z = (sine if axis == letter.lower() else 0.0 for axis in "xyz")
+            turn = x, y, z, cosine
+            turned = quaternion.compose(*turned, *turn) if letter.islower() else quaternion.compose(*turn, *turned)
+        return turned
+
+    def _xyaxes(self, attributes: Attributes) -> Quaternion:
+        """Read x and y axes: x counts, of y what is at right angles to it."""
+        numbers = self.numbers(attributes, "xyaxes", 6, ())
+        x = self._unit(attributes, "xyaxes", numbers[:3])
+        along = sum(a * b for a, b in zip(x, numbers[3:], strict=True))
+        y = self._unit(attributes, "xyaxes", tuple(b - along * a for a, b in zip(x, numbers[3:], strict=True)))
+        z = cross(*x, *y)
+        return matrix.to_quaternion(x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2], floats)
+
+    def _zaxis(self, attributes: Attributes) -> Quaternion:
+        return _turning_z(*self.direction(attributes, "zaxis", (0.0, 0.0, 1.0)))
+
+
+def _turning_z(x: float, y: float, z: float) -> Quaternion:
+    """Return the shortest turn of the z axis into a direction; about x where that is -z, as MuJoCo does."""
+    if z < 0.0 and quaternion.length(x, y, 0.0, floats) < SAME_LINE:
+        return 1.0, 0.0, 0.0, 0.0
+    return quaternion.between(0.0, 0.0, 1.0, x, y, z, floats)

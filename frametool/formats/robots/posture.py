@@ -1,17 +1,12 @@
-"""Where the joints of one robot stand, at one time or over time: as told by options and files, else at rest.
-
-A joint that mimics another follows it, in chains too; only its own name overrides that.
-
-Files that say where joints stand: maps in YAML and JSON, JointState messages, tables, states of other forms.
+"""Where the joints of one robot stand, at one time or over time: as options and files say, else at rest.
 
     {shoulder: 30deg, gripper: 2cm, base: {xyz: [1, 0, 0]}}          with `stamp`, one of many: the joints move
     {name: [shoulder, gripper], position: [0.5, 0.02]}               JointState, of either ROS, one or many
-    t,shoulder_deg,gripper                                           a table; without a stamp its last row counts
+    t,shoulder_deg,elbow [deg],finger (mm)                           a table; without a stamp its last row counts
     robot.srdf:ready                                                 a state that another form has a name for
 
-Each statement keeps its place; what it means is for those who know the joint.
-
-Joints among the columns of a table, by name: `elbow`, `elbow_deg`, `elbow [deg]`, `finger (mm)`; also stamps.
+A joint that mimics another follows it, in chains too; only its own name overrides that.  Each statement keeps its
+place; what it means is for those who know the joint.
 """
 
 from __future__ import annotations
@@ -26,11 +21,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from frametool.documents.source import InputFile, Source
 from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
 from frametool.formats.detect import detect
-from frametool.formats.robots.joints import IDENTITY, TURNING, JointValue, followed, motion, read_value
+from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
 from frametool.formats.table import FORMATS, readers
 from frametool.frames.stamps import format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
-from frametool.grammar.edges import Edge, Tally
+from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.readers import Misfit, Note, as_mapping, kind
 from frametool.ros import joint_state, messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
@@ -40,13 +35,11 @@ from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.formats.robots.joints import Joint, Value
+    from frametool.formats.robots.model import Fail, Value
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Path
 
     Series = Mapping[int, Value]
-    Fail = Callable[[Joint, str], FormatError]
 
 SLACK = 1e-9  # by which a value may lie beyond a limit: printed with fewer digits than it has
 HALF_TURN = 3.141592653589793
@@ -84,24 +77,28 @@ class Posture:
         options.tally.has_joints = True
         options.tally.about = options.tally.about or self._about()
 
-    def edges(self, parent: str, child: str, origin: Rigid, joint: str, line: int = 0) -> Iterator[Edge]:
-        """Yield the edge across one joint: for good, or a sample at each time; `origin` is the pose at rest."""
-        for stamp_ns, (moved,) in self.motions(joint):
-            pose = origin if moved is IDENTITY else rigid.compose(*origin, *moved)
-            yield Edge(parent, child, pose, stamp_ns, line)
+    @classmethod
+    def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> Posture:
+        """Find out where the joints of some links stand."""
+        joints = (joint for link in links for joint in link.joints)
+        return cls(joints, options, fail or _at_its_line, fixed=[link.fixed for link in links if link.fixed])
 
-    def motions(self, *names: str) -> Iterator[tuple[int | None, tuple[Rigid, ...]]]:
-        """Yield what joints do together to the frames behind them: once without a stamp, or at each of their times.
+    def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
+        """Yield an edge a link: for good, or a sample at each time at which one of its joints has a value."""
+        for link in links:
+            for stamp_ns, values in self.values(*(joint.name for joint in link.joints)):
+                yield Edge(link.parent, link.child, link.pose(values), stamp_ns, link.line)
+
+    def values(self, *names: str) -> Iterator[tuple[int | None, list[Value]]]:
+        """Yield the values of joints that move one frame together: once without a stamp, or at each of their times.
 
         A joint without a sample at the time of another one is interpolated.
         """
-        joints = [self.joints[name] for name in names]
-        moving = [name for name in names if name in self.moving]
-        if not moving:
-            yield None, tuple(motion(joint, self.still[joint.name]) for joint in joints)
-            return
-        for stamp_ns in self._common_times(moving):
-            yield stamp_ns, tuple(motion(joint, self._at(joint.name, stamp_ns)) for joint in joints)
+        if moving := [name for name in names if name in self.moving]:
+            for stamp_ns in self._common_times(moving):
+                yield stamp_ns, [self._at(name, stamp_ns) for name in names]
+        else:
+            yield None, [self.still[name] for name in names]
 
     def _common_times(self, moving: Sequence[str]) -> list[int]:
         """Return the times at which any of some joints has a sample and all are known."""
@@ -127,9 +124,6 @@ class Posture:
 
     def _take_files(self) -> None:
         """Read all files; the later one counts, and of one file all its samples."""
-        if not self._options.answers.joint_files:
-            return
-
         for path in self._options.answers.joint_files:
             found: dict[str, list[tuple[int | None, Value]]] = {}
             setting = None
@@ -183,12 +177,8 @@ class Posture:
             self._take(name, [(None, value)])
 
     def _follow(self, fail: Fail) -> None:
-        """Settle each joint that nobody told of: at its leader's value, along chains of any length, or at rest."""
-        for name, joint in self.joints.items():
-            if joint.mimic is None:
-                if name not in self.given:
-                    self.still[name] = joint.start
-                continue
+        """Settle each joint that has no value yet: at its leader's, along chains of any length, or at rest."""
+        for name in self.joints:
             chain = {name: None}
             last = name
             while (leader := self._leader(last, fail)) is not None:
@@ -204,9 +194,7 @@ class Posture:
     def _leader(self, name: str, fail: Fail) -> str | None:
         """Return the joint that decides over one which is not settled yet."""
         mimic = self.joints[name].mimic
-        if name in self.still or name in self.moving or mimic is None:
-            return None
-        if mimic.joint in self._fixed:
+        if name in self.still or name in self.moving or mimic is None or mimic.joint in self._fixed:
             return None
         if mimic.joint not in self.joints:
             raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is no joint")
@@ -233,20 +221,17 @@ class Posture:
     def _tell_limits(self) -> None:
         """Note the values told that lie beyond limits, and steps that a pose cannot follow."""
         for name in (*self.still, *self.moving):
-            joint = self.joints[name]
+            joint, tally = self.joints[name], self._options.tally
             series = self.moving.get(name) or {0: self.still[name]}
             values = [value.plain for value in series.values() if isinstance(value, JointValue)]
             if joint.lower is not None and joint.upper is not None and joint.lower <= joint.upper:
                 beyond = [value for value in values if not joint.lower - SLACK <= value <= joint.upper + SLACK]
                 if beyond:
-                    self._note("limit", _about_limits(joint, beyond, len(values)), joint)
+                    tally.note(Note("limit", _about_limits(joint, beyond, len(values)), ()), joint.line)
             steps = zip(series, values, values[1:], strict=False) if joint.kind == "revolute" else ()
             if wide := next((at for at, one, two in steps if abs(two - one) >= HALF_TURN), None):
                 far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide)}"
-                self._note("odd", f"{far}; poses between go the shorter way", joint)
-
-    def _note(self, rule: str, message: str, joint: Joint) -> None:
-        self._options.tally.note(Note(rule, message, ()), joint.line)
+                tally.note(Note("odd", f"{far}; poses between go the shorter way", ()), joint.line)
 
     def _about(self) -> str:
         """Say how many joints stand where nobody said."""
@@ -256,6 +241,10 @@ class Posture:
         at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)
         many = f"{len(free)} joint{'s' * (len(free) > 1)}"
         return f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
+
+
+def _at_its_line(joint: Joint, problem: str) -> FormatError:
+    return FormatError(problem, line=joint.line)
 
 
 def _about_limits(joint: Joint, beyond: Sequence[float], count: int) -> str:
@@ -276,9 +265,6 @@ def _between(one: Value, two: Value, fraction: float) -> Value:
     return JointValue(one.plain + (two.plain - one.plain) * fraction)
 
 
-_STAMP = re.compile(
-    r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_(n?s))?(?:\s*[\[(]\s*(n?s)\s*[\])])?", re.IGNORECASE
-)
 _HOLDERS = ("joint", "joints", "position", "positions", "joint_positions")  # before a dot
 _UNIT = re.compile(rf"_({'|'.join((*ANGLES, *filter(None, LENGTHS)))})$")
 
@@ -319,13 +305,11 @@ def _joint_column(place: int, name: str, joints: Mapping[str, Joint]) -> JointCo
         return None
     if joint.posed:
         raise ValueInvalid(f"column {shown(name)}: joint {shown(joint.name)} is {joint.kind}, which no number says")
-    units = ("rad", "deg") if joint.kind in TURNING else tuple(filter(None, LENGTHS))
-    known = ANGLES if joint.kind in TURNING else LENGTHS
-    if unit and unit not in known:
+    turns = joint.kind in TURNING
+    if unit and unit not in (ANGLES if turns else LENGTHS):
+        units = ("rad", "deg") if turns else tuple(filter(None, LENGTHS))
         raise ValueInvalid(f"column {shown(name)}: joint {shown(joint.name)} is {joint.kind}; units: {listing(units)}")
-    if joint.kind in TURNING:
-        return JointColumn(place, bare_name, degrees=ANGLES.get(unit, False))
-    return JointColumn(place, bare_name, per_metre=LENGTHS[unit])
+    return JointColumn(place, bare_name, ANGLES.get(unit, False), 1.0 if turns else LENGTHS[unit])
 
 
 def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
@@ -344,10 +328,10 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
 
 def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, bool] | None:
     """Find the column of stamps: its place, and whether they are nanoseconds; None if there is none."""
-    for place, name in enumerate(names):
-        if name.strip() not in joints and (match := _STAMP.fullmatch(name.strip())):
-            return place, "ns" in (match[1], match[2])
-    return None
+    from frametool.grammar import names as known
+
+    place = known.stamp_column("" if name.strip() in joints else name.strip() for name in names)
+    return None if place is None else (place, known.in_nanoseconds(names[place].strip()))
 
 
 def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
@@ -360,12 +344,6 @@ def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
     return ""
 
 
-def no_joints(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
-    """Say that no column is called as a joint."""
-    return f"no column is a joint; columns: {', '.join(map(bare, names[:20]))}; joints: {listing(joints)}"
-
-
-TIMES = ("stamp", "stamp_ns", "time", "t")
 DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
 
 
@@ -388,7 +366,9 @@ class JointFile:
 
     def __init__(self, path: str, joints: Mapping[str, Joint]) -> None:
         """Open it: a file, or FILE:STATE for a state that it has a name for; raises FileProblem."""
-        self.path, self.state = _parted(path)
+        file, colon, state = path.rpartition(":")
+        has_state = colon and file and not os.path.exists(path) and os.path.exists(file)
+        self.path, self.state = (file, state) if has_state else (path, "")
         self.joints = joints
         self.tally = Tally()
         self.file = InputFile(self.path)
@@ -419,19 +399,19 @@ class JointFile:
         elif "rows" in FORMATS[form].reads:
             yield from self._table(form, head.decode("utf-8", "replace"))
         else:
-            for message in read_messages(self.file.stream, name, "echo", self.tally):
-                yield from self._message(message, self._values)
+            yield from self._messages(read_messages(self.file.stream, name, "echo", self.tally))
 
-    def _message(
-        self, message: Message | FormatError, read: Callable[[Any, Path, Message], Iterator[Setting]]
+    def _messages(
+        self, messages: Iterable[Message | FormatError], state_of: Callable[[Any], Any] | None = None
     ) -> Iterator[Setting]:
-        """Yield what one document or row says."""
-        if isinstance(message, FormatError):
-            raise message
-        try:
-            yield from read(message.value, (), message)
-        except Misfit as misfit:
-            raise message.error(misfit) from None
+        """Yield what documents or rows say; `state_of` makes a JointState of a row."""
+        for message in messages:
+            if isinstance(message, FormatError):
+                raise message
+            try:
+                yield from self._values(state_of(message.value) if state_of else message.value, (), message)
+            except Misfit as misfit:
+                raise message.error(misfit) from None
 
     def _values(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
         """Yield the settings of a plain value: a JointState, a map, or a list of either."""
@@ -443,20 +423,21 @@ class JointFile:
         else:
             try:
                 mapping = as_mapping(value, "a map of joints, or a JointState")
-                read = self._state if joint_state.is_joint_state(mapping) else self._map
-                yield from read(mapping, path, message)
+                if not joint_state.is_joint_state(mapping):
+                    yield from self._map(mapping, path, message)
+                    return
+                stamp_ns = joint_state.stamp_of_state(mapping)
+                for joint, position, place in joint_state.positions(mapping):
+                    refuse = partial(_refused, message, (*path, *place))
+                    yield Setting(joint, _finite(position, place), stamp_ns, refuse, message.source)
             except Misfit as misfit:
                 raise misfit.below(*path) from None
 
-    def _state(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
-        stamp_ns = joint_state.stamp_of_state(mapping)
-        for joint, position, place in joint_state.positions(mapping):
-            number = _finite(position, place)
-            yield Setting(joint, number, stamp_ns, partial(_refused, message, (*path, *place)), message.source)
-
     def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
         """Yield what a map says, or the one map in it, as under `joints:`."""
-        times = [key for key in TIMES if key in mapping and key not in self.joints]
+        from frametool.grammar.names import STAMP_KEYS
+
+        times = [key for key in STAMP_KEYS if key in mapping and key not in self.joints]
         stamp_ns = _time(mapping, times[0]) if times else None
         keys = [key for key in mapping if key not in times]
         if len(keys) == 1 and keys[0] not in self.joints and type(mapping[keys[0]]) is dict:
@@ -470,19 +451,14 @@ class JointFile:
         first = next((line for line in head.split("\n") if line.strip()), "")
         name = self.file.name
         if first.startswith("%time,"):
-            for message in read_messages(self.file.stream, name, "csv1", self.tally):
-                yield from self._message(message, self._numbered)
+            rows = read_messages(self.file.stream, name, "csv1", self.tally)
+            yield from self._messages(rows, joint_state.of_numbered)
         elif joint_state.looks_like_row(first):
-            for line, text in line_texts(self.file.stream, name, self.tally):
-                yield from self._message(Message(text, Source(name, text), line, cells=True), self._row)
+            texts = line_texts(self.file.stream, name, self.tally)
+            rows = (Message(text, Source(name, text), line, cells=True) for line, text in texts)
+            yield from self._messages(rows, lambda row: joint_state.of_row(joint_state.unquoted(row)))
         else:
             yield from self._columns(form)
-
-    def _numbered(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
-        return self._state(joint_state.of_numbered(value), path, message)
-
-    def _row(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
-        return self._state(joint_state.of_row(joint_state.unquoted(value)), path, message)
 
     def _cells(self, form: str, line: str) -> list[str]:
         if form == "csv":
@@ -496,7 +472,10 @@ class JointFile:
         names = self._cells(form, header.strip("\r\ufeff"))
         try:
             columns = find_joint_columns(names, self.joints)
-            if problem := misspelt(names, self.joints) if columns else no_joints(names, self.joints):
+            if not columns:
+                named = ", ".join(map(bare, names[:20]))
+                raise ValueInvalid(f"no column is a joint; columns: {named}; joints: {listing(self.joints)}")
+            if problem := misspelt(names, self.joints):
                 raise ValueInvalid(problem)
         except ValueInvalid as error:
             raise FormatError(str(error), source=self.file.name, line=number) from None
@@ -509,7 +488,10 @@ class JointFile:
             if line.lstrip().startswith("#"):
                 continue
             cells = self._cells(form, line.rstrip("\r"))
-            refuse = partial(_refused_row, self.file.name, number)
+
+            def refuse(problem: str, _below: Path, line: int = number) -> FormatError:
+                return FormatError(problem, source=self.file.name, line=line)
+
             if len(cells) != len(names):
                 raise refuse(f"expected {len(names)} cells, found {len(cells)}", ())
             at = ""
@@ -523,12 +505,6 @@ class JointFile:
                     yield Setting(joint, value, stamp_ns if stamp else None, refuse, source)
             except ValueInvalid as error:
                 raise refuse(f"{at}: {error}", ()) from None
-
-
-def _parted(path: str) -> tuple[str, str]:
-    """Part FILE:STATE, unless there is a file of that name."""
-    file, colon, state = path.rpartition(":")
-    return (file, state) if colon and file and not os.path.exists(path) and os.path.exists(file) else (path, "")
 
 
 def _time(mapping: dict[str, Any], key: str) -> int:
@@ -553,10 +529,6 @@ def _finite(value: Any, path: Path) -> JointValue:
 
 def _refused(message: Message, path: Path, problem: str, below: Path) -> FormatError:
     return message.error(Misfit(problem, (*path, *below)))
-
-
-def _refused_row(name: str, line: int, problem: str, _below: Path) -> FormatError:
-    return FormatError(problem, source=name, line=line)
 
 
 def unknown_joint(joint: str, joints: Mapping[str, Joint], fixed: frozenset[str]) -> str:

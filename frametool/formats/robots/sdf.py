@@ -10,35 +10,322 @@ Without `relative_to` a pose is that in the model; of a joint in its child, of a
 A model outside of any world has a parent, `world`, if it has a pose. `<include>` is left out, and said.
 Source: sdformat.org, Pose Frame Semantics and Model Composition, SDF 1.4 to 1.12.
 
-The joints of an SDF file: which bodies they connect, and how those move.
-
-The frame of a joint is attached to its child; axes are seen from it, or from the frame that `expressed_in` names.
+Every model is a scope: a pose is relative to a frame of the model it stands in, or of one nested in that, named with
+`::`.  Which frame a frame is attached to is another matter, and says how it moves.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from functools import reduce
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.xml import XmlFile, read_nodes
+from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
-from frametool.formats.robots.joints import Joint, Mimic
+from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
 from frametool.formats.robots.posture import Posture
-from frametool.formats.robots.sdf_frames import HELD, IDENTITY, WORLD, SdfFrames
-from frametool.geometry import floats, quaternion, rigid
+from frametool.frames.path import IDENTITY
+from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.quaternion import unit_vector
-from frametool.grammar.edges import Edge
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
-    from frametool.documents.xml import XmlNode
-    from frametool.formats.robots.sdf_frames import SdfFrame
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
+    from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Vector
+
+_AXIS = frozenset(("xyz", "limit", "mimic", "use_parent_model_frame"))
+HELD = {
+    "sdf": frozenset(("world", "model", "include")),
+    "world": frozenset(("model", "frame", "joint", "include", "state")),
+    "model": frozenset(("model", "link", "joint", "frame", "pose", "include")),
+    "link": frozenset(("pose", "sensor")),
+    "sensor": frozenset(("pose",)),
+    "frame": frozenset(("pose",)),
+    "joint": frozenset(("pose", "parent", "child", "axis", "axis2")),
+    "axis": _AXIS,
+    "axis2": _AXIS,
+    "limit": frozenset(("lower", "upper")),
+    "mimic": frozenset(("multiplier", "offset", "reference")),
+    "include": frozenset(("uri", "name")),
+}
+
+
+def read_pose(holder: XmlNode, options: Options) -> tuple[Rigid, str]:
+    """Read the pose of an element: x y z roll pitch yaw, or x y z qx qy qz qw.
+
+    What is empty or missing is the identity.  Returns it with what it is relative to, "" for the default.
+    Raises FormatError.
+    """
+    pose = holder.first("pose")
+    if pose is None:
+        return IDENTITY, ""
+    if pose.attribute("frame"):
+        message = "<pose frame=..> of SDF 1.5 has no meaning and is left out; relative_to has one"
+        options.tally.note_each(message, pose.line)
+    degrees, form = pose.attribute("degrees").lower() in TRUE, pose.attribute("rotation_format")
+    if form not in ("", "euler_rpy", "quat_xyzw"):
+        message = f"rotation_format {shown(form)}; expected euler_rpy or quat_xyzw"
+        raise pose.error(message, "rotation_format")
+    if degrees and form == "quat_xyzw":
+        raise pose.error("degrees with quat_xyzw; keep one", "degrees")
+    relative_to = pose.attribute("relative_to")
+    if not pose.text:
+        return IDENTITY, relative_to
+    x, y, z, roll, pitch, yaw = pose.numbers(7 if form == "quat_xyzw" else 6)[:6]
+    if form == "quat_xyzw":
+        rotation = read_quaternion(pose.xml, pose.element, pose.text.split()[3:], options)
+    else:
+        rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats, degrees=degrees)
+    return (x, y, z, *rotation), relative_to
+
+
+WORLD = "world"
+INSIDE = "__model__"
+DEEPEST_MODEL = 100
+TRUE = ("true", "1")
+
+
+class SdfFrame:
+    """One frame: of a world, model, link, joint, sensor, or one that is only a frame.
+
+    name: with its scopes, as the tree has it; local: as the file has it
+    scope: the model, or the world, in which it stands; of the world itself
+    attached_to: the frame that it moves with, unless it is a link
+    pose: as written, in `relative_to`; in_scope: worked out, in the frame of the scope
+    """
+
+    __slots__ = ("attached_to", "holder", "in_scope", "kind", "local", "name", "open", "placement", "pose",
+                 "relative_to", "scope")  # fmt: skip
+
+    def __init__(self, kind: str, local: str, scope: SdfFrame | None, holder: XmlNode) -> None:
+        """Create a frame whose pose is not read yet."""
+        self.kind = kind
+        self.local = local
+        self.scope: SdfFrame = scope or self
+        self.name: str = local if scope is None or scope.kind == WORLD else f"{scope.name}::{local}"
+        self.holder = holder
+        self.pose = IDENTITY
+        self.relative_to = self.attached_to = self.scope
+        self.placement: SdfFrame | None = None
+        self.in_scope: Rigid | None = None
+        self.open = False
+
+    def below(self, scope: SdfFrame) -> list[SdfFrame]:
+        """Return the frames on the way up from this one to a scope around it, that excluded."""
+        way, frame = [], self
+        while frame is not scope:
+            way.append(frame)
+            frame = frame.scope
+        return way
+
+
+class SdfFrames:
+    """All frames of a file by name."""
+
+    def __init__(self, root: XmlNode, options: Options) -> None:
+        """Read the frames and the poses; raises FormatError."""
+        self.options = options
+        worlds = list(root.all("world"))
+        if len(worlds) > 1:
+            raise worlds[1].error("a second <world>; a tree is of one")
+        self.top = SdfFrame(WORLD, WORLD, None, worlds[0] if worlds else root)
+        self.all: dict[str, SdfFrame] = {WORLD: self.top}
+        self.sensors: list[SdfFrame] = []
+        parts = root.attribute("version").split(".")  # what is not a number counts as the newest
+        self.version = tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else (2,)
+        self.missing: FormatError | None = None  # the last error about a name that was left out
+        self.gone: set[str] = set()
+        self._take([self.top])
+        while self._read_all():  # as long as names are lost with what was left out
+            pass
+        for frame in self.all.values():
+            self._settle(frame)
+
+    def _take(self, scopes: list[SdfFrame]) -> None:
+        """Register what stands in some scopes, and in those below."""
+        for scope in scopes:  # which grows
+            if len(scope.below(self.top)) > DEEPEST_MODEL:
+                raise scope.holder.error(f"more than {DEEPEST_MODEL} models inside one another")
+            for holder in scope.holder.children:
+                if holder.tag == "include":
+                    name = shown(holder.text_of("name") or holder.text_of("uri"))
+                    message = (
+                        f"<include> {name} is left out, it needs other files; with them: gz sdf -p FILE > whole.sdf"
+                    )
+                    self.options.tally.note_each(message, holder.line)
+                elif holder.tag == "state":
+                    message = "<state> is left out: every model stands where its own pose has it"
+                    self.options.tally.note_each(message, holder.line)
+                elif holder.tag in ("model", "link", "joint", "frame"):
+                    frame = self._named(holder, scope)
+                    if holder.tag == "model":
+                        scopes.append(frame)
+                    for sensor in holder.all("sensor"):
+                        self.sensors.append(SdfFrame("sensor", self._name(sensor), frame, sensor))
+
+    def _name(self, holder: XmlNode) -> str:
+        name = holder.attribute("name")
+        if not name:
+            raise holder.error(f"<{holder.tag}> has no name")
+        return name
+
+    def _named(self, holder: XmlNode, scope: SdfFrame) -> SdfFrame:
+        """Register one element under its name."""
+        frame = SdfFrame(holder.tag, self._name(holder), scope, holder)
+        if frame.local in (WORLD, INSIDE):
+            raise holder.error(f"the name {shown(frame.local)} is reserved", "name")
+        known = self.all.get(frame.name)
+        if known is not None and self.version < (1, 7) and holder.tag == "joint" and known.kind == "link":
+            message = f"joint {shown(frame.local)} has the name of a link; its frame is {frame.local}_joint"
+            self.options.tally.note_each(message, holder.line)
+            frame = SdfFrame("joint", f"{frame.local}_joint", scope, holder)
+            known = self.all.get(frame.name)
+        if known is not None:
+            first = f"first in line {known.holder.line}"
+            raise holder.error(f"{holder.tag} {shown(frame.name)} twice; {first}", "name")
+        self.all[frame.name] = frame
+        return frame
+
+    def _read_all(self) -> bool:
+        """Read every frame; return whether some were left out because they build on what is included."""
+        lost: list[SdfFrame] = []
+        for frame in [*self.all.values(), *self.sensors]:
+            try:
+                if frame is not self.top:
+                    self._read(frame)
+            except FormatError as error:
+                if error is not self.missing:
+                    raise
+                lost.append(frame)
+                message = f"{frame.kind} {shown(frame.name)} is left out: {error.message}"
+                self.options.tally.note_each(message, frame.holder.line)
+        self.gone |= {frame.name for frame in lost}
+        self.all = {name: each for name, each in self.all.items() if not self._is_gone(each)}
+        self.sensors = [each for each in self.sensors if not self._is_gone(each)]
+        return bool(lost)
+
+    def _is_gone(self, frame: SdfFrame) -> bool:
+        """Tell whether a frame, or a scope around it, was left out."""
+        return any(each.name in self.gone for each in (frame, *frame.below(self.top)))
+
+    def _read(self, frame: SdfFrame) -> None:
+        """Read the pose of a frame and find what it is relative to."""
+        holder, scope = frame.holder, frame.scope
+        frame.pose, relative_to = read_pose(holder, self.options)
+        if frame.kind == "frame" and (name := holder.attribute("attached_to")):
+            frame.attached_to = self.find(name, scope, holder, "attached_to")
+        elif frame.kind == "joint":  # both ends must be there
+            _, frame.attached_to = self.end(frame, "parent"), self.end(frame, "child")
+        elif frame.kind == "sensor":  # which stands in its link, but sees the names around that
+            scope = scope.scope
+        frame.relative_to = frame.attached_to
+        if relative_to:
+            frame.relative_to = self.find(relative_to, scope, holder.first("pose") or holder, "relative_to")
+        if frame.kind == "model" and (placed := holder.attribute("placement_frame")):
+            frame.placement = self.find(placed, frame, holder, "placement_frame")
+
+    def end(self, joint: SdfFrame, which: str) -> SdfFrame:
+        """Return the frame that is the parent or the child of a joint."""
+        holder = joint.holder.first(which)
+        if holder is None or not holder.text:
+            raise (holder or joint.holder).error(f"joint {shown(joint.local)} has no <{which}>")
+        if holder.text == WORLD:
+            return self.top
+        return self.find(holder.text, joint.scope, holder, "")
+
+    def find(self, name: str, scope: SdfFrame, holder: XmlNode, attribute: str) -> SdfFrame:
+        """Return the frame that a name means in a scope.
+
+        Raises FormatError with the names there are.
+        """
+        if name == (INSIDE if scope.kind == "model" else WORLD):
+            return scope
+        full = name if scope.kind == WORLD else f"{scope.name}::{name}"
+        found = self.all.get(full) or self.all.get(full.removesuffix(f"::{INSIDE}"))
+        if found is not None and found is not self.top:
+            return found
+        place = "the world" if scope.kind == WORLD else f"model {shown(scope.name)}"
+        message = f"no frame {shown(name)} in {place}"
+        if self._is_left_out(name, full, scope):
+            self.missing = holder.error(message, attribute)
+            raise self.missing
+        if name == WORLD:
+            raise holder.error(f"{message}; poses in a model are relative to frames of the model", attribute)
+        inside = [frame.local for frame in self.all.values() if frame.scope is scope and frame is not scope]
+        raise holder.error(f"{message}{alternatives(name, inside, 'frames')}", attribute)
+
+    def _is_left_out(self, name: str, full: str, scope: SdfFrame) -> bool:
+        """Tell whether a name is one that was left out, or begins with that of an included model."""
+        if any(full == gone or full.startswith(f"{gone}::") for gone in self.gone):
+            return True
+        for include in scope.holder.all("include"):
+            file = include.text_of("uri").rstrip("/").rsplit("/", 1)[-1]
+            names = (include.text_of("name"), file, file.rsplit(".", 1)[0])
+            if name.split("::", maxsplit=1)[0] in names or include.attribute("merge") == "true":
+                return True
+        return False
+
+    def _settle(self, frame: SdfFrame) -> None:
+        """Work out the pose of a frame in its scope, after those it depends on; a stack, for chains may be long.
+
+        Raises FormatError for frames that are relative to each other in a circle.
+        """
+        pending = [frame]
+        while pending:
+            current = pending[-1]
+            if current.in_scope is not None:
+                pending.pop()
+                continue
+            needed = self._between(current.relative_to, current.scope)
+            if current.placement:
+                needed = needed + current.placement.below(current)
+            needed = [each for each in needed if each.in_scope is None]
+            if not needed:
+                current.in_scope = self._worked_out(current)
+            elif current.open or any(each.open for each in needed):
+                named = " -> ".join(shown(each.name) for each in [current, *needed][:2])
+                message = f"poses relative to each other in a circle: {named}"
+                raise (current.holder.first("pose") or current.holder).error(message)
+            else:
+                current.open = True
+                pending += needed
+
+    def _between(self, frame: SdfFrame, scope: SdfFrame) -> list[SdfFrame]:
+        """Return the frames between one and a scope: those below that, or above it where the frame is the world."""
+        return scope.below(self.top) if frame is self.top else frame.below(scope)
+
+    def _worked_out(self, frame: SdfFrame) -> Rigid:
+        pose = frame.pose
+        if frame.relative_to is not frame.scope:
+            outer = _product(self._between(frame.relative_to, frame.scope))
+            if frame.relative_to is self.top:
+                outer = rigid.inverse(*outer)
+            pose = rigid.compose(*outer, *pose)
+        if frame.placement is None:
+            return pose
+        return rigid.compose(*pose, *rigid.inverse(*_product(frame.placement.below(frame))))
+
+    def relative(self, outer: SdfFrame, frame: SdfFrame) -> Rigid:
+        """Return the pose of one frame in another, before anything has moved; as written where it was written so."""
+        if frame.relative_to is outer and frame.placement is None:
+            return frame.pose
+        if outer.relative_to is frame and outer.placement is None:
+            return rigid.inverse(*outer.pose)
+        around = {id(each) for each in (outer, *outer.below(self.top), self.top)}
+        common = next(each for each in (*frame.below(self.top), self.top) if id(each) in around)
+        seen = _product(frame.below(common))
+        return seen if common is outer else rigid.relative(*_product(outer.below(common)), *seen)
+
+
+def _product(way: Sequence[SdfFrame]) -> Rigid:
+    """Compose the poses of frames in their scopes, the innermost given first."""
+    poses = [each.in_scope or IDENTITY for each in reversed(way)]
+    return reduce(lambda outer, inner: rigid.compose(*outer, *inner), poses) if poses else IDENTITY
+
 
 KINDS = {  # how many axes each has
     "revolute": 1, "continuous": 1, "prismatic": 1, "universal": 2, "revolute2": 2, "ball": 0, "fixed": 0,
@@ -52,27 +339,15 @@ class SdfJoint(NamedTuple):
     """What connects two bodies, links or the world.
 
     motions: what moves, outermost first; nothing for a fixed joint
+    hanging: the body that hangs on the other one, `outer`: on the world everything hangs
     """
 
     frame: SdfFrame
     parent: SdfFrame
     child: SdfFrame
     motions: tuple[Joint, ...]
-
-    @property
-    def turned(self) -> bool:
-        """Tell whether the parent hangs on the child: on the world everything hangs."""
-        return self.child.kind == WORLD
-
-    @property
-    def hanging(self) -> SdfFrame:
-        """Return the body that hangs on the other one."""
-        return self.parent if self.turned else self.child
-
-    @property
-    def outer(self) -> SdfFrame:
-        """Return the body that it hangs on."""
-        return self.child if self.turned else self.parent
+    hanging: SdfFrame
+    outer: SdfFrame
 
 
 class SdfJoints:
@@ -84,7 +359,6 @@ class SdfJoints:
     def __init__(self, frames: SdfFrames) -> None:
         """Read them; raises FormatError."""
         self.frames = frames
-        self.xml = frames.xml
         of_joints = [frame for frame in frames.all.values() if frame.kind == "joint"]
         counts = Counter(frame.holder.attribute("name") for frame in of_joints)
         self.names = {
@@ -103,19 +377,16 @@ class SdfJoints:
         while current is not None and current.kind not in ("link", WORLD):
             if current in seen:
                 named = " -> ".join(shown(each.name) for each in [*seen, current][-3:])
-                raise self.xml.error(frame.holder.element, f"frames attached to each other in a circle: {named}")
+                raise frame.holder.error(f"frames attached to each other in a circle: {named}")
             seen.append(current)
-            if current.kind == "frame":
-                current = self.frames.attached(current)
-            else:
-                current = self.frames.end(current, "child") if current.kind == "joint" else self.canonical(current)
+            current = self.canonical(current) if current.kind == "model" else current.attached_to
         return current
 
     def canonical(self, model: SdfFrame) -> SdfFrame | None:
         """Return the link that a model's frame is attached to: the one it names, or the first, also of nested ones."""
-        if told := model.holder.attribute("canonical_link"):
+        if name := model.holder.attribute("canonical_link"):
             try:
-                return self.frames.find(told, model, model.holder, "canonical_link")
+                return self.frames.find(name, model, model.holder, "canonical_link")
             except FormatError as error:
                 if error is not self.frames.missing:
                     raise
@@ -129,71 +400,58 @@ class SdfJoints:
         kind = holder.attribute("type")
         if kind not in KINDS:
             message = f"joint {shown(frame.local)} has the type {shown(kind)}{alternatives(kind, KINDS, 'types')}"
-            raise self.xml.error(holder.element, message, "type")
+            raise holder.error(message, "type")
         parent, child = (self.body(self.frames.end(frame, which)) for which in ("parent", "child"))
         if parent is None or child is None or parent is child:
-            raise self.xml.error(holder.element, f"joint {shown(frame.local)} does not connect two links")
+            raise holder.error(f"joint {shown(frame.local)} does not connect two links")
         if kind in STILL:
             message = f"joint {shown(frame.local)} is a {kind}: it stands as in the file and takes no value"
-            self.frames.options.tally.note_each(message, holder.element.line)
-        return SdfJoint(frame, parent, child, self._motions(frame, kind))
+            self.frames.options.tally.note_each(message, holder.line)
+        hanging, outer = (parent, child) if child.kind == WORLD else (child, parent)
+        return SdfJoint(frame, parent, child, self._motions(frame, kind), hanging, outer)
 
     def _motions(self, frame: SdfFrame, kind: str) -> tuple[Joint, ...]:
-        name, line = self.names[frame.name], frame.holder.element.line
+        name, line = self.names[frame.name], frame.holder.line
         if kind == "ball":
             return (Joint(name, "ball", line=line),)
         plain = {"continuous": "continuous", "prismatic": "prismatic"}.get(kind, "revolute")
         motions = []
         for tag, called in (("axis", name), ("axis2", f"{name}:2"))[: KINDS[kind]]:
             if axis := frame.holder.first(tag):
-                motions.append(self._axis(frame, axis, called, plain))
+                lower, upper = (self._limit(axis.first("limit"), which) for which in ("lower", "upper"))
+                if lower is None or upper is None or lower > upper:
+                    lower = upper = None
+                direction, mimic = self._direction(frame, axis), self._mimic(frame, axis)
+                motions.append(Joint(called, plain, direction, lower, upper, mimic, line=line))
             else:
                 message = f"joint {shown(frame.local)} has no <{tag}>: it takes no value there"
                 self.frames.options.tally.note_each(message, line)
         return tuple(motions)
-
-    def _axis(self, frame: SdfFrame, axis: XmlNode, name: str, kind: str) -> Joint:
-        """Read one axis of a joint, with its limits and what it mimics."""
-        line = frame.holder.element.line
-        lower, upper = self._limits(axis)
-        return Joint(name, kind, self._direction(frame, axis), lower, upper, self._mimic(frame, axis), line=line)
 
     def _direction(self, frame: SdfFrame, axis: XmlNode) -> Vector:
         """Return an axis as the joint's frame sees it."""
         xyz = axis.first("xyz")
         if xyz is None:
             return 0.0, 0.0, 1.0
-        x, y, z = self.xml.numbers_in(xyz.text, xyz.element, "", 3)
+        x, y, z = xyz.numbers(3)
         if not (x or y or z):
-            raise self.xml.error(xyz.element, f"joint {shown(frame.local)} has the axis 0 0 0, which is no direction")
-        scope = frame.scope or self.frames.top
-        told = xyz.attribute("expressed_in")
-        outer = self.frames.find(told, scope, xyz, "expressed_in") if told else None
-        if not told and self._in_model(axis):
-            outer = scope
-        if outer is not None and outer is not frame:
+            raise xyz.error(f"joint {shown(frame.local)} has the axis 0 0 0, which is no direction")
+        outer, version = frame, self.frames.version
+        if name := xyz.attribute("expressed_in"):
+            outer = self.frames.find(name, frame.scope, xyz, "expressed_in")
+        elif version < (1, 5) or (version < (1, 7) and axis.text_of("use_parent_model_frame").lower() in TRUE):
+            outer = frame.scope  # before 1.5 an axis is seen from the model, until 1.6 where it says so
+        if outer is not frame:
             turned = self.frames.relative(frame, outer)[3:]
             x, y, z = quaternion.rotate(*turned, x, y, z)
         return unit_vector(x, y, z, floats)
-
-    def _in_model(self, axis: XmlNode) -> bool:
-        """Tell whether an axis is seen from the model: in SDF before 1.5 always, until 1.6 where it says so."""
-        version = self.frames.version
-        flag = axis.text_of("use_parent_model_frame").lower() in ("true", "1")
-        return version < (1, 5) or (flag and version < (1, 7))
-
-    def _limits(self, axis: XmlNode) -> tuple[float | None, float | None]:
-        limit = axis.first("limit")
-        lower = self._limit(limit, "lower")
-        upper = self._limit(limit, "upper")
-        return (None, None) if lower is None or upper is None or lower > upper else (lower, upper)
 
     def _limit(self, limit: XmlNode | None, which: str) -> float | None:
         """Read one limit; None for none, which SDF writes as 1e16 or inf."""
         held = limit.first(which) if limit is not None else None
         if held is None or held.text.lstrip("+-").lower() in ("inf", "infinity"):
             return None
-        (value,) = self.xml.numbers_in(held.text, held.element, "", 1)
+        (value,) = held.numbers(1)
         return value if isfinite(value) and abs(value) < UNLIMITED else None
 
     def _mimic(self, frame: SdfFrame, axis: XmlNode) -> Mimic | None:
@@ -201,9 +459,9 @@ class SdfJoints:
         mimic = axis.first("mimic")
         if mimic is None:
             return None
-        leader = self.frames.find(mimic.attribute("joint"), frame.scope or self.frames.top, mimic, "joint")
+        leader = self.frames.find(mimic.attribute("joint"), frame.scope, mimic, "joint")
         if leader.kind != "joint":
-            raise self.xml.error(mimic.element, f"{shown(leader.name)} is a {leader.kind}, no joint", "joint")
+            raise mimic.error(f"{shown(leader.name)} is a {leader.kind}, no joint", "joint")
         name = self.names[leader.name] + (":2" if mimic.attribute("axis") == "axis2" else "")
         multiplier = self._number(mimic, "multiplier", 1.0)
         offset, reference = self._number(mimic, "offset", 0.0), self._number(mimic, "reference", 0.0)
@@ -211,33 +469,35 @@ class SdfJoints:
 
     def _number(self, holder: XmlNode, tag: str, default: float) -> float:
         held = holder.first(tag)
-        return default if held is None else self.xml.numbers_in(held.text, held.element, "", 1)[0]
+        return default if held is None else held.numbers(1)[0]
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a world or model, its joints as told, else where the file has them."""
-    xml = XmlFile(file)
-    frames = SdfFrames(read_nodes(xml, HELD), xml, options)
-    yield from _SdfTree(frames, SdfJoints(frames), options).edges()
+    """Yield the edges of a world or model, its joints as options say, else where the file has them."""
+    yield from _SdfTree(SdfFrames(read_nodes(XmlFile(file), HELD), options)).edges()
 
 
 class _SdfTree:
     """Hangs the frames of a file on each other."""
 
-    def __init__(self, frames: SdfFrames, joints: SdfJoints, options: Options) -> None:
+    def __init__(self, frames: SdfFrames) -> None:
         self.frames = frames
-        self.joints = joints
-        self.options = options
+        self.joints = joints = SdfJoints(frames)
+        self.options = frames.options
         self.hung: dict[str, SdfJoint] = {}  # link -> the joint that it hangs on
         self._above: dict[str, str] = {}  # link -> one on which it hangs, if not at once
         for joint in joints.all:
             self._hang(joint)
         ends = [end for joint in joints.all for end in (joint.parent, joint.child)]
         self.in_world = frames.top.holder.tag == "world" or frames.top in ends
-        self.carried = {model.name: self._carrier(model) for model in frames.all.values() if model.kind == "model"}
+        self.carried: dict[str, SdfFrame] = {}  # model -> the link on which its frame hangs, not its links on it
+        for model in frames.all.values():
+            link = joints.body(model) if model.kind == "model" else None
+            if link is not None and link.name in self.hung:
+                self.carried[model.name] = link
 
     def _hang(self, joint: SdfJoint) -> None:
-        """Let a link hang on a joint; one that would close a loop is left out, and told."""
+        """Let a link hang on a joint; one that would close a loop is left out, with a note."""
         link = joint.hanging.name
         if link in self.hung:
             where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
@@ -248,7 +508,7 @@ class _SdfTree:
             self._above[link] = joint.outer.name
             return
         message = f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}"
-        self.options.tally.note_each(message, joint.frame.holder.element.line)
+        self.options.tally.note_each(message, joint.frame.holder.line)
 
     def _root_of(self, link: str) -> str:
         """Return the link at the top of those on which a link hangs; the way is cut short for the next time."""
@@ -259,82 +519,47 @@ class _SdfTree:
         self._above.update(dict.fromkeys(way, link))
         return link
 
-    def _carrier(self, model: SdfFrame) -> SdfFrame | None:
-        """Return the link on which a model's frame hangs; None where its links hang on it."""
-        link = self.joints.body(model)
-        return link if link is not None and link.name in self.hung else None
-
-    def _around(self, frame: SdfFrame) -> SdfFrame:
-        """Return the frame of the nearest model around one that no joint moves, or the world."""
-        scope = frame.scope
-        while scope is not None and self.carried.get(scope.name):
-            scope = scope.scope
-        return scope or self.frames.top
-
     def edges(self) -> Iterator[Edge]:
         """Yield every edge, and the root where nothing stands in a world."""
-        posture = self._posture()
-        for frame in self.frames.all.values():
-            if frame.name in self.hung:
-                yield from self._across(self.hung[frame.name], posture)
-            elif frame is not self.frames.top:
-                yield self._edge(self._outer(frame), frame)
+        links = [self._link(frame) for frame in self.frames.all.values() if frame is not self.frames.top]
         for sensor in self.frames.sensors:
-            link = sensor.scope or self.frames.top
-            pose = rigid.compose(*self.frames.relative(link, sensor.relative_to or link), *sensor.pose)
-            yield Edge(link.name, sensor.name, pose, line=sensor.holder.element.line)
+            holder = sensor.scope
+            pose = rigid.compose(*self.frames.relative(holder, sensor.relative_to), *sensor.pose)
+            links.append(Link(holder.name, sensor.name, pose, line=sensor.holder.line))
+        return self._posture().edges(links)
+
+    def _link(self, frame: SdfFrame) -> Link:
+        """Return how a frame hangs: on the joint that holds it, if one does."""
+        line = frame.holder.line
+        relative = self.frames.relative
+        if joint := self.hung.get(frame.name):
+            line = joint.frame.holder.line
+            origin, after = relative(joint.parent, joint.frame), relative(joint.frame, joint.child)
+            rest, inverted = relative(joint.outer, frame), frame is joint.parent
+            return Link(joint.outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
+        outer = self._outer(frame)
+        model = frame.below(self.frames.top)[-1]
+        if not self.in_world and outer is self.frames.top and model.kind == "model" and model.in_scope == IDENTITY:
+            return Link(None, frame.name, line=line)  # outside of any world, in a model without a pose in one
+        return Link(outer.name, frame.name, relative(outer, frame), line=line)
 
     def _outer(self, frame: SdfFrame) -> SdfFrame:
         """Return the frame on which one hangs that no joint holds."""
-        if frame.kind == "joint":
-            return self.frames.end(frame, "child")
-        if frame.kind == "frame":
-            return self.frames.attached(frame)
-        return self.carried.get(frame.name) or self._around(frame)
-
-    def _edge(self, outer: SdfFrame, frame: SdfFrame) -> Edge:
-        """Return an edge that stands still."""
-        line = frame.holder.element.line
-        if outer is self.frames.top and self._is_root(frame):
-            return Edge(None, frame.name, IDENTITY, line=line)
-        return Edge(outer.name, frame.name, self.frames.relative(outer, frame), line=line)
-
-    def _is_root(self, frame: SdfFrame) -> bool:
-        """Tell whether a frame has no parent: outside of any world, in a model without a pose in one."""
-        way = frame.below(self.frames.top)
-        return not self.in_world and way[-1].kind == "model" and way[-1].in_scope == IDENTITY
+        if frame.kind in ("joint", "frame"):
+            return frame.attached_to
+        if link := self.carried.get(frame.name):
+            return link
+        scope = frame.scope  # the nearest model around it that no joint moves, or the world
+        while scope.name in self.carried:
+            scope = scope.scope
+        return scope
 
     def _posture(self) -> Posture:
-        """Return where the joints stand."""
-        places = {motion.name: joint.frame.holder.element for joint in self.joints.all for motion in joint.motions}
+        """Return where the joints stand; values have the names that we have for joints: `tip` for `arm::tip`."""
+        places = {motion.name: joint.frame.holder for joint in self.joints.all for motion in joint.motions}
         moving = [motion for joint in self.joints.all for motion in joint.motions]
         fixed = [self.joints.names[joint.frame.name] for joint in self.joints.all if not joint.motions]
-        return Posture(
-            moving,
-            self._with_short_names(),
-            lambda joint, problem: self.frames.xml.error(places[joint.name], problem),
-            fixed=fixed,
-        )
-
-    def _with_short_names(self) -> Options:
-        """Return the options with values of joints under the names that we have for them: `tip` for `arm::tip`."""
         answers = self.options.answers
-        told = {self.joints.names.get(name, name): value for name, value in answers.joints.items()}
-        return self.options._replace(answers=answers._replace(joints=told))
-
-    def _across(self, joint: SdfJoint, posture: Posture) -> Iterator[Edge]:
-        """Yield the edge across a joint: for good, or a sample at each time."""
-        hanging = joint.hanging
-        outer = joint.outer
-        rest = self.frames.relative(outer, hanging)
-        line = joint.frame.holder.element.line
-        for stamp_ns, moved in posture.motions(*(motion.name for motion in joint.motions)):
-            pose = rest if all(each == IDENTITY for each in moved) else self._moved(joint, moved)
-            yield Edge(outer.name, hanging.name, pose, stamp_ns, line)
-
-    def _moved(self, joint: SdfJoint, moved: tuple[Rigid, ...]) -> Rigid:
-        """Return the pose of the body that hangs on a joint once that has moved."""
-        pose = self.frames.relative(joint.parent, joint.frame)
-        for each in (*moved, self.frames.relative(joint.frame, joint.child)):
-            pose = rigid.compose(*pose, *each)
-        return rigid.inverse(*pose) if joint.turned else pose
+        values = {self.joints.names.get(name, name): value for name, value in answers.joints.items()}
+        options = self.options._replace(answers=answers._replace(joints=values))
+        return Posture(moving, options, lambda joint, problem: places[joint.name].error(problem), fixed=fixed)

@@ -15,183 +15,143 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.source import UTF16, Source
-from frametool.documents.xml import XmlFile
-from frametool.errors import FormatError, ValueInvalid, alternatives, bare, listing, shown
-from frametool.formats.robots.joints import IDENTITY, Joint, Mimic
+from frametool.documents.source import UTF16, InputFile, paused_collector
+from frametool.documents.xml import Element, XmlFile, XmlNode, read_nodes
+from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, listing, shown
+from frametool.formats.load import Recording, refuse_unknown_joints
+from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
+from frametool.frames.path import IDENTITY
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import Pose
-from frametool.grammar.readers import INDICES, Note, Reading
-from frametool.grammar.result import rotation_numbers
-from frametool.grammar.rotation_spelling import TURN, agreeing_rotation, rotation_of
+from frametool.grammar.readers import Note
+from frametool.grammar.result import Style, rotation_numbers
+from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from os import PathLike
 
-    from frametool.documents.source import InputFile
-    from frametool.documents.xml import Element
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Quaternion, Vector
-    from frametool.grammar.result import Style
+    from frametool.grammar.readers import Vector
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
-PARTS = ("origin", "parent", "child", "axis", "limit", "mimic")
-
-
-class Hinge(NamedTuple):
-    """What connects a link to its parent: the pose at rest, and the joint, None for a fixed one."""
-
-    name: str
-    parent: str
-    child: str
-    origin: Rigid
-    joint: Joint | None
-    element: Element
+LIMITED = ("revolute", "prismatic")
+HELD = {
+    "robot": ("link", "joint"),
+    "link": ("link", "joint"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
+}
+_XACRO = f"xacro, not yet URDF; {FORMATS['xacro'].instead}"
 
 
 class RobotDescription(NamedTuple):
-    """The links of a robot, each with its line, and what connects them, in the order of the file."""
+    """The frames of a robot, each with its line, and how those hang that a joint holds, in the order of the file."""
 
-    xml: XmlFile
-    links: dict[str, int]
-    hinges: list[Hinge]
+    frames: dict[str, int]
+    links: list[Link]
+    posture: Posture
 
     @property
     def roots(self) -> list[str]:
-        """Return the links that hang nowhere."""
-        children = {hinge.child for hinge in self.hinges}
-        return [link for link in self.links if link not in children]
-
-    def posture(self, options: Options) -> Posture:
-        """Return where the joints stand, as the options say."""
-        places = {hinge.name: hinge.element for hinge in self.hinges}
-        joints = [hinge.joint for hinge in self.hinges if hinge.joint]
-        fixed = [hinge.name for hinge in self.hinges if not hinge.joint]
-        return Posture(joints, options, lambda joint, problem: self.xml.error(places[joint.name], problem), fixed=fixed)
+        """Return the frames that hang nowhere."""
+        children = {link.child for link in self.links}
+        return [frame for frame in self.frames if frame not in children]
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a robot, its joints as told, else at 0."""
+    """Yield the edges of a robot, its joints as options say, else at 0."""
     robot = describe(file, options)
-    for link in robot.roots:
-        yield Edge(None, link, IDENTITY, line=robot.links[link])
-    posture = robot.posture(options)
-    for _, parent, child, origin, joint, element in robot.hinges:
-        if joint is None:
-            yield Edge(parent, child, origin, line=element.line)
-        else:
-            yield from posture.edges(parent, child, origin, joint.name, element.line)
+    for frame in robot.roots:
+        yield Edge(None, frame, IDENTITY, line=robot.frames[frame])
+    yield from robot.posture.edges(robot.links)
 
 
 def describe(file: InputFile, options: Options) -> RobotDescription:
-    """Read the links and joints of a robot.
+    """Read the links and joints of a robot, and find out where the joints stand.
 
     Raises FormatError for what is no URDF; what is wrong with one joint goes to `options.report`.
     """
     xml = XmlFile(file)
+    # few files hold what would have to be looked for in every attribute
+    if b"$" in xml.data or b"xacro" in xml.data or xml.data.startswith(UTF16):
+        for element in xml.elements(deepest=3, ends=False):
+            _refuse_xacro(xml, element)
     reader = _Reader(xml, options)
-    for element in xml.elements(deepest=3, ends=False):
-        reader.take(element)
-    reader.end_joint()
-    robot = RobotDescription(xml, reader.links, list(reader.connected()))
-    if not robot.links:
+    for node in read_nodes(xml, HELD, "URDF", texts=False).children:
+        try:
+            reader.take(node)
+        except FormatError as error:
+            options.report(error)
+    links = list(reader.connected())
+    robot = RobotDescription(reader.frames, links, Posture.of(links, options, reader.fail))
+    if not robot.frames:
         raise FormatError("no links in it", source=file.name)
     if len(roots := robot.roots) > 1:
         named = f"{', '.join(map(bare, roots[:5]))}{', ..' * (len(roots) > 5)}"
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
-        options.tally.note(Note("several-roots", message, ()), robot.links[roots[1]])
+        options.tally.note(Note("several-roots", message, ()), robot.frames[roots[1]])
     return robot
 
 
+def _refuse_xacro(xml: XmlFile, element: Element) -> None:
+    """Refuse what xacro would have to expand first: its elements, and expressions in attributes."""
+    if element.tag.startswith("xacro:"):
+        raise xml.error(element, f"<{bare(element.tag)}> is {_XACRO}")
+    for name, value in element.attributes.items():
+        if "${" in value or "$(" in value:
+            raise xml.error(element, f"{shown(value)} is {_XACRO}", name)
+
+
 class _Reader:
-    """Takes elements as they come, and keeps what the joint in hand is made of."""
+    """Read links and joints one by one."""
 
     def __init__(self, xml: XmlFile, options: Options) -> None:
         self.xml = xml
         self.options = options
-        self.bare = options.tally.names.bare
-        self.links: dict[str, int] = {}
-        self.hinges: dict[str, Hinge] = {}
-        self.outer: Element | None = None  # the link or joint in hand
-        self.parts: dict[str, Element] = {}
-        # few files hold what would have to be looked for in every attribute
-        self.suspicious = b"$" in xml.data or b"xacro" in xml.data or xml.data.startswith(UTF16)
+        self.frames: dict[str, int] = {}
+        self.joints: dict[str, tuple[Link, Element]] = {}
 
-    def take(self, element: Element) -> None:
-        """Take the beginning of an element down to the parts of joints."""
-        if self.suspicious:
-            self._refuse_xacro(element)
-        if element.depth == 3:
-            self._inside(element)
+    def take(self, node: XmlNode) -> None:
+        """Read one link or joint; raises FormatError."""
+        if node.tag == "link":
+            self._frame(node)
             return
-        self.end_joint()
-        self.outer = element
-        self.parts = {}
-        if element.depth == 1:
-            if element.tag != "robot":
-                raise self.xml.error(element, f"URDF begins with <robot>, found <{bare(element.tag)}>")
-        elif element.tag == "link":
-            try:
-                self._link(element)
-            except FormatError as error:
-                self.options.report(error)
+        parts: dict[str, Element] = {}
+        for part in node.children:
+            if parts.setdefault(part.tag, part.element) is not part.element:
+                self.options.report(self.xml.error(part.element, f"<{part.tag}> twice in one joint"))
+        self._link(node.element, parts)
 
-    def _link(self, element: Element) -> None:
-        name = self.bare(self._name(element))
-        if name in self.links:
-            raise self.xml.error(element, f"link {shown(name)} twice; first in line {self.links[name]}", "name")
-        self.links[name] = element.line
+    def fail(self, joint: Joint, problem: str) -> FormatError:
+        """Make the error for the place of a joint."""
+        return self.xml.error(self.joints[joint.name][1], problem)
 
-    def _inside(self, element: Element) -> None:
-        """Keep a part of a joint; links and joints do not stand inside links."""
-        outer, tag = self.outer.tag if self.outer else "", element.tag
-        if outer == "joint":
-            if tag in PARTS and self.parts.setdefault(tag, element) is not element:
-                self.options.report(self.xml.error(element, f"<{tag}> twice in one joint"))
-        elif outer == "link" and tag in ("link", "joint"):
-            raise self.xml.error(element, f"<{tag}> inside a <link>; links and joints stand side by side in <robot>")
+    def _frame(self, node: XmlNode) -> None:
+        for inner in node.children:
+            message = f"<{inner.tag}> inside a <link>; links and joints stand side by side in <robot>"
+            raise self.xml.error(inner.element, message)
+        name = self._bare(node.element, "name")
+        if name in self.frames:
+            message = f"link {shown(name)} twice; first in line {self.frames[name]}"
+            raise self.xml.error(node.element, message, "name")
+        self.frames[name] = node.element.line
 
-    def _refuse_xacro(self, element: Element) -> None:
-        """Refuse what xacro would have to expand first: its elements, and expressions in attributes."""
-        if element.tag.startswith("xacro:"):
-            raise self.xml.error(element, f"<{bare(element.tag)}> is {_XACRO}")
-        for name, value in element.attributes.items():
-            if "${" in value or "$(" in value:
-                raise self.xml.error(element, f"{shown(value)} is {_XACRO}", name)
+    def _bare(self, element: Element, attribute: str) -> str:
+        """Return the name of a frame without its leading slash."""
+        return self.options.tally.names.bare(self.xml.required(element, attribute))
 
-    def end_joint(self) -> None:
-        """Read the joint in hand, if it is one, from its parts."""
-        if self.outer is None or self.outer.tag != "joint":
-            return
-        try:
-            hinge = self._hinge(self.outer, self.parts)
-        except FormatError as error:
-            self.options.report(error)
-        else:
-            self.hinges[hinge.name] = hinge
-
-    def _name(self, element: Element, attribute: str = "name") -> str:
-        """Return an attribute that names something."""
-        name = element.attributes.get(attribute)
-        if not name:
-            raise self.xml.error(element, f"<{element.tag}> has no {attribute}", attribute if name is not None else "")
-        return name
-
-    def _hinge(self, element: Element, parts: dict[str, Element]) -> Hinge:
+    def _link(self, element: Element, parts: dict[str, Element]) -> None:
         """Read one joint from its parts."""
-        name = self._name(element)
-        kind = self._name(element, "type")
-        if name in self.hinges:
-            line = self.hinges[name].element.line
+        name, kind = self.xml.required(element, "name"), self.xml.required(element, "type")
+        if name in self.joints:
+            line = self.joints[name][1].line
             raise self.xml.error(element, f"joint {shown(name)} twice; first in line {line}", "name")
         if kind not in KINDS:
             message = f"joint {shown(name)} has the type {shown(kind)}{alternatives(kind, KINDS, 'types')}"
@@ -199,10 +159,11 @@ class _Reader:
         if "parent" not in parts or "child" not in parts:
             missing = "child" if "parent" in parts else "parent"
             raise self.xml.error(element, f"joint {shown(name)} has no <{missing}>")
-        parent, child = self.bare(self._name(parts["parent"], "link")), self.bare(self._name(parts["child"], "link"))
+        parent, child = self._bare(parts["parent"], "link"), self._bare(parts["child"], "link")
         origin = self._origin(parts["origin"]) if "origin" in parts else IDENTITY
-        joint = None if kind == "fixed" else self._joint(name, kind, element, parts)
-        return Hinge(name, parent, child, origin, joint, element)
+        joints = () if kind == "fixed" else (self._joint(name, kind, element, parts),)
+        link = Link(parent, child, origin, joints, element.line, fixed="" if joints else name)
+        self.joints[name] = link, element
 
     def _origin(self, element: Element) -> Rigid:
         """Read the pose of a joint in its parent: rpy, or a quaternion."""
@@ -215,24 +176,17 @@ class _Reader:
             self.options.tally.note(Note("degrees", message, ()), element.line)
         if roll or pitch or yaw:
             rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
-        if "quat_xyzw" in element.attributes:
-            rotation = self._quaternion(element, rotation if "rpy" in element.attributes else None)
-        return x, y, z, *rotation
-
-    def _quaternion(self, element: Element, other: Quaternion | None) -> Quaternion:
-        """Read quat_xyzw, which must agree with the angles if they stand beside it, and says more digits than they."""
-        self.xml.numbers(element, "quat_xyzw", 4)
-        reading = Reading(Source(self.xml.name, ""), normalize=self.options.normalize)
+        if "quat_xyzw" not in element.attributes:
+            return x, y, z, *rotation
+        numbers(element, "quat_xyzw", 4)
         texts = element.attributes["quat_xyzw"].split()
-        try:
-            rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
-            if other is not None:
-                agreeing_rotation(rotation, other)
-        except ValueInvalid as error:
-            raise self.xml.error(element, str(error), "quat_xyzw", rule=error.rule) from None
-        for note in reading.notes:
-            self.options.tally.note(note, element.line)
-        return rotation
+        exact = read_quaternion(self.xml, element, texts, self.options, "quat_xyzw")  # it says more digits than angles
+        if "rpy" in element.attributes:
+            try:
+                agreeing_rotation(exact, rotation)
+            except ValueInvalid as error:
+                raise self.xml.error(element, str(error), "quat_xyzw", rule=error.rule) from None
+        return x, y, z, *exact
 
     def _joint(self, name: str, kind: str, element: Element, parts: dict[str, Element]) -> Joint:
         """Read what moves: axis, limits, the joint that is followed."""
@@ -258,32 +212,59 @@ class _Reader:
         return lower, upper
 
     def _mimic(self, name: str, kind: str, element: Element) -> Mimic:
-        leader = self._name(element, "joint")
+        leader = self.xml.required(element, "joint")
         if kind in ("planar", "floating"):
             raise self.xml.error(element, f"joint {shown(name)} is {kind}: it follows no other")
         (multiplier,) = self.xml.numbers(element, "multiplier", 1, "1")
         (offset,) = self.xml.numbers(element, "offset", 1, "0")
         return Mimic(leader, multiplier, offset)
 
-    def connected(self) -> Iterator[Hinge]:
-        """Yield the joints between links that there are."""
-        for hinge in self.hinges.values():
-            missing = next((link for link in (hinge.parent, hinge.child) if link not in self.links), None)
+    def connected(self) -> Iterator[Link]:
+        """Yield the links whose ends are there."""
+        for name, (link, element) in self.joints.items():
+            missing = next((end for end in (link.parent, link.child) if end and end not in self.frames), None)
             if missing is None:
-                yield hinge
+                yield link
                 continue
-            message = f"joint {shown(hinge.name)}: no link {shown(missing)}{alternatives(missing, self.links, 'links')}"
-            self.options.report(self.xml.error(hinge.element, message))
+            message = f"joint {shown(name)}: no link {shown(missing)}{alternatives(missing, self.frames, 'links')}"
+            self.options.report(self.xml.error(element, message))
 
 
-LIMITED = ("revolute", "prismatic")
-_XACRO = f"xacro, not yet URDF; {FORMATS['xacro'].instead}"
+def load_robot(path: str | PathLike[str]) -> Robot:
+    """Read the robot of a URDF file, `-` for standard input.
+
+    Raises FormatError and BadTopology with file, line and column; FileProblem.
+    """
+    return robot_of(Recording(path))[0]
+
+
+def robot_of(file: Recording) -> tuple[Robot, Posture]:
+    """Return the robot of a file, and where its joints stand as the file's answers say; otherwise as `load_robot`."""
+    if file.form != "urdf":
+        file.close()
+        raise FormatError(f"expected a URDF robot, found {FORMATS[file.form].summary}", source=file.name)
+    options = Options(file.tally, file.topics, answers=file.answers)
+    try:
+        with paused_collector():
+            described = describe(file, options)
+    finally:
+        file.close()
+    refuse_unknown_joints([file])
+    links: dict[str, Link] = {}
+    for link in described.links:
+        if link.child in links:
+            parents = f"{shown(links[link.child].parent)} and {shown(link.parent)}"
+            problem = f"frame {shown(link.child)} has two parents: {parents}"
+            raise BadTopology(problem, source=file.name, line=link.line, rule="two-parents")
+        links[link.child] = link
+    file.tell()
+    return Robot(file.name, links, described.frames), described.posture
 
 
 _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return the robot.
 
     Raises ValueInvalid for what URDF cannot hold: frames that move, several roots, names that XML has no letters for.
@@ -294,9 +275,7 @@ def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
         message = "URDF holds one tree, and this has the roots"
         raise ValueInvalid(f"{message} {listing(tree.roots)}; --with FILE adds what connects them")
     links = "".join(f'  <link name="{_attribute(frame)}"/>\n' for frame in tree.frames)
-    joints = "".join(
-        _joint(parent, child, transform.components, style) for parent, child, transform in tree.edges()
-    )
+    joints = "".join(_joint(parent, child, transform.components, style) for parent, child, transform in tree.edges())
     return f'<?xml version="1.0"?>\n<robot name="robot">\n{links}{joints}</robot>\n'
 
 

@@ -12,27 +12,23 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import listing, shown, warn
-from frametool.formats.trees.tree_reader import document_edges
+from frametool.formats.trees.tree_reader import XYZ, document_edges, read_flat_pose
 from frametool.formats.trees.written_poses import Precision, angles_of, standing_edges, tell_lonely_roots
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
-from frametool.grammar.readers import Misfit, as_mapping, read_numbers, within
-from frametool.grammar.rotation_spelling import rotation_of
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.readers import Misfit, Reading, as_mapping, within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Path, Reading
+    from frametool.frames.lookups import Frames
+    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
 NAME = "autoware"
-XYZ = ("x", "y", "z")
-RPY = ("roll", "pitch", "yaw")
 _RPY = notation("rpy")
+KEYS = (*XYZ, *_RPY.columns)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -54,25 +50,20 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 def _edge(parent: str, child: str, pose: Any, reading: Reading) -> Edge:
     """Read one pose; raises Misfit."""
-    expected = ", ".join((*XYZ, *RPY))
-    for key in as_mapping(pose, f"the pose of {shown(child)} as {{{expected}}}"):
-        if key not in (*XYZ, *RPY):
-            raise Misfit(f"unknown key {shown(key)}; a pose has {expected}", (key,), key=True)
-    if missing := [key for key in (*XYZ, *RPY) if key not in pose]:
-        raise Misfit(f"missing {', '.join(missing)}; a pose has {expected}")
-    x, y, z = read_numbers({key: pose[key] for key in XYZ}, XYZ)
-    turned = rotation_of(_RPY, [pose[key] for key in RPY], [(key,) for key in RPY], reading)
-    return Edge(parent, child, (x, y, z, *turned), path=(parent, child))
+    for key in as_mapping(pose, f"the pose of {shown(child)} as {{{', '.join(KEYS)}}}"):
+        if key not in KEYS:
+            raise Misfit(f"unknown key {shown(key)}; a pose has {', '.join(KEYS)}", (key,), key=True)
+    return Edge(parent, child, read_flat_pose(pose, _RPY, reading), path=(parent, child))
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return a map a parent; raises ValueInvalid for frames that move."""
     precision = Precision(NAME, "x y z roll pitch yaw")
     texts: dict[str, list[str]] = {}
     for parent, child, pose in standing_edges(tree, NAME):
         angles, back = angles_of(pose[3:])
         precision.add(pose, (*pose[:3], *back))
-        numbers = zip((*XYZ, *RPY), (*pose[:3], *angles), strict=True)
+        numbers = zip(KEYS, (*pose[:3], *angles), strict=True)
         lines = "".join(f"    {key}: {flow(number, style.number)}\n" for key, number in numbers)
         texts.setdefault(parent, []).append(f"  {quoted(child)}:\n{lines}")
     if len(texts) > 1:

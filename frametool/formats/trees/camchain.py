@@ -1,4 +1,4 @@
-"""Camera chains of Kalibr, OpenVINS and okvis: 4x4 matrices in a block a camera; what they do stands in their key.
+"""Camera chains of Kalibr, OpenVINS and okvis, sensors of EuRoC: 4x4 matrices; what they do stands in their key.
 
     cam0:
       T_cam_imu: [[..], [..], [..], [0.0, 0.0, 0.0, 1.0]]     Kalibr: takes points of the IMU to the camera
@@ -6,56 +6,70 @@
     cam1:
       T_cn_cnm1: ..                                           from cam0 to cam1; beside T_cam_imu only a check
     cameras: [{T_SC: [16 numbers]}, ..]                       okvis: the pose of the camera in the sensor, its IMU
+    T_BS: {rows: 4, cols: 4, data: [16 numbers]}              EuRoC: the pose of the sensor in the body
 
-Metres, row-major.  The cameras hang under the IMU: `imu`, or okvis' `body`.
+Metres, row-major.  The cameras hang under the IMU: `imu`, or okvis' `body`.  The sensor of a sensor.yaml is called as
+its folder: mav0/cam0/sensor.yaml.
 """
 
 from __future__ import annotations
 
+import os
 import re
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import ValueInvalid, listing, shown, warn
-from frametool.formats.trees.matrices import FrameNames, Matrices
-from frametool.formats.trees.matrix_keys import TAGS, made_ordinary
+from frametool.formats.trees.matrices import TAGS, FrameNames, Matrices, made_ordinary
 from frametool.formats.trees.tree_reader import document_edges
 from frametool.formats.trees.written_poses import Precision, rows_of, standing_edges
 from frametool.geometry import rigid
-from frametool.grammar.readers import Misfit, as_mapping
+from frametool.grammar.readers import Reading, as_mapping
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.documents.source import InputFile
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.formats.load import Recording
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge, Options
-    from frametool.grammar.readers import Reading
     from frametool.grammar.result import Style
 
 NAME = "camchain"
 _CAMERA = r"cam([0-9]+)"
 
 
-def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a camera, and check what is stated twice."""
+def read(file: Recording, options: Options) -> Iterator[Edge]:
+    """Yield an edge a camera, and check what is stated twice; of a sensor.yaml the one edge."""
+    frames = options.answers.frames
+    naming = FrameNames(base=frames[0] if frames else "", alone="cam", told=frames, blocks=frames[1:])
+    expected, nothing = "blocks of cameras", "a camera has T_cam_imu, T_imu_cam, T_cn_cnm1 or T_SC"
+    is_sensor = file.form == "euroc-sensor"
+    if is_sensor:
+        expected, nothing = "T_BS of a sensor", "the pose of a sensor is T_BS"
+        names = options.answers.names("body", sensor_name(file.path))
+        naming = FrameNames(base=names[0], alone=names[1], told=names)
 
-    def take(value: Any, reading: Reading) -> Iterator[Edge]:
-        told = options.answers.frames
-        naming = FrameNames(base=told[0] if told else "", alone="cam", told=told, blocks=told[1:])
-        matrices = Matrices(as_mapping(value, "blocks of cameras"), naming, options.answers, reading)
-        if not matrices.poses:
-            raise Misfit("no pose in it: a camera has T_cam_imu, T_imu_cam, T_cn_cnm1 or T_SC")
-        edges = matrices.edges()
-        options.tally.about = matrices.about(edges)
-        yield from edges
+    def take(value: Any, reading: Reading) -> list[Edge]:
+        matrices = Matrices(as_mapping(value, expected), naming, options.answers, reading)
+        edges = matrices.edges(options.tally, f"no pose in it: {nothing}")
+        if is_sensor:
+            options.tally.about = f"the pose of {naming.alone}"
+        return edges
 
     yield from document_edges(made_ordinary(file), options, take, TAGS)
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def sensor_name(path: str) -> str:
+    """Return what a sensor is called by its file: the folder of a sensor.yaml, else the name of the file."""
+    if path == "-":
+        return "sensor"
+    folder, name = os.path.split(os.path.abspath(path))
+    stem = name.partition(".")[0]
+    return (os.path.basename(folder) if stem == "sensor" else stem) or "sensor"
+
+
+def write_tree(tree: Frames, style: Style) -> str:
     """Return a block a camera; raises ValueInvalid for several trees, and for frames that move.
 
     Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of cameras alone,
@@ -85,7 +99,7 @@ def _tell(root: str, edges: list[tuple[str, str, Rigid]]) -> None:
         warn(f"Kalibr calls cameras cam0, cam1 ..; these keep their names: {listing(others)}")
 
 
-def _star(tree: FrameTree | TransformBuffer, root: str, precision: Precision, style: Style) -> str:
+def _star(tree: Frames, root: str, precision: Precision, style: Style) -> str:
     """Write every frame as seen from the root, in both directions."""
     text = ""
     for frame in tree.frames:
@@ -98,7 +112,7 @@ def _star(tree: FrameTree | TransformBuffer, root: str, precision: Precision, st
     return text
 
 
-def _chain(tree: FrameTree | TransformBuffer, cameras: list[str], precision: Precision, style: Style) -> str:
+def _chain(tree: Frames, cameras: list[str], precision: Precision, style: Style) -> str:
     """Write every camera as seen from the next; Kalibr's first camera has no pose."""
     text, before = "", ""
     for frame in sorted(cameras, key=lambda name: int(name[3:])):

@@ -15,24 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import ValueInvalid, listing, shown, warn
-from frametool.formats.trees.tree_reader import document_edges
+from frametool.formats.trees.tree_reader import XYZ, document_edges, named, read_flat_pose
 from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
-from frametool.grammar.pose import read_name
-from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
-from frametool.grammar.rotation_spelling import rotation_of
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, within
 from frametool.ros.message_parts import only, read_rigid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Quaternion, Reading, Vector
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Rigid
     from frametool.grammar.result import Style
 
 NAME = "handeye"
@@ -44,8 +40,6 @@ MOUNTS = {
     "calibration_type": {"eye_in_hand": EFFECTOR, "eye_on_hand": EFFECTOR, "eye_on_base": BASE, "eye_to_hand": BASE},
 }
 POSES = ("transformation", "transform")
-XYZ = ("x", "y", "z")
-QUATERNION = ("qx", "qy", "qz", "qw")
 _XYZW = notation("xyzw")
 
 
@@ -58,16 +52,16 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         inner = "parameters" in calibration
         path = ("parameters",) if inner else ()
         parameters = within(path, as_mapping, calibration["parameters"] if inner else calibration, "the parameters")
-        parent = within(path, _frame, parameters, within(path, _mount, parameters))
-        child = within(path, _frame, parameters, CHILD)
+        parent = within(path, named, parameters, within(path, _mount, parameters))
+        child = within(path, named, parameters, CHILD)
         key = next((key for key in POSES if key in calibration), None)
         if key is None:
             raise Misfit(f"missing {POSES[0]} (easy_handeye) or {POSES[1]} (easy_handeye2)")
         reading.here = (key,)
         pose = within((key,), as_mapping, calibration[key], "the pose of the camera")
-        position, rotation = within((key,), _pose, pose, reading)
+        components = within((key,), _pose, pose, reading)
         options.tally.about = f"the pose of {shown(child)} in {shown(parent)}"
-        yield Edge(parent, child, (*position, *rotation), path=(key,))
+        yield Edge(parent, child, components, path=(key,))
 
     yield from document_edges(file, options, take)
 
@@ -84,27 +78,17 @@ def _mount(parameters: dict[str, Any]) -> str:
     return MOUNTS[key][found]
 
 
-def _frame(parameters: dict[str, Any], key: str) -> str:
-    name = read_name(parameters, key)
-    if name is None:
-        raise Misfit(f"missing {key}")
-    return name
-
-
-def _pose(pose: dict[str, Any], reading: Reading) -> tuple[Vector, Quaternion]:
-    """Read either spelling; the keys come in any order."""
+def _pose(pose: dict[str, Any], reading: Reading) -> Rigid:
+    """Read either spelling."""
     if "rotation" in pose or "translation" in pose:
         only(pose, ("translation", "rotation"))
-        return read_rigid(pose, ("translation", "rotation"), reading)
-    only(pose, (*XYZ, *QUATERNION))
-    if missing := [key for key in (*XYZ, *QUATERNION) if key not in pose]:
-        raise Misfit(f"missing {', '.join(missing)}; a pose has {', '.join((*XYZ, *QUATERNION))}")
-    x, y, z = read_numbers({key: pose[key] for key in XYZ}, XYZ)
-    turned = rotation_of(_XYZW, [pose[key] for key in QUATERNION], [(key,) for key in QUATERNION], reading)
-    return (x, y, z), turned
+        position, rotation = read_rigid(pose, ("translation", "rotation"), reading)
+        return (*position, *rotation)
+    only(pose, (*XYZ, *_XYZW.columns))
+    return read_flat_pose(pose, _XYZW, reading)
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+def write_tree(tree: Frames, style: Style) -> str:
     """Return the one edge of a tree as easy_handeye has it, as if on the hand; raises ValueInvalid for other trees."""
     edges = standing_edges(tree, NAME)
     if len(edges) != 1:
@@ -112,7 +96,7 @@ def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
         raise ValueInvalid(f"{NAME} holds one pose, and here are {len(edges)}: {children}")
     ((parent, child, pose),) = edges
     turned = quaternion.from_quaternion(*pose[3:], floats)
-    numbers = zip((*XYZ, *QUATERNION), (*pose[:3], *turned), strict=True)
+    numbers = zip((*XYZ, *_XYZW.columns), (*pose[:3], *turned), strict=True)
     lines = "".join(f"  {key}: {flow(number, style.number)}\n" for key, number in numbers)
     warn(f"{NAME}: {shown(parent)} is written as the hand; beside the base write eye_on_hand: false and {BASE}")
     tell_lonely_roots(tree, NAME)

@@ -15,11 +15,12 @@ import os
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.source import pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid
-from frametool.formats.trees.matrix_keys import MATRIX
+from frametool.formats.trees.matrices import MATRIX
+from frametool.formats.trees.tree_reader import line_error
+from frametool.frames.path import IDENTITY
 from frametool.geometry import rigid
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Reading
 from frametool.grammar.rotation_spelling import rotation_of
 from frametool.text.numbers import parse_number
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
     from frametool.grammar.readers import Quaternion
 
 CAMERAS = ("cam0", "cam1", "cam2", "cam3")
@@ -49,8 +49,6 @@ _COUNTS = (  # pattern of a name, how many numbers it has
     (r"T|T_0\d", 3),
 )
 _LINE = r"(\w+)(:?)[ \t]+(\S.*?)\s*"
-_ORIGIN = (0.0, 0.0, 0.0)
-_UNTURNED = (0.0, 0.0, 0.0, 1.0)
 
 
 class Field(NamedTuple):
@@ -106,29 +104,25 @@ class Calibration:
         """Keep the numbers of a line; raises FormatError with the place."""
         match = re.fullmatch(_LINE, text)
         if match is None:
-            raise self._error(line, 1, f"expected NAME: numbers, found {text.strip()[:40]!r}")
+            raise line_error(self.file, line, 1, f"expected NAME: numbers, found {text.strip()[:40]!r}")
         name = match[1]
         if name in _NO_NUMBERS:
             return
         if name in self.fields:
-            raise self._error(line, 1, f"{name} stands twice; first in line {self.fields[name].line}")
+            raise line_error(self.file, line, 1, f"{name} stands twice; first in line {self.fields[name].line}")
         words = list(re.finditer(r"\S+", match[3]))
         numbers = []
         for word in words:
             try:
                 numbers.append(parse_number(word[0]))
             except ValueInvalid as error:
-                raise self._error(line, match.start(3) + word.start() + 1, f"{name}: {error}") from None
+                raise line_error(self.file, line, match.start(3) + word.start() + 1, f"{name}: {error}") from None
         expected = next((count for pattern, count in _COUNTS if re.fullmatch(pattern, name)), len(numbers))
         if len(numbers) != expected:
-            raise self._error(line, match.start(3) + 1, f"{name}: expected {expected} numbers, found {len(numbers)}")
+            raise line_error(
+                self.file, line, match.start(3) + 1, f"{name}: expected {expected} numbers, found {len(numbers)}"
+            )
         self.fields[name] = Field(line, tuple(numbers), [word[0] for word in words])
-
-    def _error(self, line: int, column: int, message: str) -> FormatError:
-        text = self.file.text.split("\n")[line - 1]
-        return FormatError(
-            message, source=self.file.name, line=line, column=column, snippet=pointer(text.rstrip("\r"), column)
-        )
 
     def _turn(self, name: str, texts: list[str]) -> Quaternion:
         """Check a matrix of nine numbers to be a rotation; what is odd is noted."""
@@ -136,7 +130,7 @@ class Calibration:
         try:
             turned = rotation_of(MATRIX, texts, [()] * 9, self.reading)
         except ValueInvalid as error:
-            raise self._error(line, 1, f"{name}: {error}") from None
+            raise line_error(self.file, line, 1, f"{name}: {error}") from None
         for note in self.reading.notes:
             self.options.tally.note_each(f"{name}: {note.message}", line, note.rule)
         self.reading.notes.clear()
@@ -189,7 +183,7 @@ class Calibration:
             if field := self.fields.get(name):
                 self.options.tally.about = f"{name}: {camera}_rect<-{camera}; P0 .. P3 are about rectified cameras"
                 turned = self._turn(name, field.texts)
-                yield camera, f"{camera}_rect", rigid.inverse(*_ORIGIN, *turned), field.line
+                yield camera, f"{camera}_rect", rigid.inverse(0.0, 0.0, 0.0, *turned), field.line
 
     def _baselines(self) -> Iterator[tuple[str, str, Rigid, int]]:
         """Yield where projections have their cameras, on the x axis of the rectified first one."""
@@ -200,10 +194,10 @@ class Calibration:
                 continue
             focal, _, _, third, _, _, _, seventh, _, _, _, eleventh = field.numbers
             if not focal > 0.0:
-                raise self._error(field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
+                raise line_error(self.file, field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
             if seventh or eleventh:
                 self._tell_rest(f"P{index}", field)
-            yield f"cam0{rect}", f"{camera}{rect}", (0.0 - third / focal, 0.0, 0.0, *_UNTURNED), field.line
+            yield f"cam0{rect}", f"{camera}{rect}", (0.0 - third / focal, *IDENTITY[1:]), field.line
 
     def _tell_rest(self, name: str, field: Field) -> None:
         """Note what a projection says beyond its baseline: its centre, -K^-1 p."""

@@ -12,25 +12,36 @@ read, included files are named, and calls that start under a condition are read 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from frametool.documents.source import Source
+from frametool.documents.document import format_error, locate_many, parse_documents
+from frametool.documents.source import InputFile, Source
+from frametool.documents.xml import XmlFile
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.detect import Beginning
-from frametool.grammar.edges import Edge
-from frametool.grammar.readers import Reading
+from frametool.formats.trees.launch_actions import (
+    COMPOSABLE,
+    PACKAGES,
+    Action,
+    composed,
+    not_followed,
+    not_read,
+    runs_publisher,
+)
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.readers import Misfit, Reading, kind
 from frametool.ros import publisher
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
-    from frametool.documents.source import InputFile
-    from frametool.formats.trees.launch_actions import Action
     from frametool.frames.lookups import Frames
-    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
+_SUBSTITUTION = re.compile(r"\$\([^()]*\)?")
+_NO, _YES = ("0", "false"), ("1", "true")
 
 
 def write_tree(tree: Frames, style: Style) -> str:
@@ -55,50 +66,139 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     count = unread = 0
     for action in _actions(file):
         if action.unread:
-            unread += action.is_call
+            unread += action.unread.startswith(publisher.CALL)
             options.tally.note_each(action.unread, action.line)
-            continue
-        if edge := _edge(action, file, options):
+        elif edge := _edge(action, file, options):
             count += 1
             yield edge
     calls = "1 static transform" if count == 1 else f"{count} static transforms"
     options.tally.about = calls + (f" ({unread} not read)" if unread else "")
 
 
+def _edge(action: Action, file: InputFile, options: Options) -> Edge | None:
+    """Read the arguments of one call; None if they are wrong and reading goes on behind the error."""
+    reading = Reading(Source(file.name, ""), normalize=options.normalize)
+    arguments, line = action.arguments, action.line
+    try:
+        if isinstance(arguments, str):
+            pose = publisher.read_call(arguments, reading)
+        else:
+            pose = publisher.read_words(arguments, reading)
+    except ValueInvalid as error:
+        options.report(FormatError(str(error), source=file.name, line=line, column=action.column, rule=error.rule))
+        return None
+    parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
+    for note in reading.notes:
+        options.tally.note(note, line)
+    if action.conditions:
+        conditions = " and ".join(dict.fromkeys(action.conditions))
+        options.tally.note_each(f"frame {shown(child)} is published under a condition: {conditions}", line)
+    return Edge(parent, child, pose.components, line=line)
+
+
 def _actions(file: InputFile) -> Iterator[Action]:
     """Choose between the three languages of launch files."""
     begin = Beginning(file.head())
     if begin.xml:
-        from frametool.formats.trees import launch_xml
-
-        return launch_xml.actions(file)
+        return _of_xml(file)
     if file.path.endswith(".py") or _PYTHON.search(begin.text):
         from frametool.formats.trees import launch_python
 
         return launch_python.actions(file.source)
-    from frametool.formats.trees import launch_yaml
-
-    return launch_yaml.actions(file.source)
+    return _of_yaml(file.source)
 
 
-def _edge(action: Action, file: InputFile, options: Options) -> Edge | None:
-    """Read the arguments of one call; None if they are wrong and reading goes on behind the error."""
-    reading = Reading(Source(file.name, ""), normalize=options.normalize)
-    try:
-        pose = (
-            publisher.read_call(action.arguments, reading)
-            if isinstance(action.arguments, str)
-            else publisher.read_words(action.arguments, reading)
-        )
-    except ValueInvalid as error:
-        options.report(
-            FormatError(str(error), source=file.name, line=action.line, column=action.column, rule=error.rule)
-        )
+def _of_xml(file: InputFile) -> Iterator[Action]:
+    """Yield the calls and what is included in XML, in order."""
+    xml = XmlFile(file)
+    groups: list[tuple[int, list[str]]] = []  # those around: their depth, their conditions
+    for element in xml.elements():
+        if element.depth == 1 and element.tag != "launch":
+            raise xml.error(element, f"expected <launch>, found <{element.tag}>")
+        if element.ends:
+            if groups and groups[-1][0] == element.depth:
+                groups.pop()
+            continue
+        own = _conditions(element.attributes)
+        if element.tag == "group":
+            groups.append((element.depth, own))
+            continue
+        conditions = [each for _, group in groups for each in group] + own
+        if action := _action(element.tag, element.attributes, conditions, "<include>"):
+            line, column = xml.place(element, action.key)
+            yield action._replace(line=line, column=column)
+
+
+def _of_yaml(source: Source) -> Iterator[Action]:
+    """Yield the calls and what is included below `launch:`, in order."""
+    found: list[tuple[Path, Action]] = []
+    for document in parse_documents(source.text, source.name):
+        top = (document.index, "launch")
+        try:
+            if type(document.value) is not dict or "launch" not in document.value:
+                raise Misfit(f"expected launch: and a list of actions, found {kind(document.value)}", top)
+            for path, tag, entry, conditions in _entries(document.value["launch"], top, []):
+                if action := _action(tag, entry, conditions, "include"):
+                    found.append(((*path, action.key) if action.key else path, action))
+        except Misfit as misfit:
+            raise format_error(source, misfit.path, str(misfit)) from None
+    places = locate_many(source.text, [path for path, _ in found])
+    for (_, action), (line, column) in zip(found, places, strict=True):
+        yield action._replace(line=line, column=column)
+
+
+def _entries(entries: Any, path: Path, conditions: list[str]) -> Iterator[tuple[Path, str, dict[str, Any], list[str]]]:
+    """Yield what a list of actions starts: the way to it, its kind, what it says, and its conditions."""
+    if entries is None:
+        return
+    if type(entries) is not list:
+        raise Misfit(f"expected a list of actions, found {kind(entries)}", path)
+    for index, entry in enumerate(entries):
+        if type(entry) is not dict:
+            raise Misfit(f"expected an action as - node: .., found {kind(entry)}", (*path, index))
+        for tag, inner in entry.items():
+            here = (*path, index, tag)
+            under = conditions + _conditions(inner) if type(inner) is dict else conditions
+            if tag == "group" and type(inner) is list:
+                yield from _entries(inner, here, under)
+            elif tag == "group" and type(inner) is dict:
+                yield from _entries(inner.get("children"), (*here, "children"), under)
+            elif tag == "node_container" and type(inner) is dict and type(inner.get("composable_node")) is list:
+                for number, node in enumerate(inner["composable_node"]):
+                    if type(node) is dict:
+                        yield (*here, "composable_node", number), "composable_node", node, under
+            elif type(inner) is dict:
+                yield here, tag, inner, under
+
+
+def _conditions(entry: Mapping[str, Any]) -> list[str]:
+    """Return what the attributes `if` and `unless` say."""
+    return [f'{key}="{entry[key]}"' for key in ("if", "unless") if type(entry.get(key)) is str]
+
+
+def _action(tag: str, entry: Mapping[str, Any], conditions: list[str], include: str) -> Action | None:
+    """Make of one element or entry what there is to read or to tell of it; None for what starts no publisher."""
+    command = entry.get("cmd")
+    if tag == "include":
+        return not_followed(include, entry.get("file", ""))
+    if tag == "composable_node":
+        return composed() if entry.get("plugin") == COMPOSABLE else None
+    if tag == "node" and entry.get("pkg") in PACKAGES and entry.get("exec", entry.get("type")) == publisher.CALL:
+        key = "args"
+    elif tag == "executable" and type(command) is str and runs_publisher(command.split()):
+        key = "cmd"
+    else:
         return None
-    parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
-    for note in reading.notes:
-        options.tally.note(note, action.line)
-    if action.conditions:
-        told = " and ".join(dict.fromkeys(action.conditions))
-        options.tally.note_each(f"frame {shown(child)} is published under a condition: {told}", action.line)
-    return Edge(parent, child, pose.components, line=action.line)
+    text = entry.get(key)
+    if type(text) is not str:
+        return not_read(f"its {key} must be text, found {kind(text)}" if key in entry else f"it has no {key}")
+    if substitution := _SUBSTITUTION.search(text):
+        return not_read(f"its arguments have {shown(substitution[0])}")._replace(key=key)
+    open_conditions = []
+    for condition in conditions:
+        word, value = condition[:-1].lower().split('="', 1)
+        if value in (_NO if word == "if" else _YES):
+            return not_read(f"it never starts ({condition})")._replace(key=key)
+        if value not in (*_NO, *_YES):
+            open_conditions.append(condition)
+    return Action(text, conditions=open_conditions, key=key)

@@ -3,7 +3,7 @@
 A call counts wherever it stands: `Node(package="tf2_ros", executable="static_transform_publisher", arguments=[..])`,
 or any other name for it, and `ExecuteProcess(cmd=[.., "static_transform_publisher", ..])`.
 
-Which expressions of a Python text are literal: texts, numbers, lists of them, and names bound to such once.
+Literal are texts, numbers, lists of them, and names bound to such once.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import warnings
 from frametool.errors import FormatError, shown
 from frametool.formats.trees.launch_actions import (
     COMPOSABLE,
-    IN_PARAMETERS,
     PACKAGES,
     Action,
+    composed,
     not_followed,
     not_read,
     runs_publisher,
@@ -26,7 +26,7 @@ from frametool.ros.publisher import CALL
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
     from typing import TypeAlias
 
     from frametool.documents.source import Source
@@ -37,16 +37,16 @@ if TYPE_CHECKING:
 LONGEST = 10_000  # characters or words: doubling a text thirty times is a short text, too
 _SCOPES = (ast.Module, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 _CHANGING = frozenset(("append", "extend", "insert", "pop", "remove", "reverse", "sort", "clear"))
+_EXECUTABLE = ("executable", "node_executable")  # the second until Foxy
 
 
 class NotLiteral(ValueError):
-    """An expression whose value the text does not say; `why` is "" where the expression says it best."""
+    """An expression whose value the text does not say."""
 
-    def __init__(self, node: ast.expr, why: str = "") -> None:
+    def __init__(self, node: ast.expr) -> None:
         """Keep the expression."""
-        super().__init__(why)
+        super().__init__()
         self.node = node
-        self.why = why
 
 
 class Bindings:
@@ -58,53 +58,65 @@ class Bindings:
         self.bound: dict[str, ast.expr | None] = {}
         self._values: dict[str, Literal | NotLiteral] = {}
 
-    def bind(self, name: str, value: ast.expr | None) -> None:
+    def bind(self, name: str, value: ast.expr | None = None) -> None:
         """Take in one binding."""
         self.bound[name] = None if name in self.bound else value
 
+    def spoil(self, name: str) -> None:
+        """Mark a name, in this scope and those around, as one whose value changes."""
+        scope: Bindings | None = self
+        while scope is not None:
+            scope.bound[name] = None
+            scope = scope.outer
+
     def find(self, node: ast.Name) -> Literal:
         """Return the literal that a name stands for; raises NotLiteral."""
-        if node.id not in self.bound:
-            if self.outer is None:
-                raise NotLiteral(node)
+        if node.id not in self.bound and self.outer is not None:
             return self.outer.find(node)
         if node.id not in self._values:
             self._values[node.id] = NotLiteral(node)  # while it is worked out: a name in its own value
-            self._values[node.id] = self._evaluated(node)
-        value = self._values[node.id]
-        if isinstance(value, NotLiteral):
-            raise value
-        return value
-
-    def _evaluated(self, node: ast.Name) -> Literal | NotLiteral:
-        value = self.bound[node.id]
-        if value is None:
-            return NotLiteral(node)
-        try:
-            return evaluate(value, self)
-        except NotLiteral as error:
-            return error
+            if (value := self.bound.get(node.id)) is not None:
+                try:
+                    self._values[node.id] = evaluate(value, self)
+                except NotLiteral as error:
+                    self._values[node.id] = error
+        found = self._values[node.id]
+        if isinstance(found, NotLiteral):
+            raise found
+        return found
 
 
 def evaluate(node: ast.expr, scope: Bindings) -> Literal:
     """Return the value of a literal expression.
 
     Texts, numbers with a sign, lists and tuples of them, their concatenation, `str(0.5)`, `"0 0 1".split()`, and names
-    bound once to one of these. Raises NotLiteral, with the smallest expression that is none.
+    bound once to one of these. Raises NotLiteral, with the smallest expression that is not one.
     """
     value: Literal | None = None
-    if isinstance(node, ast.Constant) and isinstance(node.value, str | int | float):
-        value = None if isinstance(node.value, bool) else node.value
-    elif isinstance(node, ast.Name):
-        value = scope.find(node)
-    elif isinstance(node, ast.List | ast.Tuple):
-        value = [word for each in node.elts for word in _items(each, scope)]
-    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
-        value = _signed(node, evaluate(node.operand, scope))
-    elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-        value = _joined(evaluate(node.left, scope), evaluate(node.right, scope))
-    elif isinstance(node, ast.Call) and not node.keywords:
-        value = _called(node, scope)
+    match node:
+        case ast.Constant(value=str() | int() | float() as constant) if not isinstance(constant, bool):
+            value = constant
+        case ast.Name():
+            value = scope.find(node)
+        case ast.List(elts=items) | ast.Tuple(elts=items):
+            value = [word for each in items for word in _items(each, scope)]
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=operand):
+            number = evaluate(operand, scope)
+            if not isinstance(number, str | list):
+                value = -number if isinstance(sign, ast.USub) else number
+        case ast.BinOp(op=ast.Add(), left=left, right=right):  # of texts or lists; sums are arithmetic
+            match evaluate(left, scope), evaluate(right, scope):
+                case str() as one, str() as other:
+                    value = one + other
+                case list() as first, list() as second:
+                    value = first + second
+        case ast.Call(func=ast.Name(id="str"), args=[argument], keywords=[]):
+            value = _text_of(evaluate(argument, scope))
+        case ast.Call(func=ast.Attribute(attr="split", value=text), args=arguments, keywords=[]):
+            separator = [evaluate(each, scope) for each in arguments]
+            words = evaluate(text, scope)
+            if isinstance(words, str) and separator in ([], [" "]):
+                value = [*words.split(" " if separator else None)]
     if value is None or (isinstance(value, str | list) and len(value) > LONGEST):
         raise NotLiteral(node)
     return value
@@ -118,109 +130,52 @@ def _items(node: ast.expr, scope: Bindings) -> list[Scalar]:
     return value if isinstance(value, list) else [value]
 
 
-def _signed(node: ast.UnaryOp, value: Literal) -> Literal | None:
-    if isinstance(value, str | list):
-        return None
-    return -value if isinstance(node.op, ast.USub) else value
-
-
-def _joined(left: Literal, right: Literal) -> Literal | None:
-    """Concatenate two texts or two lists; a sum of numbers is arithmetic, which is not ours."""
-    if isinstance(left, str) and isinstance(right, str):
-        return left + right
-    return left + right if isinstance(left, list) and isinstance(right, list) else None
-
-
-def _called(node: ast.Call, scope: Bindings) -> Literal | None:
-    """Return `str(number)` or `text.split()`."""
-    function, arguments = node.func, [evaluate(each, scope) for each in node.args] if _is_known(node.func) else []
-    if isinstance(function, ast.Name) and len(arguments) == 1 and not isinstance(arguments[0], list):
-        return _text_of(arguments[0])
-    if isinstance(function, ast.Attribute):
-        text = evaluate(function.value, scope)
-        if isinstance(text, str) and arguments in ([], [" "]):
-            return [*text.split(" " if arguments else None)]
-    return None
-
-
-def _is_known(function: ast.expr) -> bool:
-    return (isinstance(function, ast.Name) and function.id == "str") or (
-        isinstance(function, ast.Attribute) and function.attr == "split"
-    )
-
-
-def _text_of(value: Scalar) -> str | None:
+def _text_of(value: Literal) -> str | None:
     try:
-        return str(value)
+        return None if isinstance(value, list) else str(value)
     except ValueError:  # a whole number of more than 4300 digits
         return None
 
 
 def scopes_of(tree: ast.Module) -> dict[ast.AST, Bindings]:
     """Return the scope of the module and of each function in it."""
-    scopes: dict[ast.AST, Bindings] = {}
-    pending: list[tuple[ast.AST, Bindings | None]] = [(tree, None)]
+    top = Bindings(None)
+    scopes: dict[ast.AST, Bindings] = {tree: top}
+    pending: list[tuple[ast.AST, Bindings]] = [(each, top) for each in tree.body]
     while pending:
         node, scope = pending.pop()
         if isinstance(node, _SCOPES):
-            if scope is not None and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-                scope.bind(node.name, None)
+            if name := getattr(node, "name", ""):
+                scope.bind(name)
             scope = scopes[node] = Bindings(scope)
-        if scope is not None:
-            _take(node, scope)
-        pending += [(each, scope) for each in _below_literal(node)]
+        bound = _take(node, scope)
+        pending += [(each, scope) for each in ast.iter_child_nodes(node) if each not in bound]
     return scopes
 
 
-def _below_literal(node: ast.AST) -> Iterable[ast.AST]:
-    """Return what a node holds, without the names that `_take` binds to a value."""
-    return (each for each in ast.iter_child_nodes(node) if each not in _targets(node))
-
-
-def _targets(node: ast.AST) -> list[ast.Name]:
-    """Return the names that an assignment binds to its value."""
-    if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
-        return []
-    targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-    return [each for each in targets if isinstance(each, ast.Name)]
-
-
-def _take(node: ast.AST, scope: Bindings) -> None:
-    """Take in what one node binds or changes."""
-    if isinstance(node, ast.Assign | ast.AnnAssign):
-        for target in _targets(node):
-            scope.bind(target.id, node.value)
-    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store | ast.Del):
-        scope.bind(node.id, None)
-    elif isinstance(node, ast.arg):
-        scope.bind(node.arg, None)
-    elif isinstance(node, ast.alias):
-        scope.bind((node.asname or node.name).split(".")[0], None)
-    elif isinstance(node, ast.ExceptHandler) and node.name:
-        scope.bind(node.name, None)
-    elif isinstance(node, ast.Global | ast.Nonlocal):
-        for name in node.names:
-            _spoil(name, scope)
-    elif isinstance(node, ast.Attribute | ast.Subscript) and isinstance(node.value, ast.Name) and _changes(node):
-        _spoil(node.value.id, scope)
-
-
-def _changes(node: ast.Attribute | ast.Subscript) -> bool:
-    """Tell whether the list that a name stands for is changed in place."""
-    if isinstance(node, ast.Attribute):
-        return node.attr in _CHANGING
-    return isinstance(node.ctx, ast.Store | ast.Del)
-
-
-def _spoil(name: str, scope: Bindings | None) -> None:
-    """Mark a name, in this scope and those around, as one whose value changes."""
-    while scope is not None:
-        scope.bound[name] = None
-        scope = scope.outer
-
-
-_EXECUTABLE = ("executable", "node_executable")  # the second until Foxy
-_NO_CALL = Action(0)
+def _take(node: ast.AST, scope: Bindings) -> list[ast.Name]:
+    """Take in what one node binds or changes; return the names in it that are bound to a value."""
+    match node:
+        case ast.Assign(targets=targets):
+            names = [each for each in targets if isinstance(each, ast.Name)]
+            for each in names:
+                scope.bind(each.id, node.value)
+            return names
+        case ast.AnnAssign(target=ast.Name() as target, value=ast.expr() as value):
+            scope.bind(target.id, value)
+            return [target]
+        case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name) | ast.ExceptHandler(name=str(name)):
+            scope.bind(name)
+        case ast.alias():
+            scope.bind((node.asname or node.name).split(".")[0])
+        case ast.Global(names=names) | ast.Nonlocal(names=names):
+            for name in names:
+                scope.spoil(name)
+        case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store() | ast.Del()):
+            scope.spoil(name)
+        case ast.Attribute(value=ast.Name(id=name), attr=attribute) if attribute in _CHANGING:
+            scope.spoil(name)
+    return []
 
 
 def actions(source: Source) -> Iterator[Action]:
@@ -252,8 +207,8 @@ def _walk(tree: ast.Module, scopes: dict[ast.AST, Bindings]) -> Iterator[Action]
         scope = scopes.get(node, scope)
         if isinstance(node, ast.Call):
             conditions += tuple(_written(each.value) for each in node.keywords if each.arg == "condition")
-            if (action := _action(node, scope, conditions)) is not _NO_CALL:
-                yield action
+            if action := _action(node, scope, conditions):
+                yield action._replace(line=node.lineno, column=node.col_offset + 1)
         pending += [(each, scope, conditions + under) for each, under in _below(node)]
 
 
@@ -269,39 +224,32 @@ def _below(node: ast.AST) -> Iterator[tuple[ast.AST, tuple[str, ...]]]:
                 yield each, under
 
 
-def _action(node: ast.Call, scope: Bindings, conditions: tuple[str, ...]) -> Action:
+def _action(node: ast.Call, scope: Bindings, conditions: tuple[str, ...]) -> Action | None:
     """Make of one call what there is to read or to tell of it."""
     given = {each.arg: each.value for each in node.keywords if each.arg}
-    if _name_of(node.func) == "IncludeLaunchDescription":
+    if getattr(node.func, "attr", getattr(node.func, "id", "")) == "IncludeLaunchDescription":
         named = node.args[0] if node.args else given.get("launch_description_source", node.func)
-        return not_followed("IncludeLaunchDescription", _written(named), node.lineno)
+        return not_followed("IncludeLaunchDescription", _written(named))
     if _text(given.get("plugin"), scope) == COMPOSABLE:
-        return not_read(IN_PARAMETERS, node.lineno, node.col_offset + 1)
+        return composed()
     name = "cmd" if "cmd" in given else "arguments"
-    if not (_is_command(given["cmd"], scope) if name == "cmd" else _is_publisher(given, scope)):
-        return _NO_CALL
-    column = node.col_offset + 1
+    if name == "cmd":  # other words of the command line need not be literal
+        parts = getattr(given["cmd"], "elts", ())
+        is_call = runs_publisher([_text(part, scope) for part in parts])
+    else:
+        is_call = _text(given.get("package"), scope) in PACKAGES
+        is_call = is_call and CALL in (_text(given.get(key), scope) for key in _EXECUTABLE)
+    if not is_call:
+        return None
     if name not in given:
-        return not_read(f"it has no {name}", node.lineno, column)
+        return not_read(f"it has no {name}")
     try:
         value = evaluate(given[name], scope)
-        if not isinstance(value, list):
-            raise NotLiteral(given[name], f"{name} is no list")
-        return Action(node.lineno, column, [str(word) for word in value], conditions=conditions)
     except NotLiteral as error:
-        return not_read(error.why or f"{shown(_written(error.node))} is not a literal", node.lineno, column)
-
-
-def _is_publisher(given: dict[str, ast.expr], scope: Bindings) -> bool:
-    """Tell whether the keywords of a call start the publisher."""
-    package = _text(given.get("package"), scope)
-    return package in PACKAGES and CALL in (_text(given.get(name), scope) for name in _EXECUTABLE)
-
-
-def _is_command(value: ast.expr, scope: Bindings) -> bool:
-    """Tell whether a command line starts the publisher, also if other words of it are not literal."""
-    parts = value.elts if isinstance(value, ast.List | ast.Tuple) else ()
-    return runs_publisher([_text(part, scope) for part in parts])
+        return not_read(f"{shown(_written(error.node))} is not a literal")
+    if not isinstance(value, list):
+        return not_read(f"{name} is no list")
+    return Action([str(word) for word in value], conditions=conditions)
 
 
 def _text(value: ast.expr | None, scope: Bindings) -> str:
@@ -311,12 +259,6 @@ def _text(value: ast.expr | None, scope: Bindings) -> str:
     except NotLiteral:
         return ""
     return found if isinstance(found, str) else ""
-
-
-def _name_of(function: ast.expr) -> str:
-    if isinstance(function, ast.Attribute):
-        return function.attr
-    return function.id if isinstance(function, ast.Name) else ""
 
 
 def _written(node: ast.expr) -> str:

@@ -1,10 +1,11 @@
-"""Matrices under keys that say what they do, wherever in a document: what camchains, OpenCV and EuRoC files share.
+"""Matrices under keys that say what they do, and the edges they make: what camchains, OpenCV and EuRoC files share.
 
-Poses that a calibration states about pairs of frames, made into the edges of trees: turned round, checked, named.
+    T_cam_imu    Kalibr: takes points of the IMU to the camera in whose block it stands
+    body_T_cam0  VINS: takes points of cam0 to body, the pose of cam0 in body
 
-    T_cam_imu of cam0 and cam1 both end at the IMU: in a tree the cameras hang under it, so each is turned round.
-
-What is stated twice, the other way round or along another way, is no edge but a check.
+One table says what keys mean; one that no row knows is never guessed: somebody has to tell its direction.  Matrices are
+rows in rows, one long list, or OpenCV's map of rows, cols and data; row-major.  What is stated twice, the other way
+round or along another way, is no edge but a check.
 """
 
 from __future__ import annotations
@@ -13,35 +14,267 @@ import re
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool.documents.yaml import TAG
 from frametool.errors import bare, shown
 from frametool.formats.table import DIRECTIONS
-from frametool.formats.trees.matrix_keys import (
-    TAGS,
-    Ambiguous,
-    Meaning,
-    grid_of,
-    is_tagged,
-    meaning_of,
-    no_pose,
-    partner_of,
-    read_shift,
-    read_turn,
-    read_whole,
-    whole_pose,
-)
 from frametool.formats.trees.tree_reader import Unclear, dotted
+from frametool.frames.path import IDENTITY
 from frametool.geometry import floats, rigid
-from frametool.grammar.edges import Edge
-from frametool.grammar.readers import Misfit, kind, within
-from frametool.grammar.rotation_spelling import AGREEMENT
+from frametool.geometry.representations import notation
+from frametool.grammar.edges import Answers, Edge, Tally
+from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, within
+from frametool.grammar.rotation_spelling import AGREEMENT, read_spelled, rotation_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.formats.trees.matrix_keys import Grid, Pair
+    from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Answers
-    from frametool.grammar.readers import Path, Reading
+    from frametool.grammar.readers import Path, Quaternion
+
+# pattern of the key, target, source; <a> and <b> stand for names in it, {..} for what the file or the user names:
+# {me} the block that the key stands in, {before} the camera before it, {imu} {body} what all of them are seen from
+KEYS = (
+    ("T_cn_cnm1", "{me}", "{before}"),  # Kalibr: from camera n-1 to camera n
+    ("T_i_b", "{me}", "{imu}"),  # Kalibr: from the body, which is its first IMU, to this one
+    ("T_cam_imu", "{me}", "{imu}"),  # Kalibr
+    ("T_imu_cam", "{imu}", "{me}"),  # OpenVINS
+    ("T_cam_body", "{me}", "{body}"),
+    ("T_body_cam", "{body}", "{me}"),
+    ("T_SC", "{sensor}", "{me}"),  # okvis: S is the IMU, C the camera
+    ("T_BS", "{body}", "{me}"),  # EuRoC, okvis: S is the sensor of the file or block
+    ("T_cam_<b>", "{me}", "<b>"),
+    ("T_<a>_cam", "<a>", "{me}"),
+    ("(?:T_)?<a>_from_<b>", "<a>", "<b>"),
+    ("<a>_T_<b>", "<a>", "<b>"),  # VINS-Fusion: body_T_cam0
+    ("T_<a>_<b>", "<a>", "<b>"),  # ORB-SLAM3: IMU.T_b_c1, Stereo.T_c1_c2
+    ("T<letter><letter>", "<a>", "<b>"),  # ORB-SLAM3: Tbc
+)
+# these name two frames, and people write both directions so
+ASKED = ("(?:T_)?<a>_to_<b>", "(?:T_)?<a>2<b>")
+# two keys side by side, a rotation (3x3, or a rotation vector of three numbers) and a translation, and the frames they
+# are about: together they take points of the second to the first; without frames their direction is asked for
+PAIRS = (
+    (r"rvec(.*)", r"tvec\1", "camera", r"object\1", ""),  # OpenCV's own: solvePnP, calibrateCamera
+    (r"extrinsicRotation", "extrinsicTranslation", "imu", "cam0", ""),  # VINS-Mono: from the camera to the IMU
+    (r"R", "T", "cam1", "cam0", "R1|P1|Q|E|F"),  # stereoCalibrate, which writes one of these beside them
+    (r"R", "[Tt]", "", "", ""),
+    (r"(?i:rotation(?:_?matrix)?)", "(?i:translation(?:_?vector)?)", "", "", ""),
+)
+# what is no pose, though some of it has the size of one
+NO_POSE = (
+    (r"P|P[0-9]|.*[Pp]rojection.*|P_rect.*", "projection"),
+    (r"R|R[0-9]|.*[Rr]ectif.*|R_rect.*", "rectification"),
+    (r"Q", "disparity to depth"),
+    (r"E|F|.*[Ee]ssential.*|.*[Ff]undamental.*|H|.*[Hh]omography.*", "geometry of two pictures"),
+    (r"K|K[0-9]|.*[Ii]ntrinsic.*|[Cc]amera_?[Mm]atrix.*|M[0-9]", "intrinsics"),
+    (r"D|D[0-9]|.*[Dd]ist.*", "distortion"),
+    (r".*[Cc]ov.*|.*[Nn]oise.*|.*[Ii]nformation.*", "covariance"),
+)
+
+
+class Meaning(NamedTuple):
+    """What a matrix does: it takes points of `source` to `target`; in a tree `child` hangs under the other one.
+
+    said: whether the key says so; else it is only how `--direction parent-from-child` would have it
+    """
+
+    target: str
+    source: str
+    child: str
+    said: bool = True
+
+
+class Ambiguous(NamedTuple):
+    """The ways in which the names of two frames can be told apart in one key."""
+
+    names: tuple[tuple[str, str], ...]
+
+
+def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -> Meaning | Ambiguous | None:
+    """Return what a key says; None if no row of the table knows it.
+
+    key: without what stands before its last point (`IMU.T_b_c1`).
+    known: names for what stands in braces; frames: names that the user told, which may be parts of the key.
+    """
+    last = key.rpartition(".")[2]
+    for pattern in ASKED:
+        if ways := _ways(pattern, last, frames):
+            parent, child = ways[0]
+            return Ambiguous(tuple(ways)) if len(ways) > 1 else Meaning(parent, child, child, said=False)
+    for pattern, target, source in KEYS:
+        if ways := _ways(pattern, last, frames):
+            if len(ways) > 1:
+                return Ambiguous(tuple(ways))
+            names = {"<a>": ways[0][0], "<b>": ways[0][1]} | {f"{{{name}}}": frame for name, frame in known.items()}
+            return Meaning(names[target], names[source], names["{me}" if "{me}" in (target, source) else source])
+    return None
+
+
+def _ways(pattern: str, key: str, frames: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the pairs of names that a pattern finds in a key, those that the user told if they fit."""
+    if "<" not in pattern:
+        return [("", "")] if key == pattern else []
+    told = [(a, b) for a in frames for b in frames if re.fullmatch(_filled(pattern, re.escape(a), re.escape(b)), key)]
+    if told:
+        return told[:1]
+    found: dict[tuple[str, str], None] = {}
+    for name in (r"[A-Za-z]\w*?", r"[A-Za-z]\w*"):  # the shortest first name, then the longest
+        if match := re.fullmatch(_filled(pattern, name, r"[A-Za-z]\w*"), key):
+            names = {"a": "", "b": ""} | match.groupdict()
+            found[names["a"], names["b"]] = None
+    return list(found)
+
+
+def _filled(pattern: str, a: str, b: str) -> str:
+    letters = pattern.replace("<letter>", "(?P<a>[a-z])", 1).replace("<letter>", "(?P<b>[a-z])", 1)
+    return letters if letters != pattern else pattern.replace("<a>", f"(?P<a>{a})").replace("<b>", f"(?P<b>{b})")
+
+
+def no_pose(key: str) -> str:
+    """Return what a matrix is that is no pose, by its key; "" if that does not say it."""
+    last = key.rpartition(".")[2]
+    return next((what for pattern, what in NO_POSE if re.fullmatch(pattern, last)), "")
+
+
+class Pair(NamedTuple):
+    """The key of the translation that belongs to a rotation, and two frames as in `PAIRS`."""
+
+    translation: str
+    target: str
+    source: str
+
+
+def partner_of(key: str, others: Collection[str]) -> Pair | None:
+    """Return what belongs to the key of a rotation among the keys beside it; None if nothing does."""
+    for rotation, translation, target, source, needed in PAIRS:
+        if not (match := re.fullmatch(rotation, key)):
+            continue
+        wanted, child = (match.expand(each) if match.groups() else each for each in (translation, source))
+        found = next((other for other in others if re.fullmatch(wanted, other)), None)
+        if found is not None and (not needed or any(re.fullmatch(needed, other) for other in others)):
+            return Pair(found, target, child)
+    return None
+
+
+MATRIX = notation("matrix")
+ROTVEC = notation("rotvec")
+WHOLE = ((4, 4), (3, 4))  # rows and columns of what holds a whole pose
+LAST_ROW = ("0", "0", "0", "1")
+_NUMBER_TYPE = r"(\d*)[ucwsifdh]"  # OpenCV's dt: how many numbers an element has, and of which type
+
+
+class Grid(NamedTuple):
+    """A matrix in text: rows and columns (0 where they differ in length), one text a number, and where each stands."""
+
+    rows: int
+    columns: int
+    texts: list[Any]
+    places: list[Path]
+
+    @property
+    def size(self) -> str:
+        """Say how large it is."""
+        return f"{self.rows} x {self.columns}" if self.columns else f"{self.rows} rows of different lengths"
+
+    def holds(self, count: int) -> bool:
+        """Tell whether it is a row or a column of so many numbers."""
+        return 1 in (self.rows, self.columns) and len(self.texts) == count
+
+
+def grid_of(value: Any) -> Grid | None:
+    """Return a value as a matrix; None if it is none.
+
+    Raises Misfit for one whose data does not have the size that it says.
+    """
+    if type(value) is dict:
+        return _stored(value) if {"rows", "cols", "data"} <= value.keys() else None
+    if type(value) is not list or not value:
+        return None
+    if not any(type(row) is list for row in value):
+        return None if any(type(each) is dict for each in value) else _flat(1, len(value), value, ())
+    rows = [row if type(row) is list else [row] for row in value]
+    widths = {len(row) for row in rows}
+    places: list[Path] = [(at, column) for at, row in enumerate(rows) for column in range(len(row))]
+    return Grid(len(rows), widths.pop() if len(widths) == 1 else 0, [text for row in rows for text in row], places)
+
+
+def _flat(rows: int, columns: int, texts: list[Any], path: Path) -> Grid:
+    return Grid(rows, columns, texts, [(*path, index) for index in range(len(texts))])
+
+
+def _stored(value: dict[str, Any]) -> Grid:
+    """Take OpenCV's map apart."""
+    rows, columns = (_whole(value, key) for key in ("rows", "cols"))
+    known = re.fullmatch(_NUMBER_TYPE, str(value.get("dt", "d")))
+    if known is None:
+        raise Misfit(f"expected a type of numbers like d or 3f, found {kind(value['dt'])}", ("dt",))
+    columns *= int(known[1] or 1)
+    data = value["data"]
+    if type(data) is not list or len(data) != rows * columns:
+        found = f"{len(data)} numbers" if type(data) is list else kind(data)
+        raise Misfit(f"expected {rows} x {columns} = {rows * columns} numbers, found {found}", ("data",))
+    return _flat(rows, columns, data, ("data",))
+
+
+def _whole(value: dict[str, Any], key: str) -> int:
+    text = value[key]
+    if type(text) is not str or not re.fullmatch(r"[0-9]{1,9}", text):
+        raise Misfit(f"expected a whole number, found {shown(text) if type(text) is str else kind(text)}", (key,))
+    return int(text)
+
+
+def whole_pose(grid: Grid | None, *, twelve: bool) -> Grid | None:
+    """Return a matrix that has the size of a whole pose with the four rows of it; None for any other.
+
+    twelve: twelve numbers in a row are one, too
+    """
+    if grid is not None and grid.holds(16):
+        grid = grid._replace(rows=4, columns=4)
+    elif grid is not None and grid.holds(12) and twelve:
+        grid = grid._replace(rows=3, columns=4)
+    if grid is None or (grid.rows, grid.columns) not in WHOLE:
+        return None
+    missing = 16 - len(grid.texts)
+    return Grid(4, 4, [*grid.texts, *LAST_ROW[:missing]], [*grid.places, *[()] * missing])
+
+
+def read_turn(grid: Grid, reading: Reading) -> Quaternion:
+    """Read a 3x3 matrix, or a rotation vector of three numbers in radians; raises Misfit."""
+    if grid.holds(3):
+        return rotation_of(ROTVEC, grid.texts, grid.places, reading)
+    if (grid.rows, grid.columns) != (3, 3) and not grid.holds(9):
+        raise Misfit(f"expected a 3 x 3 matrix or a rotation vector, found {grid.size}")
+    return rotation_of(MATRIX, grid.texts, grid.places, reading)
+
+
+def read_shift(grid: Grid) -> tuple[float, float, float]:
+    """Read a vector of three numbers; raises Misfit."""
+    if not grid.holds(3):
+        raise Misfit(f"expected 3 numbers, found {grid.size}")
+    try:
+        x, y, z = read_numbers(grid.texts, ("x", "y", "z"))
+    except Misfit as misfit:
+        raise Misfit(str(misfit), grid.places[int(misfit.path[0])]) from None
+    return x, y, z
+
+
+HEAD = "%YAML:1.0"
+TAGS = frozenset(("!!opencv-matrix", "!!opencv-nd-matrix", "!!opencv-sparse-matrix"))
+_HEAD = r"\s*%(?=YAML:1\.[0-9])"
+_TIGHT_KEY = r"(?m)^( *(?:- +)*[\w.-]+):(?=[^\s:/])"
+
+
+def made_ordinary(file: InputFile) -> InputFile:
+    """Make a text with OpenCV's head one that YAML reads: the head a comment, a blank behind each colon.
+
+    Places in the text stay where they are, but one to the right behind a colon without a blank.
+    """
+    if match := re.match(_HEAD, file.text):
+        at = match.end() - 1
+        file.text = f"{file.text[:at]}#" + re.sub(_TIGHT_KEY, r"\1: ", file.text[at + 1 :])
+    return file
+
 
 TOLERATED = 1e-3  # metres, radians: how far a pose and its stated inverse may lie apart, with a warning
 
@@ -99,7 +332,7 @@ class _Forest:
 
     def _above(self, frame: str) -> tuple[str, Rigid]:
         """Return the root above a frame, and the pose of the frame in it."""
-        pose: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        pose = IDENTITY
         while frame in self.edges:
             edge = self.edges[frame]
             pose, frame = rigid.compose(*edge.components, *pose), edge.parent or ""
@@ -138,6 +371,7 @@ def _compare(known: Rigid, each: Stated, first: Stated | None, reading: Reading)
 
 
 MOST_TOLD = 3  # matrices that are no poses
+BLOCK_NAMES = {"cameras": "cam", "imu_params": "imu", "imu_parameters": "imu"}  # of okvis
 
 
 class MatrixBlock(NamedTuple):
@@ -174,16 +408,20 @@ class Matrices:
         self.blocks = _renamed(_blocks(document, "", ()), naming)
         self.poses = [pose for block in self.blocks for pose in self._of_block(block)]
 
-    def edges(self) -> list[Edge]:
-        """Return the edges that the poses make; raises Misfit where they contradict each other."""
-        return edges_of(self.poses, self.reading)
+    def edges(self, tally: Tally, nothing: str) -> list[Edge]:
+        """Return the edges that the poses make, and say how many there are and what was left out.
 
-    def about(self, edges: list[Edge]) -> str:
-        """Say how many poses there are, and what was left out."""
-        count = f"{len(edges)} {'pose' if len(edges) == 1 else 'poses'}"
-        more = f" and {len(self.left) - MOST_TOLD} more" if len(self.left) > MOST_TOLD else ""
-        verb = "is no pose" if len(self.left) == 1 else "are no poses"
-        return f"{count}; {', '.join(self.left[:MOST_TOLD])}{more} {verb}" if self.left else count
+        Raises Misfit where they contradict each other, and with `nothing` where there is none.
+        """
+        if not self.poses:
+            raise Misfit(nothing)
+        edges = edges_of(self.poses, self.reading)
+        tally.about = f"{len(edges)} {'pose' if len(edges) == 1 else 'poses'}"
+        if self.left:
+            more = f" and {len(self.left) - MOST_TOLD} more" if len(self.left) > MOST_TOLD else ""
+            verb = "is no pose" if len(self.left) == 1 else "are no poses"
+            tally.about += f"; {', '.join(self.left[:MOST_TOLD])}{more} {verb}"
+        return edges
 
     def _of_block(self, block: MatrixBlock) -> Iterator[Stated]:
         """Yield the poses of one map."""
@@ -203,27 +441,24 @@ class Matrices:
     def _single(self, block: MatrixBlock, key: str, value: Any, grid: Grid | None) -> Stated | None:
         """Return the pose under one key, if it is one."""
         path = (*block.path, key)
-        whole = whole_pose(grid)
-        known = self._known(block)
-        meaning = meaning_of(key, known, self.naming.told)
+        meaning = meaning_of(key, self._known(block), self.naming.told)
         says = isinstance(meaning, Meaning) and meaning.said
-        if says and whole is None and grid is not None and grid.holds(12):
-            whole = whole_pose(grid._replace(rows=3, columns=4))
+        whole = whole_pose(grid, twelve=says)
         if says and whole is None and (grid is not None or type(value) is not str):
             found = grid.size if grid else kind(value)
             raise Misfit(f"{bare(key)}: expected a 4 x 4 or 3 x 4 matrix, found {found}", path)
         if whole is None or (not says and no_pose(key)):
             self._leave(path, value, grid)
             return None
-        if meaning is None or not says:
-            meaning = self._directed(block, key, path, meaning)
         if isinstance(meaning, Ambiguous):
             ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
             raise Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {ways}", path, key=True)
+        if meaning is None or not meaning.said:
+            meaning = self._directed(block, key, path, meaning)
         if "" in (meaning.target, meaning.source):
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
-        components = within(path, read_whole, whole, self.reading)
-        return Stated(*meaning[:3], components, path, chained=key == "T_cn_cnm1")
+        position, rotation = within(path, read_spelled, MATRIX, whole.texts, whole.places, self.reading)
+        return Stated(*meaning[:3], (*(position or IDENTITY[:3]), *rotation), path, chained=key == "T_cn_cnm1")
 
     def _known(self, block: MatrixBlock) -> dict[str, str]:
         """Return the names that the templates of the table stand for."""
@@ -242,12 +477,8 @@ class Matrices:
         earlier = [*beside.values()][: [*beside].index(own)] if own in beside else []
         return earlier[-1] if earlier else ""
 
-    def _directed(
-        self, block: MatrixBlock, key: str, path: Path, named: Meaning | Ambiguous | None
-    ) -> Meaning | Ambiguous:
-        """Return what a key means that does not say its direction, as it was told; raises Unclear if it was not."""
-        if isinstance(named, Ambiguous):
-            return named
+    def _directed(self, block: MatrixBlock, key: str, path: Path, named: Meaning | None) -> Meaning:
+        """Return what a key means that does not say its direction, as options say; raises Unclear if they do not."""
         if named is not None:
             parent, child = named.target, named.source
         else:
@@ -274,43 +505,37 @@ class Matrices:
         if shift is None:
             found = kind(block.entries[pair.translation])
             raise Misfit(f"{pair.translation}: expected 3 numbers, found {found}", place)
-        if pair.target:
-            target, source = self._names_of(pair)
-            meaning = Meaning(target, source, target if pair.target == "cam1" else source)
+        if pair.target == "cam1":  # of two cameras cam0 is told first
+            source, target = self.answers.names(pair.source, pair.target)
+            meaning = Meaning(target, source, target)
+        elif pair.target:
+            target, source = self.answers.names(pair.target, pair.source)
+            meaning = Meaning(target, source, source)
         else:
             parent, child = self.answers.names(self.naming.base or "body", block.name or key)
             meaning = self._told(f"{key} and {pair.translation}", path, parent, child)
         rotation = within(path, read_turn, turn, self.reading)
         return Stated(*meaning[:3], (*within(place, read_shift, shift), *rotation), path)
 
-    def _names_of(self, pair: Pair) -> tuple[str, str]:
-        """Return target and source of a pair under the names that were told; of two cameras cam0 is told first."""
-        if pair.target == "cam1":
-            source, target = self.answers.names(pair.source, pair.target)
-        else:
-            target, source = self.answers.names(pair.target, pair.source)
-        return target, source
-
     def _leave(self, path: Path, value: Any, grid: Grid | None) -> None:
         """Keep the name of a matrix that is no pose."""
         is_matrix = grid is not None and (grid.rows > 1 or type(value) is dict)
-        if is_matrix or any(is_tagged(value, tag) for tag in TAGS):
+        if is_matrix or (type(value) is dict and value.get(TAG) in TAGS):
             what = no_pose(str(path[-1]))
             self.left.append(f"{bare(dotted(path))} ({what})" if what else bare(dotted(path)))
 
 
 def _renamed(blocks: Iterator[MatrixBlock], naming: FrameNames) -> list[MatrixBlock]:
     """Return the blocks, those of cameras under the names that were told: cam0 has the first of them."""
+
+    def is_camera(block: MatrixBlock) -> bool:  # the first in a chain has no pose
+        return block.name.startswith("cam") or any(key.startswith("T_") for key in block.entries)
+
     found = list(blocks)
-    cameras = [block for block in found if block.name and not block.name.startswith("imu") and _looks_posed(block)]
+    cameras = [block for block in found if block.name and not block.name.startswith("imu") and is_camera(block)]
     numbered = sorted(cameras, key=lambda block: [int(number) for number in re.findall(r"[0-9]{1,9}", block.name)])
     told = {block.path: name for block, name in zip(numbered, naming.blocks, strict=False)}
     return [block._replace(name=told.get(block.path, block.name)) for block in found]
-
-
-def _looks_posed(block: MatrixBlock) -> bool:
-    """Tell whether a block has a pose or is that of a camera, whose first in a chain has none."""
-    return any(key.startswith("T_") for key in block.entries) or block.name.startswith("cam")
 
 
 def _blocks(entries: dict[str, Any], name: str, path: Path, depth: int = 0) -> Iterator[MatrixBlock]:
@@ -318,16 +543,12 @@ def _blocks(entries: dict[str, Any], name: str, path: Path, depth: int = 0) -> I
     yield MatrixBlock(name, entries, path)
     for key, value in entries.items():
         here = (*path, key)
+        name = BLOCK_NAMES.get(key, key)
         if depth > 8:
             return
         if type(value) is dict and not {"rows", "cols", "data"} <= value.keys():
-            yield from _blocks(value, _block_name(key), here, depth + 1)
+            yield from _blocks(value, name, here, depth + 1)
         elif type(value) is list:
             for index, each in enumerate(value):
                 if type(each) is dict:
-                    yield from _blocks(each, f"{_block_name(key)}{index}", (*here, index), depth + 1)
-
-
-def _block_name(key: str) -> str:
-    """Return what a block is about: okvis writes `cameras`, `imu_params`."""
-    return {"cameras": "cam", "imu_params": "imu", "imu_parameters": "imu"}.get(key, key)
+                    yield from _blocks(each, f"{name}{index}", (*here, index), depth + 1)

@@ -17,23 +17,22 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import parse_documents
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, bare, shown
-from frametool.formats.trees.matrix_keys import grid_of, read_turn
+from frametool.formats.trees.matrices import grid_of, read_turn
 from frametool.formats.trees.tree_reader import document_edges
+from frametool.frames.path import IDENTITY
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
-from frametool.grammar.readers import INDICES, Misfit, as_mapping, kind, read_numbers, within
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Path, Quaternion, Reading
+    from frametool.grammar.readers import Path, Quaternion
 
 NAMES = "sensor.json"
 _WXYZ = notation("wxyz")
-_IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -50,7 +49,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             yield from _ego_poses(records, world, ego, reading)
         elif "channel" in known:
             options.tally.about = "names of sensors"
-            yield Edge(None, ego, _IDENTITY)
+            yield Edge(None, ego, IDENTITY)
         else:
             raise Misfit("no poses in this table of nuScenes: they are in calibrated_sensor.json and ego_pose.json")
 

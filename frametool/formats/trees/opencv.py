@@ -17,11 +17,10 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.xml import XmlFile
+from frametool.documents.xml import Element, XmlFile
 from frametool.documents.yaml_writer import flow
 from frametool.errors import FormatError, ValueInvalid, shown
-from frametool.formats.trees.matrices import FrameNames, Matrices
-from frametool.formats.trees.matrix_keys import HEAD, TAGS, Meaning, StoredXml, made_ordinary, meaning_of
+from frametool.formats.trees.matrices import HEAD, TAGS, FrameNames, Matrices, Meaning, made_ordinary, meaning_of
 from frametool.formats.trees.tree_reader import Unclear, answerable, document_edges, remember
 from frametool.formats.trees.written_poses import Precision, rows_of, standing_edges, tell_lonely_roots
 from frametool.grammar.readers import Misfit, Reading, as_mapping
@@ -30,29 +29,27 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.grammar.edges import Edge, Options
+    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
 NAME = "opencv"
 _KEY = r"[A-Za-z_][\w-]*"  # what FileStorage takes for a name, without blanks
+DEEPEST = 100  # elements
 _NO_NAMES = dict.fromkeys(("me", "before", "imu", "body", "sensor"), "")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield an edge a pose, and check what is stated twice."""
 
-    def take(value: Any, reading: Reading) -> Iterator[Edge]:
-        told = options.answers.frames
-        naming = FrameNames(base=told[0] if told else "", alone="cam", told=told)
+    def take(value: Any, reading: Reading) -> list[Edge]:
+        frames = options.answers.frames
+        naming = FrameNames(base=frames[0] if frames else "", alone="cam", told=frames)
         matrices = Matrices(as_mapping(value, "matrices by name"), naming, options.answers, reading)
-        if not matrices.poses:
-            found = f"; {', '.join(matrices.left[:3])}" if matrices.left else ""
-            raise Misfit(f"no pose in it{found}; a pose is named after its two frames, as body_T_cam0")
-        edges = matrices.edges()
-        options.tally.about = matrices.about(edges)
-        yield from edges
+        found = f"; {', '.join(matrices.left[:3])}" if matrices.left else ""
+        nothing = f"no pose in it{found}; a pose is named after its two frames, as body_T_cam0"
+        return matrices.edges(options.tally, nothing)
 
     if file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         yield from _read_xml(file, options, take)
@@ -78,7 +75,49 @@ def _read_xml(file: InputFile, options: Options, take: Any) -> Iterator[Edge]:
         options.report(error)
 
 
-def write_tree(tree: FrameTree | TransformBuffer, style: Style) -> str:
+class StoredXml:
+    """A `<opencv_storage>` as one document: its value, and the element in which each path of it begins."""
+
+    def __init__(self, xml: XmlFile) -> None:
+        """Read all of it; raises FormatError."""
+        self.xml = xml
+        self.value: dict[str, Any] = {}
+        self._elements: dict[Path, Element] = {}
+        elements = iter(xml.elements())
+        root = next(elements)
+        self._elements[()] = root
+        inside = self._inside(elements, ())
+        self.value = inside if type(inside) is dict else {}
+
+    def element(self, path: Path) -> Element:
+        """Return the element of a path, or the nearest around it."""
+        return next(self._elements[path[:end]] for end in range(len(path), -1, -1) if path[:end] in self._elements)
+
+    def _inside(self, elements: Iterator[Element], path: Path) -> Any:
+        """Return what stands in an element up to its end: a map, a list of `_`, the words of a matrix, or a text."""
+        found: dict[str, Any] = {}
+        items: list[Any] = []
+        for element in elements:
+            if element.ends:
+                if items:
+                    return items
+                text = element.text.strip()
+                return found or (text.split() if element.tag == "data" else text.strip('"'))
+            here = (*path, len(items) if element.tag == "_" else element.tag)
+            self._elements[here] = element
+            if element.depth > DEEPEST:
+                raise self.xml.error(element, f"more than {DEEPEST} elements inside one another")
+            if element.tag in found:
+                raise self.xml.error(element, f"key {element.tag!r} stands twice")
+            value = self._inside(elements, here)
+            if element.tag == "_":
+                items.append(value)
+            else:
+                found[element.tag] = value
+        return found
+
+
+def write_tree(tree: Frames, style: Style) -> str:
     """Return a matrix an edge, called `parent_T_child`; raises ValueInvalid for names that OpenCV does not take."""
     precision = Precision(NAME, "matrices")
     text = f"{HEAD}\n---\n"

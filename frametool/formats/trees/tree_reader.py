@@ -5,9 +5,8 @@
     {name: lidar, parent: base, xyz: [0.9, 0, 2]}                             one edge, as `lookup` prints it
     {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a frame that moves; seconds
 
-Metres, radians unless said; every pose is that of the frame in its parent: parent_from_child.
-
-What forms in YAML and JSON share: each document through one function, what is wrong or odd with its place.
+Metres, radians unless a key says degrees; every pose is that of the frame in its parent: parent_from_child.  What other
+forms in YAML and JSON read their documents with stands below, and knows nothing of their keys.
 """
 
 from __future__ import annotations
@@ -16,28 +15,30 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.documents.source import Pasted
+from frametool.documents.source import InputFile, Pasted, Source, pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown, warn
 from frametool.frames.stamps import parse_stamp
-from frametool.grammar.edges import Edge
-from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
-from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, within
+from frametool.grammar.edges import Edge, Options, Tally
+from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
+from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, within
+from frametool.grammar.rotation_spelling import rotation_of
 from frametool.ros import messages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
 
-    from frametool.documents.source import InputFile, Source
-    from frametool.grammar.edges import Options, Tally
-    from frametool.grammar.readers import Note, Path
+    from frametool.geometry.representations import Notation
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.readers import Path
 
     Take = Callable[[Any, Reading], Iterable[Edge]]
 
 TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", *STAMP_KEYS))
-CHILDREN = frozenset(("children", *TIMED))
+XYZ = ("x", "y", "z")
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+CHILDREN = frozenset(("children", *TIMED))
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -292,6 +293,30 @@ def stamp_of(entry: dict[str, Any]) -> int | None:
         return parse_stamp(text if keys[0] == "stamp" else f"{text}ns")
     except ValueInvalid as error:
         raise Misfit(str(error), (keys[0],)) from None
+
+
+def named(fields: dict[str, Any], key: str) -> str:
+    """Return the name under a key; raises Misfit where there is none."""
+    name = read_name(fields, key)
+    if name is None:
+        raise Misfit(f"missing {key}")
+    return name
+
+
+def read_flat_pose(pose: dict[str, Any], rotation: Notation, reading: Reading) -> Rigid:
+    """Read a pose whose numbers stand under x, y, z and the names of the rotation's, in any order; raises Misfit."""
+    keys = (*XYZ, *rotation.columns)
+    if missing := [key for key in keys if key not in pose]:
+        raise Misfit(f"missing {', '.join(missing)}; a pose has {', '.join(keys)}")
+    x, y, z = read_numbers({key: pose[key] for key in XYZ}, XYZ)
+    places: list[Path] = [(name,) for name in rotation.columns]
+    return x, y, z, *rotation_of(rotation, [pose[name] for name in rotation.columns], places, reading)
+
+
+def line_error(file: InputFile, line: int, column: int, message: str) -> FormatError:
+    """Make the error for a place in a text that is read line by line."""
+    text = file.text.split("\n")[line - 1].rstrip("\r")
+    return FormatError(message, source=file.name, line=line, column=column, snippet=pointer(text, column))
 
 
 class Unclear(Misfit):

@@ -13,8 +13,7 @@ from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.geometry import euler, floats, matrix, quaternion, rigid
 
 if TYPE_CHECKING:
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid, Three
     from frametool.grammar.readers import Quaternion
     from frametool.grammar.result import Style
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 MOST_DECIMALS = 17
 
 
-def standing_edges(tree: FrameTree | TransformBuffer, form: str) -> list[tuple[str, str, Rigid]]:
+def standing_edges(tree: Frames, form: str) -> list[tuple[str, str, Rigid]]:
     """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
     tracks = list(tree.tracks())
     if moving := next((track.child for track in tracks if not track.standing), None):
@@ -32,7 +31,7 @@ def standing_edges(tree: FrameTree | TransformBuffer, form: str) -> list[tuple[s
     return [(track.parent, track.child, track.components) for track in tracks]
 
 
-def tell_lonely_roots(tree: FrameTree | TransformBuffer, form: str) -> None:
+def tell_lonely_roots(tree: Frames, form: str) -> None:
     """Warn of frames that a form cannot name because nothing is connected with them."""
     parents = {track.parent for track in tree.tracks()}
     if lonely := [frame for frame in tree.roots if frame not in parents]:

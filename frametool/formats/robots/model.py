@@ -1,0 +1,407 @@
+"""One model of a robot, whatever form described it: links, the joints between them, and the values those take.
+
+    Link("base", "arm", origin, (Joint("elbow", "revolute", (0.0, 1.0, 0.0), lower=-2.0, upper=2.0),))
+
+Radians, metres, poses.  A value is text as people write it (`0.5`, `30deg`, `pi/2`, `2cm`), a number, or a pose where a
+joint has no single one.  A link is where its joints put it; `Robot.fk` and the edges of a tree ask the same function.
+
+    robot = frametool.load_robot("arm.urdf")
+    base_from_tip = robot.fk("base", "tip", {"shoulder": 0.3, "elbow": numpy.linspace(0.0, 1.0, 1000)})
+
+Knows neither files of values nor times: those are `frametool.formats.robots.posture`.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+from itertools import repeat
+from operator import and_
+from typing import Any, NamedTuple, TypeAlias
+
+from frametool.documents.document import parse_documents
+from frametool.documents.source import Source
+from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
+from frametool.frames.path import IDENTITY, edges_between
+from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry.representations import notation
+from frametool.geometry.transform import Transform
+from frametool.geometry.trig import DEGREE, RADIAN
+from frametool.geometry.validation import as_numbers, scalars, single
+from frametool.grammar.pose import read_pose
+from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind
+from frametool.grammar.rotation_spelling import rotation_of
+from frametool.text.numbers import parse_angle, parse_length
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+
+    from frametool.documents.xml import Element, XmlFile
+    from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
+    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Quaternion, Vector
+
+    Value: TypeAlias = "JointValue | Rigid"
+    Values: TypeAlias = Mapping[str, Value]
+    Fail: TypeAlias = Callable[["Joint", str], FormatError]
+
+TURNING = ("revolute", "continuous")
+POSED = ("planar", "floating", "ball")  # no single number says where these stand
+OUT_OF_PLANE = 1e-9
+
+
+def read_quaternion(
+    xml: XmlFile, element: Element, texts: Sequence[str], options: Options, attribute: str = ""
+) -> Quaternion:
+    """Read x, y, z, w of an element by the rules of the grammar; what is odd is noted.  Raises FormatError."""
+    reading = Reading(Source(xml.name, ""), normalize=options.normalize)
+    try:
+        rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
+    except ValueInvalid as error:
+        raise xml.error(element, str(error), attribute, rule=error.rule) from None
+    for note in reading.notes:
+        options.tally.note(note, element.line)
+    return rotation
+
+
+class Mimic(NamedTuple):
+    """A joint follows another one: multiplier * value + offset, in radians or metres."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+class Joint(NamedTuple):
+    """A joint that can move.
+
+    kind: one of TURNING or POSED, or prismatic
+    axis: unit, in the frame of the joint; of a planar one the normal of its plane
+    lower, upper: limits in radians or metres, if it has any
+    rest: the value where nothing has moved, which it has by default (MJCF's `ref`)
+    rest_pose: the same where the value is a pose
+    anchor: the point of its frame that it turns about
+    line: on which it was written
+    """
+
+    name: str
+    kind: str
+    axis: Vector = (1.0, 0.0, 0.0)
+    lower: float | None = None
+    upper: float | None = None
+    mimic: Mimic | None = None
+    rest: float = 0.0
+    rest_pose: Rigid = IDENTITY
+    anchor: Vector = (0.0, 0.0, 0.0)
+    line: int = 0
+
+    @property
+    def posed(self) -> bool:
+        """Tell whether its value is a pose."""
+        return self.kind in POSED
+
+    @property
+    def start(self) -> Value:
+        """Return the value it has by default."""
+        return self.rest_pose if self.posed else JointValue(self.rest)
+
+
+class JointValue(NamedTuple):
+    """The value of a joint that turns or slides: a float or an array; radians or metres, or degrees, which stay exact.
+
+    An angle in degrees is never turned into radians on its way: quarter turns have exact poses.
+    """
+
+    number: Number
+    degrees: bool = False
+
+    @property
+    def plain(self) -> Number:
+        """Return it in radians or metres."""
+        return self.number * DEGREE if self.degrees else self.number
+
+
+def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
+    """Return what a joint does to the frame behind it."""
+    if isinstance(value, JointValue):
+        number, degrees = value
+        if joint.rest:
+            number = number - (joint.rest * RADIAN if degrees else joint.rest)
+        if joint.kind == "prismatic":
+            return rigid.slid(*joint.axis, number)
+        value = rigid.turned(*joint.axis, number, xp, degrees=degrees)
+    if not any(joint.anchor):
+        return value
+    tx, ty, tz, *_ = value
+    px, py, pz = joint.anchor
+    mx, my, mz = quaternion.rotate(*value[3:], px, py, pz)
+    return tx + px - mx, ty + py - my, tz + pz - mz, *value[3:]
+
+
+def _is_at_rest(joint: Joint, value: Value) -> Condition:
+    """Tell whether, or where, a joint moves nothing."""
+    if not isinstance(value, JointValue):
+        return value == IDENTITY
+    at_rest: Condition = value.number == (joint.rest * RADIAN if value.degrees else joint.rest)
+    return at_rest
+
+
+class Link(NamedTuple):
+    """How a frame hangs in its parent; None for a root.
+
+    origin: the pose in front of the joints; after: behind them
+    joints: those that move it, outermost first
+    rest: its pose where no joint has moved, to the bits that the file has
+    inverted: origin, joints and after lead from the frame to its parent
+    fixed: the name of the joint that holds it, if that does not move
+    """
+
+    parent: str | None
+    child: str
+    origin: Rigid = IDENTITY
+    joints: tuple[Joint, ...] = ()
+    line: int = 0
+    after: Rigid = IDENTITY
+    rest: Rigid | None = None
+    inverted: bool = False
+    fixed: str = ""
+
+    def pose(self, values: Sequence[Value], xp: Namespace = floats) -> Rigid:
+        """Return its pose in its parent for values of its joints; where none of them has moved the bits of `rest`."""
+        rest = self.rest or _product(self.origin, self.after)
+        if not self.joints:
+            return rest
+        at_rest: Condition = reduce(and_, map(_is_at_rest, self.joints, values))
+        if at_rest is True:
+            return rest
+        motions = map(motion, self.joints, values, repeat(xp))
+        moved = _product(self.origin, *motions, self.after)
+        if self.inverted:
+            moved = rigid.inverse(*moved)
+        if not xp.some(at_rest):
+            return moved
+        return tuple(xp.where(at_rest, one, other) for one, other in zip(rest, moved, strict=True))
+
+
+def _product(*poses: Rigid) -> Rigid:
+    """Compose poses, the outermost first; the identity changes no bits."""
+    product = IDENTITY
+    for each in poses:
+        if each is not IDENTITY:
+            product = each if product is IDENTITY else rigid.go_on(product, each)
+    return product
+
+
+def followed(joint: Joint, leader: Value) -> Value:
+    """Return the value of a joint that mimics another one; it is not held back by limits."""
+    if joint.mimic is None or not isinstance(leader, JointValue):
+        return joint.start
+    _, multiplier, offset = joint.mimic
+    if leader.degrees and joint.kind in TURNING:
+        return JointValue(leader.number * multiplier + offset * RADIAN, degrees=True)
+    return JointValue(leader.plain * multiplier + offset)
+
+
+def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = False) -> Value:
+    """Read the value of a joint: a number, text with or without a unit, a mapping that is a pose.
+
+    source: where it stands, for messages.  Raises Misfit with the path below the value, and ValueInvalid.
+    """
+    if joint.posed:
+        return _read_posed(joint, value, source, normalize=normalize)
+    if isinstance(value, (JointValue, float)):
+        return value if isinstance(value, JointValue) else JointValue(value)
+    if type(value) is not str:
+        expected = "metres, or 2cm" if joint.kind == "prismatic" else "radians, or 30deg"
+        raise Misfit(f"joint {shown(joint.name)} is {joint.kind}: expected {expected}, found {kind(value)}")
+    if joint.kind == "prismatic":
+        return JointValue(parse_length(value))
+    number, unit = parse_angle(value)
+    return JointValue(number, degrees=unit == "deg")
+
+
+def _read_posed(joint: Joint, value: Any, source: Source, *, normalize: bool) -> Rigid:
+    """Read the pose of a planar, floating or ball joint."""
+    example = "'{xyz: [1, 2, 0], rpy_deg: [0, 0, 90]}'"
+    expected = f"joint {shown(joint.name)} is {joint.kind}: it takes a POSE, as {example}"
+    if type(value) is str and value.lstrip().startswith("{"):
+        try:
+            documents = parse_documents(value, source.name)
+        except FormatError as error:
+            raise ValueInvalid(f"joint {shown(joint.name)}: {error.message}") from None
+        value = documents[0].value if len(documents) == 1 else None
+    if type(value) is not dict:
+        raise Misfit(f"{expected}; found {kind(value)}")
+    pose = read_pose(as_mapping(value, expected), Reading(source, normalize=normalize))
+    if pose.name is not None or pose.parent is not None:
+        raise Misfit(f"joint {shown(joint.name)} names its frames itself; leave name and parent out")
+    _check_freedom(joint, pose.components)
+    return pose.components
+
+
+def _check_freedom(joint: Joint, components: Rigid) -> None:
+    """Refuse a pose that the joint cannot take."""
+    tx, ty, tz, x, y, z, _ = components
+    ax, ay, az = joint.axis
+    if joint.kind == "ball" and (tx or ty or tz):
+        raise Misfit(f"joint {shown(joint.name)} is a ball joint: it turns only; leave the position out")
+    if joint.kind == "planar":
+        along = ax * tx + ay * ty + az * tz
+        tilt = max(map(abs, (y * az - z * ay, z * ax - x * az, x * ay - y * ax)))
+        if max(abs(along), tilt) > OUT_OF_PLANE * (1.0 + max(map(abs, (tx, ty, tz)))):
+            normal = f"{ax:g} {ay:g} {az:g}"
+            raise Misfit(f"joint {shown(joint.name)} is planar: this pose leaves the plane across {normal}")
+
+
+class Robot:
+    """Frames, and joints between them; answers where a frame is seen from another.
+
+    frames: names, in the order of the file
+    joints: those that move, by name
+    """
+
+    def __init__(self, name: str, links: Mapping[str, Link], frames: Iterable[str]) -> None:
+        """Take the frames, and how those hang that are no roots; `name` is for messages."""
+        self.name = name
+        self.frames = tuple(frames)
+        self.links = dict(links)
+        self.joints = {joint.name: joint for link in links.values() for joint in link.joints}
+
+    @property
+    def roots(self) -> tuple[str, ...]:
+        """Return the frames that hang nowhere."""
+        return tuple(frame for frame in self.frames if frame not in self.links)
+
+    def chain(self, base: str, tip: str) -> Chain:
+        """Return the joints and fixed pieces between two frames.
+
+        Raises UnknownFrame, NotConnected.
+        """
+        for frame in (base, tip):
+            if frame not in self.frames:
+                raise UnknownFrame(frame, known=self.frames, where=self.name)
+        down, up = edges_between(base, tip, lambda frame: self.links[frame].parent if frame in self.links else None)
+        return Chain([self.links[child] for child in down], [self.links[child] for child in reversed(up)], self.joints)
+
+    def __repr__(self) -> str:
+        """Return how many frames and joints there are, and the roots."""
+        counts = f"{len(self.frames)} frames, {len(self.joints)} joints"
+        return f"Robot({counts}, roots: {', '.join(self.roots) or 'none'})"
+
+    def fk(self, base: str, tip: str, joints: Mapping[str, Any] | Numbers) -> Transform:
+        """Return base_from_tip, the pose of `tip` in `base`, for one posture or for many at once.
+
+        joints: values by name, numbers or arrays of one shape: radians and metres, text like "30deg", a pose for a
+        planar or floating joint; or an array (..., n) of the joints in the order of `chain(base, tip).needs`.
+        A joint that mimics another one follows it unless it has a value of its own.
+        Raises UnknownFrame, NotConnected; ValueInvalid for joints that are missing or not there.
+        """
+        chain = self.chain(base, tip)
+        values = self._values(joints) if hasattr(joints, "keys") else _of_array(joints, chain.needs)
+        if missing := chain.missing(values):
+            raise ValueInvalid(f"no value for {listing(missing)}; the joints on the way are {listing(chain.needs)}")
+        return Transform.of(*chain.run(values))
+
+    def _values(self, joints: Any) -> dict[str, Value]:
+        """Check what is told of joints."""
+        values: dict[str, Value] = {}
+        for name, value in joints.items():
+            joint = self.joints.get(name)
+            if joint is None:
+                raise ValueInvalid(f"no joint {shown(name)}{alternatives(name, self.joints, 'joints')}")
+            if joint.posed and isinstance(value, Transform):
+                if not single(value.components):
+                    raise ValueInvalid(f"joint {shown(name)} takes one pose, got many")
+                values[name] = value.components
+            elif isinstance(value, (str, dict)):
+                values[name] = read_value(joint, value, Source(f"joint {name}", ""))
+            else:
+                values[name] = JointValue(scalars(value, name))
+        return values
+
+
+def _of_array(joints: Numbers, names: Sequence[str]) -> dict[str, Value]:
+    """Take the last axis of an array apart."""
+    array = as_numbers(joints, "joints")
+    if array.ndim == 0 or array.shape[-1] != len(names):
+        wanted = f"(..., {len(names)}) for {listing(names)}"
+        raise ValueInvalid(f"joints: expected shape {wanted}, got {array.shape}")
+    return {name: JointValue(scalars(array[..., at], "joints")) for at, name in enumerate(names)}
+
+
+class Chain:
+    """The way between two frames of a robot: the links on it, and which joints decide over it.
+
+    needs: the joints whose values decide, those that mimic others left out
+    """
+
+    def __init__(self, down: Sequence[Link], up: Sequence[Link], joints: Mapping[str, Joint]) -> None:
+        """Take the links from the common ancestor down to either end, topmost first."""
+        self._joints = joints
+        self._down, self._up = down, up
+        self._between = [joint.name for link in (*down, *up) for joint in link.joints]
+        self.needs = self._deciding(())
+
+    def uses(self, joint: str) -> bool:
+        """Tell whether a joint moves anything on the way, by itself or through those that follow it."""
+        return any(joint in self._followed(name, ()) for name in self._between)
+
+    def missing(self, told: Collection[str]) -> list[str]:
+        """Name the joints without a value, neither told nor followed."""
+        return [name for name in self._deciding(told) if name not in told]
+
+    def _deciding(self, told: Collection[str]) -> tuple[str, ...]:
+        """Name the joints that decide: those told of, and those that follow no other."""
+        return tuple(dict.fromkeys(self._followed(name, told)[-1] for name in self._between))
+
+    def _followed(self, name: str, told: Collection[str]) -> list[str]:
+        """Return a joint and those it follows, up to one that is told or follows none."""
+        line = [name]
+        while line[-1] not in told:
+            mimic = self._joints[line[-1]].mimic
+            if mimic is None or mimic.joint not in self._joints:
+                break
+            line.append(mimic.joint)
+        return line
+
+    def run(self, values: Values) -> Components:
+        """Return tx, ty, tz, x, y, z, w: floats if all values are, else arrays, computed block by block."""
+        used = {name: values[name] for name in self._deciding(values) if name in values}
+        plain = {name: value for name, value in used.items() if isinstance(value, JointValue)}
+        numbers = tuple(value.number for value in plain.values())
+        if single(numbers):
+            return self.pose(used, floats)
+        from frametool.geometry import arrays
+
+        def kernel(*block: Any) -> Components:
+            parts = zip(plain.items(), block, strict=True)
+            return self.pose({**used, **{name: JointValue(part, each.degrees) for (name, each), part in parts}}, arrays)
+
+        return arrays.run(kernel, 7, numbers)
+
+    def pose(self, values: Values, xp: Namespace) -> Rigid:
+        """Return base_from_tip for values of the joints that are needed: all floats, or arrays of one block."""
+        top_from_base, top_from_tip = (self._along(links, values, xp) for links in (self._down, self._up))
+        if not self._down:
+            return top_from_tip
+        if not self._up:
+            return rigid.inverse(*top_from_base)
+        return rigid.compose(*rigid.inverse(*top_from_base), *top_from_tip)
+
+    def _along(self, links: Sequence[Link], values: Values, xp: Namespace) -> Rigid:
+        """Go along one branch, as `frametool.frames.path` does."""
+        product = None
+        for link in links:
+            pose = link.pose([self._value(joint.name, values) for joint in link.joints], xp)
+            product = pose if product is None else rigid.go_on(product, pose)
+        return product or IDENTITY
+
+    def _value(self, name: str, values: Values) -> Value:
+        """Return the value of a joint: told, followed, or at rest."""
+        *followers, leader = self._followed(name, values)
+        value = values[leader] if leader in values else self._joints[leader].start
+        if leader not in values and self._joints[leader].mimic:  # of a joint that is fixed
+            value = followed(self._joints[leader], JointValue(0.0))
+        for each in reversed(followers):
+            value = followed(self._joints[each], value)
+        return value
