@@ -29,7 +29,7 @@ from frametool.cli.stderr import say_error, tell
 from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, decode, opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
-from frametool.formats.table import FORMATS
+from frametool.formats.table import FORMATS, is_trajectory
 from frametool.grammar.readers import Misfit
 from frametool.grammar.result import Result
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
@@ -189,8 +189,10 @@ def _for_a_person(term: Term, style: Style) -> str:
 
     type_ = term.type
     if type_.kind == POSE:
-        heading = f"{type_}\n" if (type_.target is None) != (type_.source is None) else ""
-        return heading + write_poses([plain_result(term, style)], style)
+        result = plain_result(term, style)
+        if (type_.target is None) == (type_.source is None):
+            return write_poses([result], style)
+        return f"{type_}\n{write_poses([Result(result.pose._replace(name=None, parent=None), result.extras)], style)}"
     if type_.kind in (POINT, VECTOR):
         return write_points([plain_result(term, style)], style)
     return line_of_value(term, style)
@@ -198,8 +200,12 @@ def _for_a_person(term: Term, style: Style) -> str:
 
 def _machine(term: Term, style: Style) -> str:
     """Write one value as a document or line of a machine format."""
-    module = import_module(FORMATS[style.form].writer)
     result = plain_result(term, style)
+    if isinstance(result, Result) and is_trajectory(style.form):
+        from frametool.stream.writers import write_poses
+
+        return write_poses([result], style)
+    module = import_module(FORMATS[style.form].writer)
     if isinstance(result, Result):
         return str(module.write_poses([result], style))
     if term.type.kind not in (POINT, VECTOR) and style.form not in ("json", "yaml"):

@@ -80,7 +80,7 @@ class Output:
 
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""
-        if self._holds_arrays:
+        if self._holds_arrays or self.is_trajectory:
             self.pieces(self._blocks(iter(results)))
             return
         self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))

@@ -26,14 +26,14 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.header import XYZ
 from frametool.stream.row_layout import POSE, Target
-from frametool.stream.row_poses import first_of, plain_cell, points_of, results_of, spans_of, texts_of
+from frametool.stream.row_poses import block_of, first_of, plain_cell, points_of, results_of, spans_of, texts_of
 from frametool.stream.rows import number_spans
 from frametool.text.csv_line import quoted
 from frametool.text.parse import parse_floats
 from frametool.text.spans import MARGIN, Spans, framed, join
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.formats.rows.column_file import ColumnWriter
     from frametool.geometry.types import Components
@@ -71,8 +71,9 @@ class TextWriter:
         self.style = style
         self.kind = kind
         module: Any = import_module(FORMATS[style.form].writer)
-        self.write: Callable[[Sequence[Any], Style], str] = module.write_poses if kind == POSE else module.write_points
         self.fixed: RowForm | None = getattr(module, "ROWS", None)
+        name = "write_poses" if kind == POSE else "write_points"
+        self.write: Callable[[Sequence[Any], Style], str] = getattr(module, name, _no_text)
         self.lost = None if self.fixed is None else Lost(self.fixed, style)
         self.extras = tuple(extras)
         self.placed = placed
@@ -270,6 +271,17 @@ class TextWriter:
         known = "" if not self.count else self.write([first], self.style)
         text = self.write(results if not self.count else [first, *results], self.style)
         return text[len(known) :].encode()
+
+
+def _no_text(_results: Sequence[Any], _style: Style) -> str:
+    """Write nothing: a form that says what its rows are writes them by that alone."""
+    return ""
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Return the text of single poses in a form that says what its rows are."""
+    writer = TextWriter(style)
+    return (writer.of_block(block_of(list(results))) + writer.end()).decode()
 
 
 def _vary(block: RowPoses) -> bool:

@@ -14,18 +14,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
-from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, write_rows
+from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
 from frametool.formats.table import Poses
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import N
     from frametool.grammar.edges import Options, Samples
-    from frametool.grammar.result import Result, Style
 
 IMAGE_LINE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
 FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ"
@@ -89,8 +88,3 @@ def _count(file: InputFile, number: int, word: str) -> int:
     if not word.isdecimal():
         raise FormatError(f"expected an id, found {shown(word)}", source=file.name, line=number)
     return int(word)
-
-
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return two lines a pose, the second empty; cameras are all number 1."""
-    return write_rows(ROWS, results, style)

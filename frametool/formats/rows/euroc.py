@@ -8,14 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.formats.rows.pose_rows import Numbers, RowForm, write_rows
+from frametool.formats.rows.pose_rows import Numbers, RowForm
 from frametool.formats.table import FORMATS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
 
     from frametool.geometry.types import N
-    from frametool.grammar.result import Result, Style
 
 
 def _w_first(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> tuple[N, ...]:
@@ -27,8 +25,3 @@ ROWS = RowForm(
     _w_first,
     head=",".join(FORMATS["euroc"].columns[:8]).encode() + b"\n",
 )
-
-
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return the header and one row a pose."""
-    return write_rows(ROWS, results, style)

@@ -12,17 +12,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
-from frametool.formats.rows.pose_rows import Numbers, RowForm, write_rows
+from frametool.formats.rows.pose_rows import Numbers, RowForm
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
 from frametool.formats.table import Poses
 from frametool.geometry import euler, floats
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
-    from frametool.grammar.result import Result, Style
 
 POSES = Poses("quaternion", counted="ids of vertices")
 ROWS = RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=())
@@ -76,8 +75,3 @@ def _pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int
 def read(file: InputFile, options: Options) -> Iterator[Samples]:
     """Yield the vertices as poses of one body."""
     return samples(poses(file, options), POSES, file, options)
-
-
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return a vertex a pose, numbered from 0."""
-    return write_rows(ROWS, results, style)

@@ -7,18 +7,6 @@ The pose of the left camera (optical axes) in the world, which is that of the fi
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix, write_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from frametool.grammar.result import Result, Style
+from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix
 
 ROWS = RowForm((Numbers(12), b"\n"), rows_of_matrix, axes="optical", holds=())
-
-
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return one row a pose."""
-    return write_rows(ROWS, results, style)

@@ -11,17 +11,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
-from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, rows_of_matrix, write_rows
+from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, rows_of_matrix
 from frametool.formats.rows.trajectory import Written, samples
 from frametool.formats.table import Poses
 from frametool.grammar.readers import Misfit, Note, as_mapping, kind, read_numbers, within
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
-    from frametool.grammar.result import Result, Style
 
 POSES = Poses("matrix", axes="opengl", frames=("world", "camera"), counted="places in its list")
 MATRIX = "transform_matrix"
@@ -72,8 +71,3 @@ def _pose(entry: Any, index: int) -> Written:
 def read(file: InputFile, options: Options) -> Iterator[Samples]:
     """Yield the poses of the camera in the world."""
     return samples(poses(file, options), POSES, file, options)
-
-
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return one document with a frame for each pose."""
-    return write_rows(ROWS, results, style)

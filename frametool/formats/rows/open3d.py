@@ -18,17 +18,16 @@ from typing import TYPE_CHECKING
 
 from frametool.documents.document import parse_documents
 from frametool.errors import FormatError
-from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix, write_rows
+from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
 from frametool.formats.table import Poses
 from frametool.grammar.readers import Misfit, as_mapping, read_numbers, within
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
-    from frametool.grammar.result import Result, Style
 
 FRAMES = ("world", "camera")
 LOG = Poses("matrix", axes="optical", frames=FRAMES)
@@ -99,8 +98,3 @@ def _position_and_rows(rows: list[list[float]]) -> tuple[float, ...]:
 def read(file: InputFile, options: Options) -> Iterator[Samples]:
     """Yield the poses of the camera in the world."""
     return samples(poses(file, options), form_of(file, options), file, options)
-
-
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return the .log form: five lines a pose."""
-    return write_rows(ROWS, results, style)

@@ -3,7 +3,7 @@
     RowForm(("seconds", b" ", Numbers(7, b" "), b"\\n"))                         a row of a TUM trajectory
     1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0
 
-The same table is filled in here for a few poses, and in bulk by `frametool.stream.writers`.
+The table is filled in by `frametool.stream.writers`, for one pose and for a million.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, warn
-from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import floats, quaternion, rigid
+from frametool.frames.stamps import format_stamp
+from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable
 
-    from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.result import Result, Style
+    from frametool.geometry.types import Components
+    from frametool.grammar.result import Style
 
 HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: between optical axes and those of OpenGL
 LOSABLE = {"frames": "names of frames", "stamps": "stamps", "extras": "other columns"}
@@ -55,20 +55,6 @@ class RowForm(NamedTuple):
     axes: str = ""
     holds: tuple[str, ...] = ("stamps",)
     beside: str = ""
-
-
-def write_rows(form: RowForm, results: Iterable[Result], style: Style) -> str:
-    """Return the results in a form of rows; what it cannot hold is told once.
-
-    Raises ValueInvalid for a result without position or rotation, and for notations that the form does not have.
-    """
-    lost = Lost(form, style)
-    parts: list[str] = [form.head.decode()]
-    for number, result in enumerate(results):
-        parts.append(form.between.decode() if number else "")
-        parts += _row(form, result, style, number, lost)
-    lost.tell()
-    return "".join([*parts, form.tail.decode()])
 
 
 class Lost:
@@ -119,36 +105,6 @@ def turned(form: RowForm, style: Style, pose: Components) -> Components:
 def is_turned(form: RowForm, style: Style) -> bool:
     """Tell whether the axes of a camera are not those of the form it is written in."""
     return bool(form.axes and style.axes and form.axes != style.axes)
-
-
-def _row(form: RowForm, result: Result, style: Style, number: int, lost: Lost) -> Iterator[str]:
-    """Yield the text of one pose."""
-    pose, extras = result.pose, dict(result.extras)
-    if pose.rotation is None:
-        raise ValueInvalid(f"{style.form} holds poses; a point has no rotation")
-    stamp_ns, image = extras.pop("stamp_ns", None), extras.pop(IMAGE, None)
-    lost.add(frames=bool(pose.name or pose.parent), stamps=stamp_ns is not None, extras=bool(extras))
-    timed = "stamps" in form.holds
-    lost.counted |= timed and stamp_ns is None
-    lost.turned = is_turned(form, style)
-    stamp = number * BILLION if stamp_ns is None else stamp_ns
-    numbers = iter(form.numbers(*turned(form, style, canonical(pose.components, style))))
-    for piece in form.row:
-        if isinstance(piece, bytes):
-            yield piece.decode()
-        elif isinstance(piece, Numbers):
-            yield piece.between.decode().join(style.number(next(numbers)) for _ in range(piece.size))
-        elif piece == IMAGE:
-            lost.by_stamp |= image is None
-            yield image_name(image, stamp)
-        else:
-            yield field(piece, stamp, number + form.first)
-
-
-def canonical(pose: Rigid, style: Style) -> Rigid:
-    """Return a pose with the sign of the quaternion that is written."""
-    unit = quaternion.unit(*pose[3:], floats)
-    return (*pose[:3], *(unit if style.keep_sign else quaternion.from_quaternion(*unit, floats)))
 
 
 def field(name: str, stamp_ns: int, number: int) -> str:

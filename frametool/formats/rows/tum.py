@@ -5,18 +5,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from frametool.formats.rows.pose_rows import Numbers, RowForm, write_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from frametool.grammar.result import Result, Style
+from frametool.formats.rows.pose_rows import Numbers, RowForm
 
 ROWS = RowForm(("seconds", b" ", Numbers(7), b"\n"))
-
-
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return one row a pose."""
-    return write_rows(ROWS, results, style)
