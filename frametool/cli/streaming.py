@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from frametool.stream.run import Outcome
 
     Function = TypeVar("Function", bound=Callable[..., Any])
+    About = Callable[[], str] | None  # what else there is to say of a form
 
 MOST_JOBS = 256
 _STREAMS = ", ".join(readers(*STREAMED))
@@ -138,68 +139,78 @@ class Stream:
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
         return form
 
+    @property
+    def name(self) -> str:
+        """Return what messages call the stream."""
+        return self.path or "stdin"
+
     def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int:
         """Run the stream and return its exit status."""
-        name = self.path or "stdin"
         with self.opened() as given:
             head = given.peek()
             if head.lstrip()[:1] == b"<":
                 from frametool.cli.trees import refuse_robots
 
-                refuse_robots(head, name)
+                refuse_robots(head, self.name)
             try:
-                return self._run_opened(given, name, request, output, tables_only=tables_only)
+                return self._run_opened(given, request, output, tables_only=tables_only)
             except FormatError as error:
                 from frametool.cli.trees import with_hint
 
-                raise with_hint(error, head, name) from None
+                raise with_hint(error, head, self.name) from None
 
-    def _run_opened(
-        self, given: BufferedReader, name: str, request: Request, output: Output, *, tables_only: bool
-    ) -> int:
+    def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
         """Run the stream, of whatever form it is."""
-        with given:
-            stream = given
-            form, known_by = self.told_form(), ""
-            signed = form or _signed(stream.peek(), name)
-            is_listed = is_trajectory(signed) or holds_arrays(signed)
-            if not (form or tables_only or self._says_columns() or is_listed):
-                pasted, stream = self._pasted(stream, name, request)
-                if pasted is not None:
-                    return self._run_pasted(pasted, request, output)
-            begin = stream.peek()
-            if not form:
-                form, known_by = detect(begin, *STREAMED, name=self.path or "")
-            if known_by:
-                say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
-            if any(click.get_current_context().meta.get(READING, {}).values()):
-                from frametool.cli.trees import say_not_needed
+        form = self.told_form()
+        signed = form or _signed(stream.peek(), self.name)
+        is_listed = is_trajectory(signed) or holds_arrays(signed)
+        if not (form or tables_only or self._says_columns() or is_listed):
+            pasted, stream = self._pasted(stream, request)
+            if pasted is not None:
+                return self._run_pasted(pasted, request, output)
+        form = form or self._detected(stream.peek())
+        if any(click.get_current_context().meta.get(READING, {}).values()):
+            from frametool.cli.trees import say_not_needed
 
-                say_not_needed((form,), "stamps", "edges")
-            if tables_only and form in RECORDS:
-                raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
-            request = self._completed(request, output, form)
-            if "trajectory" in FORMATS[form].reads and not output.notations:
-                request = request._replace(notations=())  # its rows stay what they are
-            if form in RECORDS and (output.told or form) != form and request.gathered is None:
-                return self._run_as_values(stream, form, request, output)
-            stays = output.told is None or holds_arrays(output.told)
-            if holds_arrays(form) and (stays or request.gathered is not None):
-                return self._run_columns(stream, form, request, output)
-            kindred = output.told == "csv" and form in ("tsv", "semicolon")
-            listed = "trajectory" in FORMATS[form].reads and bool(FORMATS[form].signs) and not FORMATS[form].is_table
-            listed |= holds_arrays(form)
-            if request.gathered is not None and not listed:
-                return self._gather(stream, form, request._replace(notations=()), name)
-            from frametool.stream.row_layout import POSE
+            say_not_needed((form,), "stamps", "edges")
+        if tables_only and form in RECORDS:
+            raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
+        request = self._completed(request, output, form)
+        if is_trajectory(form) and not output.notations:
+            request = request._replace(notations=())  # its rows stay what they are
+        if form in RECORDS and (output.told or form) != form and request.gathered is None:
+            return self._run_as_values(stream, form, request, output)
+        outcomes, about = self._way(form, request, output)(stream, form, request, output)
+        status = self._write(outcomes, output, gathers=request.gathered is not None, by_row=holds_arrays(form))
+        if about is not None and (states := FORMATS[form].states) and not self.options["quiet"]:
+            say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
+        return status
 
-            # a trajectory has no room for more columns, or for other ones
-            listed |= output.is_trajectory and bool(request.operation.extras(POSE) or output.notations)
-            if form not in RECORDS and (listed or output.told not in (None, form)) and not kindred:
-                return self._run_as_poses(stream, form, request, output)
-            return self._run(stream, form, request, output)
+    def _detected(self, begin: bytes) -> str:
+        """Find the form of the stream by what it begins with, and by its name."""
+        form, known_by = detect(begin, *STREAMED, name=self.path or "")
+        if known_by:
+            say_if_verbose(f"{self.name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
+        return form
 
-    def _run_columns(self, stream: Any, form: str, request: Request, output: Output) -> int:
+    def _way(self, form: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
+        """Choose how rows become results: their text edited, as columns of numbers, or as poses in another form."""
+        from frametool.stream.row_layout import POSE
+
+        gathers = request.gathered is not None
+        if holds_arrays(form) and (gathers or output.told is None or holds_arrays(output.told)):
+            return self._as_columns
+        listed = holds_arrays(form) or (is_trajectory(form) and not FORMATS[form].is_table)
+        is_kindred = output.told == "csv" and form in ("tsv", "semicolon")
+        if gathers or form in RECORDS or is_kindred:
+            return self._as_poses if gathers and listed else self._as_text
+        # a trajectory has no room for more columns, or for other ones
+        no_room = output.is_trajectory and bool(request.operation.extras(POSE) or output.notations)
+        return self._as_poses if listed or no_room or output.told not in (None, form) else self._as_text
+
+    def _as_columns(
+        self, stream: Any, form: str, request: Request, output: Output
+    ) -> tuple[Generator[Outcome], About]:
         """Write columns of numbers in the form they came in, or in another that holds such."""
         from importlib import import_module
 
@@ -209,7 +220,6 @@ class Stream:
         from frametool.stream.column_stream import run_columns
 
         self._jobs(f"{form} holds numbers, no text")
-        name = self.path or "stdin"
         if output.path is None and request.gathered is None and sys.stdout.isatty():
             raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         module: Any = import_module(FORMATS[form].reader)
@@ -219,14 +229,10 @@ class Stream:
         if output.told is not None and request.gathered is None:
             into = import_module(FORMATS[output.told].writer)
         style = output.style.in_form(output.told or form)
-        outcomes = run_columns(opened, request, style, source=name, into=None if into is module else into)
-        status = self._write(outcomes, output, name, counted="row")
-        if (states := FORMATS[form].states) and not self.options["quiet"]:
-            told = f", now in {request.told}" if request.told and request.operation.moves else ""
-            say(f"{name}: {FORMATS[form].summary}{told}; {states}")
-        return status
+        outcomes = run_columns(opened, request, style, source=self.name, into=None if into is module else into)
+        return outcomes, lambda: f", now in {request.told}" if request.told and request.operation.moves else ""
 
-    def _run_as_poses(self, stream: Any, form: str, request: Request, output: Output) -> int:
+    def _as_poses(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
         """Write the results of rows, or of poses that no table holds, in another form."""
         from frametool.cli.trees import answers
         from frametool.stream.as_poses import OtherForm
@@ -235,27 +241,34 @@ class Stream:
         target = output.told or (form if keeps else "csv")
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
-        name = self.path or "stdin"
         self._jobs(f"rows become {target} one after the other")
-        converted = OtherForm(form, request, output.style.in_form(target), name, answers())
+        converted = OtherForm(form, request, output.style.in_form(target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.options["header"])
-        status = self._write(outcomes, output, name, counted="row" if holds_arrays(form) else "line")
-        states = FORMATS[form].states
-        if states and not self.options["quiet"]:
-            about = converted.tally.about
-            say(f"{name}: {FORMATS[form].summary}{', ' if about else ''}{about}; {states}")
-        return status
+        return outcomes, lambda: ", " * bool(converted.tally.about) + converted.tally.about
+
+    def _as_text(self, stream: Any, form: str, request: Request, _output: Output) -> tuple[Generator[Outcome], None]:
+        """Put the results where the numbers stood; all other text stays."""
+        if request.gathered is not None:
+            request = request._replace(notations=())
+        jobs = self._jobs("each row needs those before it" if request.in_order else "")
+        if form in RECORDS:
+            from frametool.stream.record_stream import run_records
+
+            return run_records(stream, form, request, source=self.name, jobs=jobs), None
+        from frametool.stream.table_stream import run_table
+
+        return run_table(stream, form, request, source=self.name, header=self.options["header"], jobs=jobs), None
 
     def _says_columns(self) -> bool:
         """Tell whether an option says that the stream is a table."""
         options = self.options
         return bool(options["columns"] or options["keep"] or options["prefix"] or not options["header"])
 
-    def _pasted(self, stream: BufferedReader, name: str, request: Request) -> tuple[Source | None, BufferedReader]:
+    def _pasted(self, stream: BufferedReader, request: Request) -> tuple[Source | None, BufferedReader]:
         """Look for what was pasted; the stream is then another, with the same in it."""
         from frametool.cli.poses import pasted_stream
 
-        return pasted_stream(stream, name, request._replace(given=request.given or self.given))
+        return pasted_stream(stream, self.name, request._replace(given=request.given or self.given))
 
     @staticmethod
     def _run_pasted(source: Source, request: Request, output: Output) -> int:
@@ -274,7 +287,7 @@ class Stream:
         from frametool.stream.record_values import stream_results
 
         self._jobs(f"records become {output.told} one after the other")
-        bad = self.policy(self.path or "stdin")
+        bad = self.policy(self.name)
         output.values(stream_results(stream, form, request, output.style, bad))
         return ROWS_SKIPPED if bad.count else 0
 
@@ -303,47 +316,20 @@ class Stream:
             on_error=options["on_error"],
         )
 
-    def _run(self, stream: Any, form: str, request: Request, output: Output) -> int:
-        name = self.path or "stdin"
-        return self._write(self._outcomes(stream, form, request, name), output, name)
-
-    def _write(self, outcomes: Generator[Outcome], output: Output, name: str, *, counted: str = "line") -> int:
-        """Write what becomes of each block as it comes; return the exit status."""
-        from contextlib import closing
+    def _write(self, outcomes: Generator[Outcome], output: Output, *, gathers: bool, by_row: bool) -> int:
+        """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
+        from contextlib import closing, nullcontext
 
         from frametool.cli.sink import writing
         from frametool.stream.run import run
         from frametool.view.progress import ProgressBar
 
         with (
-            writing(output.path, force=output.force) as write,
+            nullcontext(lambda _: None) if gathers else writing(output.path, force=output.force) as write,
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
             closing(outcomes),  # ends the processes of --jobs
         ):
-            return run(outcomes, write, self.policy(name, counted), progress.advance)
-
-    def _gather(self, stream: Any, form: str, request: Request, name: str) -> int:
-        """Let the request take all poses; nothing is written."""
-        from contextlib import closing
-
-        from frametool.stream.run import run
-        from frametool.view.progress import ProgressBar
-
-        with (
-            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
-            closing(self._outcomes(stream, form, request, name)) as outcomes,
-        ):
-            return run(outcomes, lambda _: None, self.policy(name), progress.advance)
-
-    def _outcomes(self, stream: Any, form: str, request: Request, name: str) -> Generator[Outcome]:
-        jobs = self._jobs("each row needs those before it" if request.in_order else "")
-        if form in RECORDS:
-            from frametool.stream.record_stream import run_records
-
-            return run_records(stream, form, request, source=name, jobs=jobs)
-        from frametool.stream.table_stream import run_table
-
-        return run_table(stream, form, request, source=name, header=self.options["header"], jobs=jobs)
+            return run(outcomes, write, self.policy(self.name, "row" if by_row else "line"), progress.advance)
 
     def _jobs(self, obstacle: str) -> int:
         """Return how many processes do the work: one where something is in the way of more, which is said."""
