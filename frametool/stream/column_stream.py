@@ -11,9 +11,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, warn
-from frametool.formats.rows.column_file import FLOATS, Made, MovesAlong, OutColumn
-from frametool.formats.rows.pcd import NORMALS, PcdWriter, viewpoint_words
-from frametool.formats.rows.structured import StructuredBatch, is_number, not_finite, rows_of_batch
+from frametool.formats.rows import pcd
+from frametool.formats.rows.clouds import NORMALS
+from frametool.formats.rows.column_file import (
+    FLOATS,
+    Made,
+    MovesAlong,
+    OutColumn,
+    StructuredBatch,
+    is_number,
+    not_finite,
+    rows_of_batch,
+)
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.stream.evaluate import Run, State
@@ -448,7 +457,7 @@ class _InOtherForm:
         values, nulls = batch.numbers(column.passed or 0)
         return values.astype(column.kind), nulls
 
-    def end(self) -> bytes | Iterator[bytes]:
+    def end(self) -> Iterator[bytes]:
         """Return what comes behind the last batch."""
         return self.writer.end()
 
@@ -493,10 +502,10 @@ class MessageColumns:
 
     def batches(self) -> Iterator[StructuredBatch]:
         """Yield the points."""
-        rows, fields = self.cloud.rows, self.cloud.rows.dtype.names or ()
+        rows = self.cloud.rows
         step = rows_of_batch(rows.dtype.itemsize)
         for first in range(0, len(rows), step):
-            yield StructuredBatch(rows[first : first + step], fields)
+            yield StructuredBatch(rows[first : first + step])
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Refuse: messages are written in other forms."""
@@ -516,10 +525,9 @@ class _GridOfForm:
     def create(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
         """Return what writes the points."""
         del count
-        writer: ColumnWriter = self.module.create(columns, len(self.cloud.rows), style)
-        if isinstance(writer, PcdWriter):
-            writer.words |= {"WIDTH": str(self.cloud.width), "HEIGHT": str(self.cloud.height)}
-            writer.words["VIEWPOINT"] = viewpoint_words(self.pose)
+        cloud = self.cloud
+        kept = {"grid": (cloud.width, cloud.height), "sensor": self.pose} if self.module is pcd else {}
+        writer: ColumnWriter = self.module.create(columns, len(cloud.rows), style, **kept)
         return writer
 
 

@@ -8,7 +8,7 @@ from frametool.errors import warn
 from frametool.formats.rows.arrow import ArrowRows, Collected, require_pyarrow, type_of, typed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from frametool.formats.rows.arrow import ArrowBatch
     from frametool.formats.rows.column_file import Made, OutColumn
@@ -58,12 +58,12 @@ class GroupWriter:
             self._write_group()
         return self.sink.taken()
 
-    def end(self) -> bytes:
-        """Return the last group and what stands behind all."""
+    def end(self) -> Iterator[bytes]:
+        """Yield the last group and what stands behind all."""
         if self.waiting or self.writer is None:
             self._write_group()
         self.writer.close()
-        return bytes(self.sink.taken())
+        yield bytes(self.sink.taken())
 
     def _write_group(self) -> None:
         """Write what waits; a group whose rows were all left out is none."""

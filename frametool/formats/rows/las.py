@@ -10,21 +10,21 @@ from __future__ import annotations
 from contextlib import contextmanager
 from copy import deepcopy
 from importlib import import_module
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
-from weakref import finalize
 
 import numpy as np
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown, warn
-from frametool.formats.rows.column_file import ColumnNumbers
-from frametool.formats.rows.structured import (
+from frametool.formats.rows.column_file import (
     MOST_ROWS,
+    XYZ,
+    Batch,
+    ColumnFile,
     bytes_left,
     check_declared,
     kept_in_file,
     pieces,
-    stamps_of_numbers,
+    temporary_file,
 )
 
 if TYPE_CHECKING:
@@ -39,9 +39,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
-XYZ = ("x", "y", "z")
 STORED = ("X", "Y", "Z")
-DOUBLE = np.dtype(np.float64)
 LIMITS = np.iinfo(np.int32)
 NEW_SCALE = 0.001  # metres, of a file that is made
 COLOURS = {"red", "green", "blue"}
@@ -82,7 +80,7 @@ def _told(name: str, what: str) -> Iterator[None]:
         raise FormatError(what.format(said), source=name) from None
 
 
-class LasBatch:
+class LasBatch(Batch):
     """Some points."""
 
     def __init__(self, points: Any, names: Sequence[str]) -> None:
@@ -100,27 +98,15 @@ class LasBatch:
         """Count the bytes of the points, unpacked."""
         return int(self.points.array.nbytes)
 
-    def numbers(self, place: int) -> ColumnNumbers:
-        """Return a column as floats."""
-        return ColumnNumbers(self.column(place).astype(np.float64))
-
-    def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
-        """Return a column as nanoseconds, and why points have none."""
-        return stamps_of_numbers(self.column(place), in_ns=in_ns)
-
-    def texts(self, place: int) -> list[str]:
-        """Return a column as texts."""
-        return [str(value) for value in self.column(place).tolist()]
-
     def column(self, place: int) -> NDArray[Any]:
         """Return a column as it is."""
         return np.array(self.points[self.names[place]])
 
 
-class LasFile:
+class LasFile(ColumnFile):
     """A scan whose points are read one batch after the other."""
 
-    vectors: tuple[tuple[str, ...], ...] = (("x_t", "y_t", "z_t"),)  # directions of waveforms
+    vectors = (("x_t", "y_t", "z_t"),)  # directions of waveforms
     gaps = False
 
     def __init__(self, file: InputFile) -> None:
@@ -192,13 +178,12 @@ class LasWriter:
         self.packed = packed
         self.given = given
         self.name = given.file.name if given else "las"
-        self.kept = TemporaryFile()  # noqa: SIM115 - closed with the writer
-        finalize(self, self.kept.close)
+        self.kept = temporary_file(self)
         self.writer: Any = None
         self.count = 0
         self.left_out = 0  # points without numbers
 
-    def of_rows(self, batch: LasBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
+    def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
         """Take the points of a batch, those that have a place; nothing is written yet."""
         columns = [each for each in self.columns if each.passed is None]
         new = {column.name: np.asarray(each.values) for column, each in zip(columns, made, strict=True)}
