@@ -15,8 +15,8 @@ from frametool.formats.rows import pcd
 from frametool.formats.rows.clouds import NORMALS
 from frametool.formats.rows.column_file import (
     FLOATS,
+    ColumnFile,
     Made,
-    MovesAlong,
     OutColumn,
     StructuredBatch,
     is_number,
@@ -43,7 +43,7 @@ from frametool.text.spans import Spans, framed
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Mapping, Sequence
 
-    from frametool.formats.rows.column_file import Batch, ColumnFile, ColumnWriter, Kind
+    from frametool.formats.rows.column_file import Batch, ColumnWriter, Kind
     from frametool.geometry.types import Rigid
     from frametool.grammar.result import Style
     from frametool.ros.point_clouds import PointCloud
@@ -465,7 +465,7 @@ class _InOtherForm:
 def move_along(file: ColumnFile, request: Request) -> None:
     """Let what else has a place among the points of a file move with them."""
     operation, timed = request.operation, request.timed
-    if isinstance(file, MovesAlong) and operation.moves and not request.keep and request.gathered is None:
+    if operation.moves and not request.keep and request.gathered is None:
         by_row = request.edge_of is not None or (timed is not None and bool(timed.name))
         file.moved_by(None if by_row else operation.left)
 
@@ -483,7 +483,7 @@ def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults)
     return made
 
 
-class MessageColumns:
+class MessageColumns(ColumnFile):
     """The points of a message as a file of columns."""
 
     vectors = NORMALS

@@ -14,7 +14,7 @@ import stat
 from functools import partial
 from shutil import copyfileobj
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 from weakref import finalize
 
 import numpy as np
@@ -141,7 +141,14 @@ class ColumnFile(Protocol):
     gaps: bool
 
     def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers; None for texts and for what else is no number."""
+        """Return the type of a column's numbers; None for texts and for what else is not a number."""
+
+    def moved_by(self, pose: Rigid | None) -> None:
+        """Move what has a place among the points by the pose that moves all of them, before any is read.
+
+        That is the pose of the sensor, or rotations of splats; None: there is no such pose.
+        """
+        del pose
 
     def batches(self) -> Iterator[Batch]:
         """Yield the rows; raises FormatError where the file ends too early."""
@@ -151,14 +158,6 @@ class ColumnFile(Protocol):
 
         drops: rows may be left out, so that their number is not known before the end.
         """
-
-
-@runtime_checkable
-class MovesAlong(Protocol):
-    """A file in which more than its points has a place among them: the pose of the sensor, rotations of splats."""
-
-    def moved_by(self, pose: Rigid | None) -> None:
-        """Move that by the pose that moves all points, before any is read; None: there is no such one."""
 
 
 class StructuredBatch(Batch):

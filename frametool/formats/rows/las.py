@@ -2,7 +2,7 @@
 
 x y z are integers of 32 bits, times a scale, plus an offset.  The scale stays; the offset is chosen anew, whole metres
 near the first points that are written, and what does not fit then is an error.  All other dimensions, VLRs and EVLRs
-are kept, a coordinate system among them, which is told.
+are kept, a coordinate system among them, which a warning says.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInva
 from frametool.formats.rows.column_file import (
     MOST_ROWS,
     XYZ,
-    Batch,
     ColumnFile,
+    StructuredBatch,
     bytes_left,
     check_declared,
     kept_in_file,
@@ -69,7 +69,7 @@ REFUSED = "it cannot be written as las: {}"
 
 
 @contextmanager
-def _told(name: str, what: str) -> Iterator[None]:
+def _translated(name: str, what: str) -> Iterator[None]:
     """Turn whatever the library raises into one error, with what the library says in the place of {}."""
     try:
         yield
@@ -80,23 +80,14 @@ def _told(name: str, what: str) -> Iterator[None]:
         raise FormatError(what.format(said), source=name) from None
 
 
-class LasBatch(Batch):
+class LasBatch(StructuredBatch):
     """Some points."""
 
     def __init__(self, points: Any, names: Sequence[str]) -> None:
         """Take a record of the library and the names of the columns."""
+        super().__init__(points.array)
         self.points = points
         self.names = names
-
-    @property
-    def size(self) -> int:
-        """Count the points."""
-        return len(self.points)
-
-    @property
-    def bytes_read(self) -> int:
-        """Count the bytes of the points, unpacked."""
-        return int(self.points.array.nbytes)
 
     def column(self, place: int) -> NDArray[Any]:
         """Return a column as it is."""
@@ -116,7 +107,7 @@ class LasFile(ColumnFile):
         if bytes_left(file.stream) is None:
             file.stream = kept_in_file(file.stream, self)
         whole = bytes_left(file.stream) or 0
-        with _told(file.name, BROKEN):
+        with _translated(file.name, BROKEN):
             self.reader = laspy.open(file.stream, closefd=False)
             header = self.header = self.reader.header
             if not header.are_points_compressed:
@@ -137,7 +128,7 @@ class LasFile(ColumnFile):
         return self.kinds[place]
 
     def moved_by(self, pose: Rigid | None) -> None:
-        """Tell that a coordinate system is kept."""
+        """Warn that a coordinate system is kept."""
         del pose
         if any(type(vlr).__name__.startswith(("Wkt", "Geo")) for vlr in self.header.vlrs):
             warn(f"{self.file.name}: its coordinate system (CRS) is kept as it is; is it still that of the points?")
@@ -146,13 +137,13 @@ class LasFile(ColumnFile):
         """Yield the points; raises FormatError where the file ends too early."""
         count, done = self.header.point_count, 0
         while done < count:
-            with _told(self.file.name, BROKEN):
-                points = self.reader.read_points(min(MOST_ROWS, count - done))
-            if not len(points) or len(points) < min(MOST_ROWS, count - done):
-                there = done + len(points)
-                raise FormatError(f"the file ends after {there} of {count} points", source=self.file.name)
-            yield LasBatch(points, self.names)
+            wanted = min(MOST_ROWS, count - done)
+            with _translated(self.file.name, BROKEN):
+                points = self.reader.read_points(wanted)
             done += len(points)
+            if len(points) < wanted:
+                raise FormatError(f"the file ends after {done} of {count} points", source=self.file.name)
+            yield LasBatch(points, self.names)
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> LasWriter:
         """Return what writes a file of the same kind."""
@@ -160,7 +151,7 @@ class LasFile(ColumnFile):
         if [column.name for column in columns] != list(self.names):
             raise ValueInvalid("the dimensions of las stay as they are; -f npy or csv writes others")
         packed = self.header.are_points_compressed if style.form not in ("las", LAZ) else style.form == LAZ
-        return LasWriter(deepcopy(self.header), columns, packed=packed, given=self)
+        return LasWriter(deepcopy(self.header), columns, packed=packed, name=self.file.name)
 
 
 MOST_PACKED = 1 << 16  # points in a packed byte: far more than any packer makes
@@ -169,15 +160,12 @@ MOST_PACKED = 1 << 16  # points in a packed byte: far more than any packer makes
 class LasWriter:
     """Write points into a file that can be gone back in, as the header wants, and give it out at the end."""
 
-    def __init__(
-        self, header: Any, columns: Sequence[OutColumn], *, packed: bool, given: LasFile | None = None
-    ) -> None:
+    def __init__(self, header: Any, columns: Sequence[OutColumn], *, packed: bool, name: str = "las") -> None:
         """Take a header, whose offsets are chosen when the first points come."""
         self.header = header
         self.columns = columns
         self.packed = packed
-        self.given = given
-        self.name = given.file.name if given else "las"
+        self.name = name
         self.kept = temporary_file(self)
         self.writer: Any = None
         self.count = 0
@@ -195,7 +183,7 @@ class LasWriter:
         if not there.any():
             return b""
         self._begin(new)
-        with _told(self.name, REFUSED):
+        with _translated(self.name, REFUSED):
             self.writer.write_points(self._points(batch, rows, new))
         self.count += len(there)
         return b""
@@ -206,10 +194,9 @@ class LasWriter:
             return
         if set(XYZ) <= new.keys():
             self.header.offsets = np.rint([np.median(new[name]) for name in XYZ])
-        with _told(self.name, REFUSED):
-            self.writer = _laspy(self.name, packed=self.packed).LasWriter(
-                self.kept, self.header, do_compress=self.packed, closefd=False
-            )
+        with _translated(self.name, REFUSED):
+            writer = _laspy(self.name, packed=self.packed).LasWriter
+            self.writer = writer(self.kept, self.header, do_compress=self.packed, closefd=False)
 
     def _points(self, batch: LasBatch | None, rows: Ints | None, new: dict[str, Any]) -> Any:
         """Return points as the library writes them."""
@@ -233,20 +220,17 @@ class LasWriter:
             stored = np.rint((values - offset) / scale)
         bad = ~((stored >= LIMITS.min) & (stored <= LIMITS.max))
         if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            raise FormatError(
-                f"point {self.count + row + 1}: {XYZ[axis]} = {values[row]:g} does not fit 32 bits of {scale:g} m "
-                f"around {offset:g}; give the file a coarser scale, or write -f npy",
-                source=self.name,
-            )
+            row = int(np.argmax(bad))
+            found = f"point {self.count + row + 1}: {XYZ[axis]} = {values[row]:g}"
+            problem = f"{found} does not fit 32 bits of {scale:g} m around {offset:g}"
+            raise FormatError(f"{problem}; give the file a coarser scale, or write -f npy", source=self.name)
         return stored.astype(np.int32)
 
     def end(self) -> Iterator[bytes]:
         """Yield the file."""
         self._begin({})
-        with _told(self.name, REFUSED):
-            evlrs = getattr(self.header, "evlrs", None)
-            if evlrs:
+        with _translated(self.name, REFUSED):
+            if evlrs := getattr(self.header, "evlrs", None):
                 self.writer.write_evlrs(evlrs)
             self.writer.close()
         scales = ", ".join(f"{scale:g}" for scale in dict.fromkeys(map(float, self.header.scales)))
@@ -278,6 +262,6 @@ def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> Las
         if column.kind is None:
             raise ValueInvalid(f"las holds numbers; column {shown(column.name)} of texts has no place in it")
         if column.name not in known and column.name not in XYZ:
-            with _told(style.form, REFUSED):
+            with _translated(style.form, REFUSED):
                 header.add_extra_dim(laspy.ExtraBytesParams(name=column.name, type=column.kind.newbyteorder("<")))
     return LasWriter(header, columns, packed=style.form == LAZ)

@@ -73,6 +73,40 @@ class PcdField(NamedTuple):
         return f"<{self.kind.lower()}{self.size}"
 
 
+class PcdColumn(NamedTuple):
+    """A column of a cloud: its name, the field of which it is a value, its byte in a record and its cell in a row."""
+
+    name: str
+    field: PcdField
+    offset: int
+    cell: int
+
+
+def columns_of(fields: Sequence[PcdField]) -> list[PcdColumn]:
+    """Return the columns of fields, each value of one; padding makes none, and takes its room."""
+    found: list[PcdColumn] = []
+    offset, cell = 0, 0
+    for field in fields:
+        for place in range(field.values):
+            if field.name != PADDING:
+                name = field.name if field.values == 1 else f"{field.name}_{place}"
+                found.append(PcdColumn(name, field, offset, cell))
+            offset += field.size
+            cell += 1
+    return found
+
+
+def record_type(fields: Sequence[PcdField]) -> Kind:
+    """Return the type of a point."""
+    columns = columns_of(fields)
+    return np.dtype({
+        "names": [f"{place}" for place in range(len(columns))],
+        "formats": [column.field.code for column in columns],
+        "offsets": [column.offset for column in columns],
+        "itemsize": sum(field.size * field.values for field in fields),
+    })  # fmt: skip
+
+
 class PcdHead:
     """What a header says.
 
@@ -162,6 +196,7 @@ class PcdHead:
         return PcdField(name, int(size), kind, self._count("COUNT", values, of))
 
     def _count(self, key: str, word: str, of: str = "") -> int:
+        """Read a count."""
         count = count_in(word)
         if count is None:
             self.refuse(key, f"{key} {shown(word)}{of} is no count")
@@ -279,15 +314,14 @@ class PcdFile(CloudFile):
     def __init__(self, file: InputFile) -> None:
         """Read the header and hold it against the file; raises FormatError."""
         head = self.head = PcdHead(file.stream, file.name)
-        columns = _columns_of(head.fields)
-        super().__init__(file, columns.names, columns.record, head.points)
-        self.several = columns.several
+        self.columns = columns_of(head.fields)
+        super().__init__(file, [column.name for column in self.columns], record_type(head.fields), head.points)
         self.viewpoint = ""
         if head.data == "binary":
             check_declared(file, self.count, self.record.itemsize, self.what, last=True)
         elif head.data == "ascii":
             every = sum(field.values for field in head.fields)
-            self.text = TextRows(self, columns.cells, every, head.text.count(b"\n") + 1)
+            self.text = TextRows(self, [column.cell for column in self.columns], every, head.text.count(b"\n") + 1)
 
     def moved_by(self, pose: Rigid | None) -> None:
         """Move VIEWPOINT by the pose that moves all points; None: there is no such one."""
@@ -349,9 +383,9 @@ class PcdFile(CloudFile):
         at = self.width if same else 0
         while at < len(columns):
             passed = columns[at].passed
-            field = self.several.get(passed)
-            places = [column.passed for column in columns[at : at + field.values]] if field is not None else []
-            if field is None or passed is None or places != [*range(passed, passed + field.values)]:
+            field = _new_field(columns[at]) if passed is None else self.columns[passed].field
+            whole = [place for place, each in enumerate(self.columns) if each.field is field]
+            if field.values > 1 and [column.passed for column in columns[at : at + field.values]] != whole:
                 field = _new_field(columns[at])
             found.append(field)
             at += field.values
@@ -359,7 +393,7 @@ class PcdFile(CloudFile):
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a point that has other columns."""
-        return _columns_of(self._fields(columns)).record
+        return record_type(self._fields(columns))
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
         """Return the header with what changed in it."""
@@ -373,40 +407,6 @@ class PcdFile(CloudFile):
         if count != self.count:
             words |= {"WIDTH": str(count), "HEIGHT": "1", "POINTS": str(count)}
         return self.head.rewritten(words)
-
-
-class _Columns(NamedTuple):
-    """The columns of fields, each value of one; padding makes none, and has its room in a record and its cells.
-
-    record: the type of a point; cells: where the columns stand in a row of text
-    several: the fields of several values, by the place of the first
-    """
-
-    names: list[str]
-    record: Kind
-    cells: list[int]
-    several: dict[int | None, PcdField]
-
-
-def _columns_of(fields: Sequence[PcdField]) -> _Columns:
-    names: list[str] = []
-    formats: list[str] = []
-    offsets: list[int] = []
-    cells: list[int] = []
-    several: dict[int | None, PcdField] = {}
-    at, cell = 0, 0
-    for field in fields:
-        if field.name != PADDING:
-            several |= {len(names): field} if field.values > 1 else {}
-            names += [field.name] if field.values == 1 else [f"{field.name}_{place}" for place in range(field.values)]
-            formats += [field.code] * field.values
-            offsets += range(at, at + field.size * field.values, field.size)
-            cells += range(cell, cell + field.values)
-        at += field.size * field.values
-        cell += field.values
-    places = [f"{place}" for place in range(len(names))]
-    record = np.dtype({"names": places, "formats": formats, "offsets": offsets, "itemsize": at})
-    return _Columns(names, record, cells, several)
 
 
 def _new_field(column: OutColumn) -> PcdField:
@@ -441,4 +441,4 @@ def create(
         lines = "".join(f"{key} {each}\n" for key, each in words.items())
         return f"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{lines}".encode()
 
-    return RecordWriter(named, _columns_of(fields).record, head, count)
+    return RecordWriter(named, record_type(fields), head, count)
