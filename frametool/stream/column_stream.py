@@ -19,7 +19,6 @@ from frametool.formats.rows.column_file import (
     Made,
     OutColumn,
     StructuredBatch,
-    is_number,
     not_finite,
     rows_of_batch,
 )
@@ -494,11 +493,7 @@ class MessageColumns(ColumnFile):
         self.cloud = cloud
         self.names: tuple[str, ...] | None = cloud.names
         self.width = len(cloud.names)
-
-    def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers."""
-        kind = self.cloud.rows.dtype[place]
-        return kind if is_number(kind) else None
+        self.kinds = [cloud.rows.dtype[place] for place in range(self.width)]
 
     def batches(self) -> Iterator[StructuredBatch]:
         """Yield the points."""

@@ -92,18 +92,9 @@ class ArrowBatch(Batch):
     def __init__(self, rows: Any, bytes_read: int, *, ends_group: bool) -> None:
         """Take rows, and what they take in the file."""
         self.rows = rows
-        self._bytes_read = bytes_read
+        self.size = int(rows.num_rows)
+        self.bytes_read = bytes_read
         self.ends_group = ends_group
-
-    @property
-    def size(self) -> int:
-        """Count the rows."""
-        return int(self.rows.num_rows)
-
-    @property
-    def bytes_read(self) -> int:
-        """Count the bytes of the file that they take."""
-        return self._bytes_read
 
     def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats, nan where it is null."""

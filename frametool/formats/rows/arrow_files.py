@@ -11,7 +11,6 @@ import os
 import struct
 from collections import Counter
 from contextlib import contextmanager, suppress
-from stat import S_ISREG
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
-    from frametool.formats.rows.column_file import Kind, Made, OutColumn
+    from frametool.formats.rows.column_file import Made, OutColumn
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
     from frametool.text.spans import Ints
@@ -61,6 +60,7 @@ class ArrowFile(ColumnFile):
             self.schema = self.opened(file)
             self.names: tuple[str, ...] | None = tuple(self.schema.names)
         self.width = len(self.schema.names)
+        self.kinds = [kind_of(field.type) for field in self.schema]
 
     def opened(self, file: InputFile) -> Any:
         """Open the file and return its schema."""
@@ -92,15 +92,11 @@ class ArrowFile(ColumnFile):
     def seekable(self, file: InputFile) -> Any:
         """Return what pyarrow reads at any place; what comes by a pipe is put into a file without a name first."""
         pa = require_pyarrow(self.name)
-        if file.path != "-" and S_ISREG(os.stat(file.path).st_mode):
+        if file.path != "-" and os.path.isfile(file.path):
             return pa.OSFile(file.path)
         stream: Any = file.stream if file.stream.seekable() else kept_in_file(file.stream, self)
         stream.seek(0)
         return pa.PythonFile(stream, mode="r")
-
-    def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers; None for what is not a number."""
-        return kind_of(self.schema.field(place).type)
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> GroupWriter:
         """Return what writes the same schema, compressed in the same way; the form may be another one of Arrow's."""

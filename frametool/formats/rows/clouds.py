@@ -18,7 +18,7 @@ from frametool.formats.rows.column_file import (
     ColumnFile,
     ColumnNumbers,
     CountedWriter,
-    RecordWriter,
+    encode_records,
     pieces,
     record_batches,
     rows_of_batch,
@@ -61,15 +61,12 @@ class CloudFile(ColumnFile):
         self.names: tuple[str, ...] = tuple(names)
         self.width = len(names)
         self.record = record
+        self.kinds = [record[place] for place in range(len(names))]
         self.count = count
         self.what = what
         self.text: TextRows | None = None
         self.is_last = True  # nothing stands behind the points
         self.behind = b""
-
-    def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers."""
-        return self.record[place]
 
     def batches(self) -> Iterator[Batch]:
         """Yield the points; raises FormatError where the file ends too early, or holds more."""
@@ -98,10 +95,13 @@ class CloudFile(ColumnFile):
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> CountedWriter:
         """Return what writes a cloud of the same kind."""
         head, count = partial(self.header, columns), None if drops else self.count
-        if self.text is not None:
-            return TextWriter(columns, self.width, style, head, count, self.rest)
-        kind = self.record if same_columns(columns, self.width) else self.record_with(columns)
-        return RecordWriter(columns, kind, head, count, self.rest)
+        if self.text is None:
+            kind = self.record if same_columns(columns, self.width) else self.record_with(columns)
+            return CountedWriter(partial(encode_records, columns, kind), head, count, self.rest)
+        beyond = columns[self.width :]
+        if not same_columns(columns[: self.width], self.width) or any(column.passed is not None for column in beyond):
+            raise ValueInvalid("columns of an ascii cloud stay as they are; -f csv writes others")
+        return CountedWriter(partial(encode_text, columns, style), head, count, self.rest)
 
 
 def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
@@ -109,10 +109,11 @@ def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
     return len(columns) == width and all(column.passed in (None, at) for at, column in enumerate(columns))
 
 
-def count_in(word: str) -> int | None:
-    """Read how many there are of something; None for what is not a count."""
-    is_count = word.isascii() and word.isdecimal() and len(word) <= 19 and int(word) <= _MOST_POINTS
-    return int(word) if is_count else None
+def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
+    """Read how many there are of something, which an error calls `what`; raises FormatError."""
+    if not (word.isascii() and word.isdecimal()) or len(word) > 19 or int(word) > _MOST_POINTS:
+        raise fail(f"{what} is no count")
+    return int(word)
 
 
 def type_in(form: str, part: str, codes: Mapping[str, Code], column: OutColumn, taken: str = "") -> Code:
@@ -205,16 +206,8 @@ class TextBatch(Batch):
         self.cells = cells
         self.table = table
         self.line = table.line
-
-    @property
-    def size(self) -> int:
-        """Count the rows."""
-        return len(self.cells.rows)
-
-    @property
-    def bytes_read(self) -> int:
-        """Count the bytes of the file that they take."""
-        return len(self.cells.data) - 2 * MARGIN
+        self.size = len(cells.rows)
+        self.bytes_read = len(cells.data) - 2 * MARGIN
 
     def _spans(self, place: int) -> Spans:
         return self.cells.column(self.table.at[place])
@@ -257,51 +250,41 @@ class TextBatch(Batch):
         return values.astype(kind)
 
 
-class TextWriter(CountedWriter):
-    """Write rows as they were, with what is made in the place of their cells, or behind them."""
-
-    def __init__(
-        self, columns: Sequence[OutColumn], width: int, style: Style, head: Callable[[int], bytes], count: int | None,
-        behind: Callable[[], Iterable[bytes]],
-    ) -> None:  # fmt: skip
-        """Take how many columns the input has; raises ValueInvalid where they do not stay."""
-        if not same_columns(columns[:width], width) or any(column.passed is not None for column in columns[width:]):
-            raise ValueInvalid("columns of an ascii cloud stay as they are; -f csv writes others")
-        super().__init__(columns, head, count, behind)
-        self.style = style
-
-    def encoded(self, batch: TextBatch, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Return the text of a batch; what is new beyond the columns of the input stands at the ends of the lines."""
-        cells = batch.cells
-        chosen = np.arange(batch.size) if rows is None else rows
-        if not len(chosen):
-            return b"" if rows is not None else cells.data[MARGIN:-MARGIN].tobytes()
-        lines = cells.rows[chosen]
-        at, ends = cells.line_starts[lines], cells.line_ends[lines]
-        if rows is None:  # what stands between rows, or behind the last, belongs to one of them
-            at = np.concatenate([[MARGIN], ends[:-1]])
-            ends = np.append(ends[:-1], len(cells.data) - MARGIN)
-        new, parts = iter(made), list[Spans]()
-        for place, column in enumerate(self.columns):
-            if column.passed is not None:
-                continue
-            written = _written(next(new), column, self.style)
-            if place < len(batch.table.at):
-                cell = batch.table.at[place]
-                start, end = cells.starts[chosen, cell], cells.ends[chosen, cell]
-                parts += [Spans(cells.data, at, start), _unless_lost(written, Spans(cells.data, start, end))]
-            else:
-                end, blank = cells.ends[chosen, -1], np.full(len(chosen), MARGIN)
-                parts += [Spans(cells.data, at, end), Spans(framed(b" "), blank, blank + 1), written]
-            at = end
-        return join([*parts, Spans(cells.data, at, ends)])
+def encode_text(
+    columns: Sequence[OutColumn], style: Style, batch: TextBatch, rows: Ints | None, made: Sequence[Made]
+) -> bytes:
+    """Return rows as they were, with what is made in the place of their cells, or behind them in further columns."""
+    cells = batch.cells
+    chosen = np.arange(batch.size) if rows is None else rows
+    if not len(chosen):
+        return b"" if rows is not None else cells.data[MARGIN:-MARGIN].tobytes()
+    lines = cells.rows[chosen]
+    at, ends = cells.line_starts[lines], cells.line_ends[lines]
+    if rows is None:  # what stands between rows, or behind the last, belongs to one of them
+        at = np.concatenate([[MARGIN], ends[:-1]])
+        ends = np.append(ends[:-1], len(cells.data) - MARGIN)
+    new, parts = iter(made), list[Spans]()
+    for place, column in enumerate(columns):
+        if column.passed is not None:
+            continue
+        values = next(new).values
+        written = _written(values, column, style)
+        if place < len(batch.table.at):
+            cell = batch.table.at[place]
+            start, end = cells.starts[chosen, cell], cells.ends[chosen, cell]
+            parts += [Spans(cells.data, at, start), _unless_lost(written, values, Spans(cells.data, start, end))]
+        else:
+            end, blank = cells.ends[chosen, -1], np.full(len(chosen), MARGIN)
+            parts += [Spans(cells.data, at, end), Spans(framed(b" "), blank, blank + 1), written]
+        at = end
+    return join([*parts, Spans(cells.data, at, ends)])
 
 
-def _written(made: Made, column: OutColumn, style: Style) -> Spans:
+def _written(numbers: Any, column: OutColumn, style: Style) -> Spans:
     """Write numbers as the shortest text of their kind, or with so many decimals."""
     if column.kind is None:
         raise ValueInvalid(f"column {column.name} holds texts; the rows of a cloud are numbers")
-    values = np.asarray(made.values, np.float64).reshape(-1, 1)
+    values = np.asarray(numbers, np.float64).reshape(-1, 1)
     if style.precision is not None:
         spans = fixed_spans(values, style.precision, b" ")
     else:
@@ -309,20 +292,15 @@ def _written(made: Made, column: OutColumn, style: Style) -> Spans:
     return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
 
 
-def _unless_lost(new: Spans, old: Spans) -> Spans:
-    """Keep the text of cells that held no number: `-nan` stays."""
-    lost = np.flatnonzero(_begin_with_letters(new))
-    lost = lost[_begin_with_letters(Spans(old.data, old.starts[lost], old.ends[lost]))]
+def _unless_lost(new: Spans, values: Any, old: Spans) -> Spans:
+    """Keep the text of cells that held no number, and still do: `-nan` stays."""
+    lost = np.flatnonzero(~np.isfinite(values))
+    first = old.data[old.starts[lost]]
+    first = old.data[old.starts[lost] + ((first == ord("-")) | (first == ord("+")))]
+    lost = lost[first >= ord("A")]
     if not lost.size:
         return new
     starts, ends = new.starts.copy(), new.ends.copy()
     starts[lost] = old.starts[lost] + len(new.data)
     ends[lost] = old.ends[lost] + len(new.data)
     return Spans(np.concatenate([new.data, old.data]), starts, ends)
-
-
-def _begin_with_letters(spans: Spans) -> Any:
-    """Tell which texts begin with a letter behind their sign."""
-    first = spans.data[spans.starts]
-    first = spans.data[spans.starts + ((first == ord("-")) | (first == ord("+")))]
-    return first >= ord("A")

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from frametool.text.spans import Flags, Floats, Ints
 
     Kind: TypeAlias = np.dtype[Any]
+    Encode: TypeAlias = Callable[[Any, Ints | None, Sequence["Made"]], bytes | memoryview]
 
 FLOATS, WHOLE = "f", "iu"  # kinds of numpy's types
 STAMP_NS = np.dtype(np.int64)
@@ -75,15 +76,13 @@ class Made(NamedTuple):
 
 
 class Batch(Protocol):
-    """Some rows of a file; places are those of its columns."""
+    """Some rows of a file; places are those of its columns.
 
-    @property
-    def size(self) -> int:
-        """Count the rows."""
+    size: how many they are; bytes_read: how many bytes of the file they take
+    """
 
-    @property
-    def bytes_read(self) -> int:
-        """Count the bytes of the file that they take."""
+    size: int
+    bytes_read: int
 
     def column(self, place: int) -> Any:
         """Return a column as it is: an array whose kind the file tells, or texts."""
@@ -131,17 +130,20 @@ class ColumnFile(Protocol):
     """A file that was opened: its columns are known, its rows are not read yet.
 
     names: of the columns; None where they have none; width: how many there are
+    kinds: the types of their numbers; None for texts and for what else is not a number
     vectors: columns of vectors that turn when points move, as normals do
     gaps: numbers that are not finite stand for none: a point without return; else their rows are bad
     """
 
     names: tuple[str, ...] | None
     width: int
+    kinds: Sequence[Kind | None]
     vectors: tuple[tuple[str, ...], ...] = ()
     gaps: bool
 
     def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers; None for texts and for what else is not a number."""
+        """Return the type of a column's numbers; None for what is not a number."""
+        return self.kinds[place]
 
     def moved_by(self, pose: Rigid | None) -> None:
         """Move what has a place among the points by the pose that moves all of them, before any is read.
@@ -167,16 +169,8 @@ class StructuredBatch(Batch):
         """Take rows (n,)."""
         self.rows = rows
         self.fields = rows.dtype.names or ()
-
-    @property
-    def size(self) -> int:
-        """Count the rows."""
-        return len(self.rows)
-
-    @property
-    def bytes_read(self) -> int:
-        """Count the bytes of the file that they take."""
-        return self.rows.nbytes
+        self.size = len(rows)
+        self.bytes_read = rows.nbytes
 
     def column(self, place: int) -> NDArray[Any]:
         """Return a field as it is."""
@@ -290,15 +284,15 @@ class CountedWriter:
     """Write a header that says how many rows there are, the rows, and what stands behind them."""
 
     def __init__(
-        self, columns: Sequence[OutColumn], head: Callable[[int], bytes], count: int | None,
+        self, encode: Encode, head: Callable[[int], bytes], count: int | None,
         behind: Callable[[], Iterable[bytes]] = tuple,
     ) -> None:  # fmt: skip
-        """Take the columns of the output.
+        """Take what makes bytes of the rows of a batch, with what is made for them.
 
         head: makes the header for so many rows; behind: yields what follows the rows
         count: how many rows there will be; None if that is known at the end only: they wait in a file until then.
         """
-        self.columns = columns
+        self.encode = encode
         self.head = head
         self.count = count
         self.behind = behind
@@ -306,13 +300,9 @@ class CountedWriter:
         self.begun = False
         self.waiting = temporary_file(self) if count is None else None
 
-    def encoded(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
-        """Return the rows of a batch as they are written."""
-        raise NotImplementedError
-
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
         """Return what is written of a batch."""
-        data = self.encoded(batch, rows, made)
+        data = self.encode(batch, rows, made)
         self.written += len(made[0].values) if batch is None else batch.size if rows is None else len(rows)
         if self.waiting is not None:
             self.waiting.write(data)
@@ -331,37 +321,28 @@ class CountedWriter:
         yield from self.behind()
 
 
-class RecordWriter(CountedWriter):
-    """Write rows as records: what is made goes into its field, what passes is copied.
+def encode_records(
+    columns: Sequence[OutColumn], kind: Kind, batch: StructuredBatch | None, rows: Ints | None, made: Sequence[Made]
+) -> bytes | memoryview:
+    """Return rows as records: what is made goes into its field, what passes is copied.
 
-    Where no field is new the rows are changed in their place.
+    kind: of the records, which have a field for each of the columns.  Where none is new they are changed in place.
     """
-
-    def __init__(
-        self, columns: Sequence[OutColumn], kind: Kind, head: Callable[[int], bytes], count: int | None,
-        behind: Callable[[], Iterable[bytes]] = tuple,
-    ) -> None:  # fmt: skip
-        """Take the type of the records, which has a field for each of the columns."""
-        super().__init__(columns, head, count, behind)
-        self.kind = kind
-
-    def encoded(self, batch: StructuredBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
-        """Return the records of a batch."""
-        given = batch if batch is None or rows is None else StructuredBatch(batch.rows[rows])
-        if given is not None and given.rows.dtype == self.kind:
-            records = given.rows
-        else:
-            records = np.zeros(len(made[0].values) if given is None else given.size, self.kind)
-        new = iter(made)
-        for name, column in zip(self.kind.names or (), self.columns, strict=True):
-            if column.passed is None:
-                values = next(new).values
-                if column.kind is None:
-                    _check_lengths(values, records.dtype[name], column.name)
-                records[name] = values
-            elif given is not None and records is not given.rows:
-                records[name] = given.column(column.passed)
-        return memoryview(records.view(np.uint8)) if records.size else b""  # type: ignore[arg-type]
+    given = batch if batch is None or rows is None else StructuredBatch(batch.rows[rows])
+    if given is not None and given.rows.dtype == kind:
+        records = given.rows
+    else:
+        records = np.zeros(len(made[0].values) if given is None else given.size, kind)
+    new = iter(made)
+    for name, column in zip(kind.names or (), columns, strict=True):
+        if column.passed is None:
+            values = next(new).values
+            if column.kind is None:
+                _check_lengths(values, records.dtype[name], column.name)
+            records[name] = values
+        elif given is not None and records is not given.rows:
+            records[name] = given.column(column.passed)
+    return memoryview(records.view(np.uint8)) if records.size else b""  # type: ignore[arg-type]
 
 
 def _check_lengths(texts: Sequence[str], kind: Kind, name: str) -> None:
@@ -388,9 +369,7 @@ class Collected:
         piece = memoryview(data).cast("B")
         end = self._filled + len(piece)
         if end > len(self._space):
-            grown = bytearray(max(end, 2 * len(self._space)))
-            grown[: self._filled] = memoryview(self._space)[: self._filled]
-            self._space = grown
+            self._space = self._space.ljust(max(end, 2 * len(self._space)), b"\0")
         self._space[self._filled : end] = piece
         self._filled = end
         return len(piece)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.documents.source import InputFile
-    from frametool.formats.rows.column_file import Kind, Made, OutColumn
+    from frametool.formats.rows.column_file import Made, OutColumn
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
@@ -121,11 +121,7 @@ class LasFile(ColumnFile):
             probe = laspy.ScaleAwarePointRecord.zeros(1, header=header)
             kinds = [np.array(probe[name]) for name in self.names]
         self.width = len(self.names)
-        self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]
-
-    def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers; None for several in one."""
-        return self.kinds[place]
+        self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]  # several in one are no number
 
     def moved_by(self, pose: Rigid | None) -> None:
         """Warn that a coordinate system is kept."""

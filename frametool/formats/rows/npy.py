@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import ast
 import struct
+from functools import partial
 from math import prod
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +19,9 @@ from frametool.formats.rows.column_file import (
     PIECE,
     XYZ,
     ColumnFile,
-    RecordWriter,
+    CountedWriter,
     StructuredBatch,
+    encode_records,
     is_number,
     record_batches,
     record_of,
@@ -39,16 +41,8 @@ LONGEST_TEXT = 64  # characters of a name that is made; numpy has a fixed size f
 ALIGNED = 64  # bytes, as numpy pads its headers
 
 
-class ArrayHeader(NamedTuple):
-    """What stands before the numbers: the type of an element, the shape, and whether columns stand one by one."""
-
-    kind: Kind
-    shape: tuple[int, ...]
-    by_columns: bool
-
-
-def read_header(file: InputFile) -> ArrayHeader:
-    """Read the header; raises FormatError."""
+def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
+    """Return the type of an element, the shape, and whether columns stand one by one; raises FormatError."""
 
     def wrong(what: str) -> FormatError:
         return FormatError(what, source=file.name)
@@ -77,7 +71,7 @@ def read_header(file: InputFile) -> ArrayHeader:
         raise wrong(f"the header cannot be read: {shown(text)}") from None
     if kind.hasobject:
         raise wrong("it holds Python objects, which are never unpickled; save plain numbers")
-    return ArrayHeader(kind, shape, by_columns)
+    return kind, shape, by_columns
 
 
 class NpyFile(ColumnFile):
@@ -102,11 +96,8 @@ class NpyFile(ColumnFile):
                 raise FormatError(f"it holds {kind}; wanted are numbers, or fields", source=file.name)
             self.record = record_of([kind] * prod(self.shape[1:]))
         self.width = len(self.record.names or ())
-
-    def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers; None for what is not a number."""
-        kind = self.record[place]
-        return kind if is_number(kind) else None
+        kinds = [self.record[place] for place in range(self.width)]
+        self.kinds = [kind if is_number(kind) else None for kind in kinds]
 
     def batches(self) -> Iterator[Batch]:
         """Yield the rows; raises FormatError where the file ends too early."""
@@ -135,7 +126,7 @@ class NpyFile(ColumnFile):
 
 def _writer(
     columns: Sequence[OutColumn], given: Kind, count: int | None, shape: tuple[int, ...] | None
-) -> RecordWriter:
+) -> CountedWriter:
     """Return what writes an array: without fields where the input had none and all columns are of one type.
 
     given: the type of the input's records; shape: of a row that has no fields
@@ -156,7 +147,7 @@ def _writer(
         version = b"\x02\x00" if long else b"\x01\x00"
         return MAGIC + version + struct.pack("<I" if long else "<H", len(text)) + text.encode("latin-1")
 
-    return RecordWriter(columns, record, head, count)
+    return CountedWriter(partial(encode_records, columns, record), head, count)
 
 
 def _record_type(columns: Sequence[OutColumn], given: Kind) -> Kind:
@@ -176,7 +167,7 @@ def open_columns(file: InputFile, options: Options) -> NpyFile:
     return NpyFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> RecordWriter:
+def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> CountedWriter:
     """Return what writes rows made elsewhere: n x 3 where there are points alone, else records with fields."""
     del style
     names = tuple(column.name for column in columns)

@@ -21,6 +21,8 @@ from __future__ import annotations
 
 import re
 import struct
+from collections import Counter
+from functools import partial
 from itertools import count as numbers_from
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -29,9 +31,10 @@ import numpy as np
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows.clouds import LONGEST_HEAD, CloudFile, TextRows, count_in, same_columns, type_in
 from frametool.formats.rows.column_file import (
-    RecordWriter,
+    CountedWriter,
     StructuredBatch,
     check_declared,
+    encode_records,
     read_exactly,
     rows_of_batch,
 )
@@ -40,7 +43,7 @@ from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from typing import BinaryIO, NoReturn
+    from typing import BinaryIO
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
@@ -74,10 +77,11 @@ class PcdField(NamedTuple):
 
 
 class PcdColumn(NamedTuple):
-    """A column of a cloud: its name, the field of which it is a value, its byte in a record and its cell in a row."""
+    """A column of a cloud: its name, which value of which field it is, its byte in a record and its cell in a row."""
 
     name: str
     field: PcdField
+    place: int
     offset: int
     cell: int
 
@@ -90,7 +94,7 @@ def columns_of(fields: Sequence[PcdField]) -> list[PcdColumn]:
         for place in range(field.values):
             if field.name != PADDING:
                 name = field.name if field.values == 1 else f"{field.name}_{place}"
-                found.append(PcdColumn(name, field, offset, cell))
+                found.append(PcdColumn(name, field, place, offset, cell))
             offset += field.size
             cell += 1
     return found
@@ -111,7 +115,7 @@ class PcdHead:
     """What a header says.
 
     text: the header byte for byte, its last line end included
-    lines: for each key the number of its line and the words behind it
+    words: what stands behind each key; lines: the number of its line
     viewpoint: seven numbers; None where there are none
     """
 
@@ -119,21 +123,22 @@ class PcdHead:
         """Read a header and leave the stream behind it; raises FormatError that says line, value and remedy."""
         self.source = source
         self.text = b""
-        self.lines: dict[str, tuple[int, list[str]]] = {}
+        self.words: dict[str, list[str]] = {}
+        self.lines: dict[str, int] = {}
         self._read(stream)
         missing = [key for key in ("FIELDS", "SIZE", "TYPE") if key not in self.lines]
         if "POINTS" not in self.lines and not {"WIDTH", "HEIGHT"} <= set(self.lines):
             missing.append("POINTS")
         if missing:
-            self.refuse("DATA", f"the header has no {', '.join(missing)}")
-        version = " ".join(self.words("VERSION"))
+            raise self.problem("DATA", f"the header has no {', '.join(missing)}")
+        version = " ".join(self.words.get("VERSION", ()))
         if "VERSION" in self.lines and version not in _VERSIONS:
-            self.refuse("VERSION", f"version {shown(version)} is not known; versions: 0.5, 0.6, 0.7")
+            raise self.problem("VERSION", f"version {shown(version)} is not known; versions: 0.5, 0.6, 0.7")
         self.fields = self._fields()
         self.points = self._points()
-        self.data = " ".join(self.words("DATA")).lower()
+        self.data = " ".join(self.words["DATA"]).lower()
         if self.data not in DATA:
-            self.refuse("DATA", f"DATA {shown(self.data)} is not known; known: {', '.join(DATA)}")
+            raise self.problem("DATA", f"DATA {shown(self.data)} is not known; known: {', '.join(DATA)}")
         self.viewpoint = self._viewpoint()
 
     def _read(self, stream: BinaryIO) -> None:
@@ -154,87 +159,77 @@ class PcdHead:
             elif (key := words[0].upper()) not in _KEYS:
                 problem = f"{shown(words[0])} is no key of a PCD header; keys: {listing(_KEYS)}"
             elif (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
-                problem = f"{key} stands twice, first on line {self.lines[key][0]}"
+                problem = f"{key} stands twice, first on line {self.lines[key]}"
             if problem:
                 raise FormatError(problem, source=self.source, line=number)
-            self.lines[key] = number, words[1:]
+            self.lines[key], self.words[key] = number, words[1:]
 
-    def refuse(self, key: str, message: str) -> NoReturn:
-        """Raise the error for a line."""
-        raise FormatError(message, source=self.source, line=self.lines[key][0])
-
-    def words(self, key: str) -> list[str]:
-        """Return the words of a line; none if it is not there."""
-        return self.lines[key][1] if key in self.lines else []
+    def problem(self, key: str, message: str) -> FormatError:
+        """Return the error for a line."""
+        return FormatError(message, source=self.source, line=self.lines[key])
 
     def _fields(self) -> tuple[PcdField, ...]:
         """Return the fields of a point."""
-        names = self.words("FIELDS")
+        names = self.words["FIELDS"]
         found = []
         for key in _EACH[1:]:
-            words = self.words(key) if key in self.lines else ["1"] * len(names)
+            words = self.words.get(key, ["1"] * len(names))
             if len(words) != len(names):
-                self.refuse(key, f"{key} has {len(words)} values for {len(names)} fields")
+                raise self.problem(key, f"{key} has {len(words)} values for {len(names)} fields")
             found.append(words)
         if not names:
-            self.refuse("FIELDS", "FIELDS names no field")
-        for name in names:
-            if name != PADDING and names.count(name) > 1:
-                self.refuse("FIELDS", f"field {shown(name)} stands twice")
+            raise self.problem("FIELDS", "FIELDS names no field")
+        for name, times in Counter(names).items():
+            if name != PADDING and times > 1:
+                raise self.problem("FIELDS", f"field {shown(name)} stands twice")
         fields = tuple(self._field(*words) for words in zip(names, *found, strict=True))
         if sum(field.values for field in fields) > _WIDEST:
-            self.refuse("COUNT", f"more than {_WIDEST} values a point")
+            raise self.problem("COUNT", f"more than {_WIDEST} values a point")
         return fields
 
     def _field(self, name: str, size: str, kind: str, values: str) -> PcdField:
         of, kind = f" of field {shown(name)}", kind.upper()
         if kind not in TYPES:
-            self.refuse("TYPE", f"TYPE {shown(kind)}{of} is not known; known: F, I, U")
+            raise self.problem("TYPE", f"TYPE {shown(kind)}{of} is not known; known: F, I, U")
         if size not in map(str, TYPES[kind]):
             known = ", ".join(map(str, TYPES[kind]))
-            self.refuse("SIZE", f"SIZE {shown(size)}{of}: TYPE {kind} has {known}")
-        return PcdField(name, int(size), kind, self._count("COUNT", values, of))
-
-    def _count(self, key: str, word: str, of: str = "") -> int:
-        """Read a count."""
-        count = count_in(word)
-        if count is None:
-            self.refuse(key, f"{key} {shown(word)}{of} is no count")
-        return count
+            raise self.problem("SIZE", f"SIZE {shown(size)}{of}: TYPE {kind} has {known}")
+        count = count_in(values, f"COUNT {shown(values)}{of}", partial(self.problem, "COUNT"))
+        return PcdField(name, int(size), kind, count)
 
     def _points(self) -> int:
         """Return how many points there are; WIDTH, HEIGHT and POINTS have to agree."""
         found = {}
         for key in ("WIDTH", "HEIGHT", "POINTS"):
-            words = self.words(key)
-            if key in self.lines and len(words) != 1:
-                self.refuse(key, f"{key} has {len(words)} values, expected 1")
-            if words:
-                found[key] = self._count(key, words[0])
+            words = self.words.get(key)
+            if words is not None and len(words) != 1:
+                raise self.problem(key, f"{key} has {len(words)} values, expected 1")
+            if words is not None:
+                found[key] = count_in(words[0], f"{key} {shown(words[0])}", partial(self.problem, key))
         if not {"WIDTH", "HEIGHT"} <= found.keys():
             return found["POINTS"]
         points = found["WIDTH"] * found["HEIGHT"]
         if found.get("POINTS", points) != points:
             both = f"WIDTH {found['WIDTH']} times HEIGHT {found['HEIGHT']} is {points}"
-            self.refuse("POINTS", f"POINTS is {found['POINTS']}, {both}; correct the one that is wrong")
+            raise self.problem("POINTS", f"POINTS is {found['POINTS']}, {both}; correct the one that is wrong")
         return points
 
     def _viewpoint(self) -> tuple[float, ...] | None:
         if "VIEWPOINT" not in self.lines:
             return None
-        words = self.words("VIEWPOINT")
+        words = self.words["VIEWPOINT"]
         if len(words) != 7:
-            self.refuse("VIEWPOINT", f"VIEWPOINT has {len(words)} numbers, expected 7 (tx ty tz qw qx qy qz)")
+            raise self.problem("VIEWPOINT", f"VIEWPOINT has {len(words)} numbers, expected 7 (tx ty tz qw qx qy qz)")
         try:
             return tuple(parse_number(word) for word in words)
         except ValueInvalid as error:
-            self.refuse("VIEWPOINT", f"VIEWPOINT: {error}")
+            raise self.problem("VIEWPOINT", f"VIEWPOINT: {error}") from None
 
     def rewritten(self, words: dict[str, str]) -> bytes:
         """Return the header with other words behind some keys, those that it has."""
         lines = self.text.split(b"\n")
         for key in words.keys() & self.lines.keys():
-            at = self.lines[key][0] - 1
+            at = self.lines[key] - 1
             first, last = re.match(rb"\s*\S+\s+", lines[at]), len(lines[at].rstrip())
             lines[at] = lines[at][: first.end() if first else last] + words[key].encode() + lines[at][last:]
         return b"\n".join(lines)
@@ -382,11 +377,11 @@ class PcdFile(CloudFile):
         found = list(self.head.fields) if same else []
         at = self.width if same else 0
         while at < len(columns):
-            passed = columns[at].passed
-            field = _new_field(columns[at]) if passed is None else self.columns[passed].field
-            whole = [place for place, each in enumerate(self.columns) if each.field is field]
-            if field.values > 1 and [column.passed for column in columns[at : at + field.values]] != whole:
-                field = _new_field(columns[at])
+            field, passed = _new_field(columns[at]), columns[at].passed
+            if passed is not None and self.columns[passed].place == 0:
+                whole = self.columns[passed].field
+                places = [column.passed for column in columns[at : at + whole.values]]
+                field = whole if places == [*range(passed, passed + whole.values)] else field
             found.append(field)
             at += field.values
         return found
@@ -423,7 +418,7 @@ def open_columns(file: InputFile, options: Options) -> PcdFile:
 def create(
     columns: Sequence[OutColumn], count: int | None, style: Style, *, grid: tuple[int, int] | None = None,
     sensor: Rigid | None = None,
-) -> RecordWriter:  # fmt: skip
+) -> CountedWriter:  # fmt: skip
     """Return what writes points made elsewhere, with numbers of the types they have.
 
     grid: how many points there are in a row, and how many rows; sensor: its pose among the points
@@ -441,4 +436,4 @@ def create(
         lines = "".join(f"{key} {each}\n" for key, each in words.items())
         return f"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{lines}".encode()
 
-    return RecordWriter(named, record_type(fields), head, count)
+    return CountedWriter(partial(encode_records, named, record_type(fields)), head, count)

@@ -28,9 +28,10 @@ import numpy as np
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows.clouds import LONGEST_HEAD, NORMALS, CloudFile, TextRows, count_in, same_columns, type_in
 from frametool.formats.rows.column_file import (
-    RecordWriter,
+    CountedWriter,
     bytes_left,
     check_declared,
+    encode_records,
     pieces,
     read_exactly,
     record_of,
@@ -58,6 +59,7 @@ NAMES = {code: name for name, code in reversed(TYPES.items())}
 NEW_NAMES = {code: name for code, name in NAMES.items() if code not in ("i8", "u8")}  # not everybody reads these
 NEW_NAMES |= {"b1": "uchar", "f2": "float"}
 VERTEX = "vertex"
+OWN_LINES: tuple[list[bytes], ...] = ([b"property"], [b"comment"], [b"obj_info"], [])  # how those of an element begin
 SPLAT = ("rot_1", "rot_2", "rot_3", "rot_0")  # x y z w
 HARMONICS = "f_rest_0"
 
@@ -153,9 +155,7 @@ def _element(words: Sequence[str], before: Sequence[PlyElement], line: int, fail
     if len(words) != 3:
         raise fail(f"{shown(' '.join(words))}: expected element NAME COUNT")
     _, name, word = words
-    count = count_in(word)
-    if count is None:
-        raise fail(f"{shown(word)} of element {shown(name)} is no count")
+    count = count_in(word, f"{shown(word)} of element {shown(name)}", fail)
     if any(each.name == name for each in before):
         raise fail(f"element {shown(name)} stands twice")
     return PlyElement(name, count, line)
@@ -365,7 +365,7 @@ class PlyFile(CloudFile):
         if not same_columns(columns, self.width):
             lines = text.splitlines(keepends=True)
             end = b"\r\n" if lines[0].endswith(b"\r\n") else b"\n"
-            own = list(takewhile(_is_of_element, lines[self.line :]))
+            own = list(takewhile(lambda line: line.split()[:1] in OWN_LINES, lines[self.line :]))
             others = [line for line in own if line.split()[:1] != [b"property"]]
             made = [_property_line(column) + end for column in columns]
             text = b"".join([*lines[: self.line], *made, *others, *lines[self.line + len(own) :]])
@@ -383,10 +383,6 @@ def _check_lists(before: Sequence[PlyElement], vertex: PlyElement, order: str, s
             raise FormatError(f"{message}; write {VERTEX!r} first, or the file as ascii", source=source, line=each.line)
 
 
-def _is_of_element(line: bytes) -> bool:
-    return line.split()[:1] in ([b"property"], [b"comment"], [b"obj_info"], [])
-
-
 def _type_of(column: OutColumn) -> str:
     """Return the type of a column as PLY calls it; raises ValueInvalid for what PLY cannot hold."""
     return type_in("ply", "property", NEW_NAMES if column.passed is None else NAMES, column)
@@ -402,7 +398,7 @@ def open_columns(file: InputFile, options: Options) -> PlyFile:
     return PlyFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> RecordWriter:
+def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> CountedWriter:
     """Return what writes points made elsewhere, with numbers of the types they have."""
     del style
     record = record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
@@ -411,4 +407,4 @@ def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> Rec
     def head(vertices: int) -> bytes:
         return b"ply\nformat binary_little_endian 1.0\nelement vertex %d\n%send_header\n" % (vertices, lines)
 
-    return RecordWriter(columns, record, head, count)
+    return CountedWriter(partial(encode_records, columns, record), head, count)
