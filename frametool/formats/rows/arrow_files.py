@@ -293,8 +293,7 @@ def _number(message: memoryview, table: int, field: int, form: str) -> int:
 
 def _table(message: memoryview, table: int, field: int) -> int:
     """Return where a table within a table stands."""
-    place = _place(message, table, field)
-    return place + int(struct.unpack_from("<i", message, place)[0])
+    return _place(message, table, field) + _number(message, table, field, "<i")
 
 
 class IpcWriter(GroupWriter):
@@ -424,9 +423,8 @@ class ParquetWriter(GroupWriter):
 WRITERS: dict[str, type[GroupWriter]] = {"parquet": ParquetWriter, "arrow": IpcWriter, "arrows": IpcWriter}
 
 
-def open_columns(file: InputFile, options: Options) -> ArrowFile:
+def open_columns(file: InputFile, _options: Options) -> ArrowFile:
     """Open a file of any of these forms; raises FileProblem without pyarrow, FormatError for a broken file."""
-    del options
     require_pyarrow(file.name)
     head = file.head()
     form = next((form for begin, form in BEGINNINGS.items() if head.startswith(begin)), "")
@@ -436,7 +434,6 @@ def open_columns(file: InputFile, options: Options) -> ArrowFile:
     return (ParquetFile if form == "parquet" else IpcFile)(file, form)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> GroupWriter:
+def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> GroupWriter:
     """Return what writes rows made elsewhere."""
-    del count
     return WRITERS[style.form](style.form, columns, None, {})

@@ -7,6 +7,7 @@ Knows no format: what a header says, and how it is written anew, is theirs.
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -21,7 +22,6 @@ from frametool.formats.rows.column_file import (
     encode_records,
     pieces,
     record_batches,
-    rows_of_batch,
 )
 from frametool.text.cells import split_blank
 from frametool.text.lines import read_blocks
@@ -70,14 +70,13 @@ class CloudFile(ColumnFile):
 
     def batches(self) -> Iterator[Batch]:
         """Yield the points; raises FormatError where the file ends too early, or holds more."""
-        size = self.record.itemsize
         if self.text is not None:
             yield from self.text.batches()
             self.behind = self.text.check_end() if self.is_last else b""
             return
-        yield from record_batches(self.file, self.record, self.count, rows_of_batch(size))
-        self.behind = self.file.stream.read(size) if self.is_last else b""
-        if self.behind and len(self.behind) == size:
+        yield from record_batches(self.file, self.record, self.count)
+        self.behind = self.file.stream.read(self.record.itemsize) if self.is_last else b""
+        if self.behind and len(self.behind) == self.record.itemsize:
             raise FormatError(f"the header says {self.count} {self.what}, more follow", source=self.file.name)
 
     def rest(self) -> Iterable[bytes]:
@@ -183,9 +182,7 @@ class TextRows:
 
     def behind(self) -> Iterator[bytes]:
         """Yield what stands behind the last row."""
-        if self._rest:
-            yield self._rest
-        yield from pieces(self.cloud.file.stream)
+        return chain((self._rest,), pieces(self.cloud.file.stream))
 
     def check_end(self) -> bytes:
         """Return the blanks behind the last row; raises FormatError where more rows stand there."""

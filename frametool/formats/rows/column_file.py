@@ -204,11 +204,12 @@ def rows_of_batch(size: int) -> int:
     return max(1, min(MOST_ROWS, BATCH_BYTES // max(size, 1)))
 
 
-def record_batches(file: InputFile, record: Kind, count: int, size: int) -> Iterator[StructuredBatch]:
+def record_batches(file: InputFile, record: Kind, count: int) -> Iterator[StructuredBatch]:
     """Yield so many records of a stream; memory is taken as they come, not as many as are said to come.
 
     Raises FormatError where the file ends too early.
     """
+    size = rows_of_batch(record.itemsize)
     for done in range(0, count, size):
         data = bytearray(min(size, count - done) * record.itemsize)
         filled = file.stream.readinto(data)  # type: ignore[attr-defined]

@@ -238,15 +238,13 @@ class LasWriter:
         yield from pieces(self.kept)
 
 
-def open_columns(file: InputFile, options: Options) -> LasFile:
+def open_columns(file: InputFile, _options: Options) -> LasFile:
     """Open a scan; raises FormatError, FileProblem where the extra is missing."""
-    del options
     return LasFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> LasWriter:
+def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> LasWriter:
     """Return what writes points made elsewhere: LAS 1.4, what is no dimension of it as extra bytes."""
-    del count
     laspy = _laspy(style.form)
     names = {column.name for column in columns}
     if not names >= set(XYZ):

@@ -103,7 +103,7 @@ class NpyFile(ColumnFile):
         """Yield the rows; raises FormatError where the file ends too early."""
         if self.by_columns and len(self.shape) > 1:
             return self._rows_of_columns()
-        return record_batches(self.file, self.record, self.count, MOST_ROWS)
+        return record_batches(self.file, self.record, self.count)
 
     def _rows_of_columns(self) -> Iterator[Batch]:
         """Yield the rows of an array whose columns stand one after the other: all of it is read for that."""
@@ -161,14 +161,12 @@ def _record_type(columns: Sequence[OutColumn], given: Kind) -> Kind:
     return given if same else np.dtype(fields)
 
 
-def open_columns(file: InputFile, options: Options) -> NpyFile:
+def open_columns(file: InputFile, _options: Options) -> NpyFile:
     """Open an array; raises FormatError."""
-    del options
     return NpyFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> CountedWriter:
+def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> CountedWriter:
     """Return what writes rows made elsewhere: n x 3 where there are points alone, else records with fields."""
-    del style
     names = tuple(column.name for column in columns)
     return _writer(columns, np.dtype([]), count, () if names == XYZ else None)

@@ -201,11 +201,11 @@ class PcdHead:
         """Return how many points there are; WIDTH, HEIGHT and POINTS have to agree."""
         found = {}
         for key in ("WIDTH", "HEIGHT", "POINTS"):
-            words = self.words.get(key)
-            if words is not None and len(words) != 1:
+            if (words := self.words.get(key)) is None:
+                continue
+            if len(words) != 1:
                 raise self.problem(key, f"{key} has {len(words)} values, expected 1")
-            if words is not None:
-                found[key] = count_in(words[0], f"{key} {shown(words[0])}", partial(self.problem, key))
+            found[key] = count_in(words[0], f"{key} {shown(words[0])}", partial(self.problem, key))
         if not {"WIDTH", "HEIGHT"} <= found.keys():
             return found["POINTS"]
         points = found["WIDTH"] * found["HEIGHT"]
@@ -409,21 +409,19 @@ def _new_field(column: OutColumn) -> PcdField:
     return PcdField(column.name, *type_in("pcd", "field", CODES, column, taken=PADDING), 1)
 
 
-def open_columns(file: InputFile, options: Options) -> PcdFile:
+def open_columns(file: InputFile, _options: Options) -> PcdFile:
     """Open a cloud; raises FormatError."""
-    del options
     return PcdFile(file)
 
 
 def create(
-    columns: Sequence[OutColumn], count: int | None, style: Style, *, grid: tuple[int, int] | None = None,
+    columns: Sequence[OutColumn], count: int | None, _style: Style, *, grid: tuple[int, int] | None = None,
     sensor: Rigid | None = None,
 ) -> CountedWriter:  # fmt: skip
     """Return what writes points made elsewhere, with numbers of the types they have.
 
     grid: how many points there are in a row, and how many rows; sensor: its pose among the points
     """
-    del style
     numbers = numbers_from(1)
     named = [each if each.name else each._replace(name=f"column_{next(numbers)}") for each in columns]
     fields = [_new_field(column) for column in named]

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
+    Ends = Literal["little", "big"]
     Fail = Callable[[str], FormatError]
 
 FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
@@ -99,19 +100,11 @@ class PlyElement(NamedTuple):
         return [(int(code[1:]), int(counted[1:] or 0), counted[:1] == "i") for _, code, counted in self.properties]
 
 
-class PlyHead(NamedTuple):
-    """What a header says; `text` is the header byte for byte, its last line end included.
+def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElement]]:
+    """Return a header byte for byte, the order of the numbers as numpy writes it, "" for text, and the elements.
 
-    order: of the bytes as numpy writes it, "" for text
+    Leaves the stream behind it; raises FormatError that says line, value and remedy.
     """
-
-    text: bytes
-    order: str
-    elements: tuple[PlyElement, ...]
-
-
-def read_ply_head(stream: BinaryIO, source: str) -> PlyHead:
-    """Read a header and leave the stream behind it; raises FormatError that says line, value and remedy."""
     text = stream.readline(64)
     if text.rstrip(b"\r\n") != b"ply" or not text.endswith(b"\n"):
         raise FormatError("the first line of a PLY file is `ply`, and it ends in a line feed", source=source, line=1)
@@ -147,7 +140,7 @@ def read_ply_head(stream: BinaryIO, source: str) -> PlyHead:
                 raise fail(f"{shown(word)} is no key of a PLY header; keys: {known}")
     if not form:
         raise fail(f"the header has no format; formats: {', '.join(FORMS)}")
-    return PlyHead(text, FORMS[form], tuple(elements))
+    return text, FORMS[form], elements
 
 
 def _element(words: Sequence[str], before: Sequence[PlyElement], line: int, fail: Fail) -> PlyElement:
@@ -187,7 +180,7 @@ _LOST = "the rest of the file does not fit its header: {}; is it whole?"
 
 def _passing(elements: Sequence[PlyElement], order: str, stream: Iterable[bytes], fail: Fail) -> Iterator[bytes]:
     """Yield the pieces of a stream; raises FormatError where they end too early, or go on behind the last row."""
-    ends: Literal["little", "big"] = "little" if order == "<" else "big"
+    ends: Ends = "little" if order == "<" else "big"
     waiting = [(each, each.instances) for each in reversed(elements)]
     data, at = b"", 0  # what is not followed yet, and where the next row begins, perhaps behind it
     for piece in chain(stream, (b"",)):
@@ -205,9 +198,7 @@ def _passing(elements: Sequence[PlyElement], order: str, stream: Iterable[bytes]
         raise fail(_LOST.format(f"{len(data) - at} bytes too many"))
 
 
-def _followed(
-    element: PlyElement, ends: Literal["little", "big"], data: bytes, at: int, left: int, fail: Fail
-) -> tuple[int, int]:
+def _followed(element: PlyElement, ends: Ends, data: bytes, at: int, left: int, fail: Fail) -> tuple[int, int]:
     """Return where the rows of an element end that begin in the data, perhaps behind it, and how many are left."""
     if not element.lists:
         return at + left * element.size, 0
@@ -232,7 +223,7 @@ def _followed(
     return at, left
 
 
-def _alike(sizes: Sequence[tuple[int, int, bool]], ends: Literal["little", "big"], data: bytes, size: int) -> int:
+def _alike(sizes: Sequence[tuple[int, int, bool]], ends: Ends, data: bytes, size: int) -> int:
     """Count the rows whose lists are as long as those of the first, which has a size: most meshes have triangles."""
     rows = len(data) // size
     if rows < _SHORT:
@@ -254,28 +245,28 @@ class PlyFile(CloudFile):
 
     def __init__(self, file: InputFile) -> None:
         """Read the header and what stands before the vertices; raises FormatError."""
-        self.head = read_ply_head(file.stream, file.name)
-        elements = self.head.elements
+        self.head, self.order, elements = read_head(file.stream, file.name)
         at = next((at for at, each in enumerate(elements) if each.name == VERTEX), None)
         if at is None:
             names = listing(each.name for each in elements) or "none"
             raise FormatError(f"no element {VERTEX!r}; elements: {names}", source=file.name)
         before, vertex, self.after = elements[:at], elements[at], elements[at + 1 :]
-        _check_lists(before, vertex, self.head.order, file.name)
+        self.others = before + self.after
+        _check_lists(before, vertex, self.order, file.name)
         self.codes = {each.name: each.code for each in vertex.properties}
-        record = record_of((self.head.order or "<") + code for code in self.codes.values())
+        record = record_of((self.order or "<") + code for code in self.codes.values())
         super().__init__(file, tuple(self.codes), record, vertex.instances, "vertices")
         self.line = vertex.line
         self.is_last = not self.after
         self.turn: tuple[float, ...] | None = None
-        if self.head.order:
+        if self.order:
             self.before = self._skipped(sum(each.instances * each.size for each in before))
             check_declared(file, self.count, record.itemsize, self.what, last=self.is_last)
         else:
             self.before = self._lines(sum(each.instances for each in before))
             if not self.width:
                 raise FormatError(f"the {self.count} vertices have no properties", source=file.name)
-            line = (self.head.text + self.before).count(b"\n") + 1
+            line = (self.head + self.before).count(b"\n") + 1
             self.text = TextRows(self, range(self.width), self.width, line)
 
     def _skipped(self, size: int) -> bytes:
@@ -335,7 +326,7 @@ class PlyFile(CloudFile):
         if self.text is not None:
             return self._counted(self.text)
         fail = partial(FormatError, source=self.file.name)
-        return _passing(self.after, self.head.order, pieces(self.file.stream), fail)
+        return _passing(self.after, self.order, pieces(self.file.stream), fail)
 
     def _counted(self, text: TextRows) -> Iterator[bytes]:
         """Yield the lines of the other elements; raises FormatError where there are not as many as the header says."""
@@ -352,14 +343,14 @@ class PlyFile(CloudFile):
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a vertex that has other columns."""
-        return record_of(self.head.order + TYPES[_type_of(column)] for column in columns)
+        return record_of(self.order + TYPES[_type_of(column)] for column in columns)
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
         """Return the header with how many vertices there are and their properties, and what stands before them."""
-        text = self.head.text
+        text = self.head
         if count != self.count:
             if not self.is_last:
-                names = ", ".join(shown(each.name) for each in self.head.elements if each.name != VERTEX)
+                names = ", ".join(shown(each.name) for each in self.others)
                 raise ValueInvalid(f"vertices cannot be left out: other elements count them ({names})")
             text = re.sub(rb"(?m)^(\s*element\s+vertex\s+)\d+", rb"\g<1>%d" % count, text, count=1)
         if not same_columns(columns, self.width):
@@ -392,15 +383,13 @@ def _property_line(column: OutColumn) -> bytes:
     return f"property {_type_of(column)} {column.name}".encode()
 
 
-def open_columns(file: InputFile, options: Options) -> PlyFile:
+def open_columns(file: InputFile, _options: Options) -> PlyFile:
     """Open a cloud; raises FormatError."""
-    del options
     return PlyFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> CountedWriter:
+def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> CountedWriter:
     """Return what writes points made elsewhere, with numbers of the types they have."""
-    del style
     record = record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
     lines = b"".join(_property_line(column) + b"\n" for column in columns)
 
