@@ -57,7 +57,10 @@ class BagOfClouds:
             forms = ", ".join(writers("arrays"))
             raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; forms: {forms}")
         self.pattern = str(output.path)
-        _check(self.pattern)
+        for place in re.findall(r"\{(\w*)\}", self.pattern):
+            if place not in PLACES:
+                known = ", ".join(f"{{{each}}}" for each in PLACES)
+                raise click.UsageError(f"-o {self.pattern}: {{{place}}} has no meaning; there are {known}")
         self.tally = Tally()
         reading = click.get_current_context().meta.setdefault(READING, {})
         chosen = reading.get("topics", ())
@@ -127,14 +130,6 @@ class BagOfClouds:
                 source=self.path,
             )
         return name
-
-
-def _check(pattern: str) -> None:
-    """Refuse places that have no meaning."""
-    for place in re.findall(r"\{(\w*)\}", pattern):
-        if place not in PLACES:
-            known = ", ".join(f"{{{each}}}" for each in PLACES)
-            raise click.UsageError(f"-o {pattern}: {{{place}}} has no meaning; there are {known}")
 
 
 def clouds_of(stream: Stream, output: Output) -> BagOfClouds | None:

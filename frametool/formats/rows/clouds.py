@@ -206,16 +206,13 @@ class TextBatch(Batch):
         self.size = len(cells.rows)
         self.bytes_read = len(cells.data) - 2 * MARGIN
 
-    def _spans(self, place: int) -> Spans:
-        return self.cells.column(self.table.at[place])
-
     def _problem(self, row: int, place: int, reason: str) -> FormatError:
         message = f"{self.table.cloud.names[place]}: {reason}"
         return self.table.problem(message, self.line + int(self.cells.rows[row]))
 
     def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats; raises FormatError for a cell that is not a number."""
-        column = self._spans(place)
+        column = self.cells.column(self.table.at[place])
         values, bad = parse_floats(column)
         for row in bad.tolist():
             text = column.text(row).decode("utf-8", "replace")
@@ -227,7 +224,7 @@ class TextBatch(Batch):
 
     def texts(self, place: int) -> list[str]:
         """Return a column as texts."""
-        column = self._spans(place)
+        column = self.cells.column(self.table.at[place])
         return [column.text(row).decode("utf-8", "replace") for row in range(self.size)]
 
     def column(self, place: int) -> Any:

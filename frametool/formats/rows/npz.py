@@ -57,9 +57,7 @@ class NpzFile(npy.NpyFile):
 
     def _chosen(self, wanted: str) -> ZipInfo:
         """Return the array that was named, or the only one that fits."""
-        arrays = {
-            member.filename.removesuffix(SUFFIX): member for member in self.members if member.filename.endswith(SUFFIX)
-        }
+        arrays = {each.filename.removesuffix(SUFFIX): each for each in self.members if each.filename.endswith(SUFFIX)}
         if wanted and wanted not in arrays:
             message = f"--array {shown(wanted)}: there is none{alternatives(wanted, arrays, 'arrays')}"
             raise BadAnswer(message, source=self.name)

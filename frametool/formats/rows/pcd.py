@@ -248,7 +248,6 @@ def viewpoint_words(pose: Rigid) -> str:
 
 
 MOST = 88  # bytes that one packed byte may stand for: three make up to 264
-_TORN = "it ends in the middle of a run"
 
 
 def unpack(packed: bytes, size: int) -> bytearray:
@@ -264,18 +263,16 @@ def unpack(packed: bytes, size: int) -> bytearray:
         raise ValueInvalid(f"{len(packed)} packed bytes cannot hold {size}")
     out = bytearray()
     try:
-        at = _unpack(packed, size, out)
+        _unpack(packed, size, out)
     except IndexError:
-        raise ValueInvalid(_TORN) from None
-    if at > len(packed):
-        raise ValueInvalid(_TORN)
+        raise ValueInvalid("it ends in the middle of a run") from None
     if len(out) != size:
         raise ValueInvalid(f"it makes {'only' if len(out) < size else 'at least'} {len(out)} bytes, not {size}")
     return out
 
 
-def _unpack(packed: bytes, size: int, out: bytearray) -> int:
-    """Append runs until all is read or too much is there; return where reading ended.  The hot loop."""
+def _unpack(packed: bytes, size: int, out: bytearray) -> None:
+    """Append runs until all is read or too much is there; raises IndexError where one is cut.  The hot loop."""
     at, end = 0, len(packed)
     while at < end and len(out) <= size:
         control = packed[at]
@@ -300,7 +297,8 @@ def _unpack(packed: bytes, size: int, out: bytearray) -> int:
         else:  # the run overlaps what it makes
             part = out[start:]
             out += (part * (length // distance + 1))[:length]
-    return at
+    if at > end:
+        raise IndexError(at)
 
 
 class PcdFile(CloudFile):

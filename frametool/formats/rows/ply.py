@@ -65,29 +65,22 @@ SPLAT = ("rot_1", "rot_2", "rot_3", "rot_0")  # x y z w
 HARMONICS = "f_rest_0"
 
 
-class PlyProperty(NamedTuple):
-    """A property of an element: its name, the type of a value, and of a list the type of what counts it, else ""."""
-
-    name: str
-    code: str
-    counted: str
-
-
 class PlyElement(NamedTuple):
     """One element of a file.
 
     instances: how many there are; line: where it stands in the header
+    properties: the name of each, the type of a value, and of a list the type of what counts it, else ""
     """
 
     name: str
     instances: int
     line: int
-    properties: tuple[PlyProperty, ...] = ()
+    properties: tuple[tuple[str, str, str], ...] = ()
 
     @property
     def lists(self) -> list[str]:
         """Name the properties that are lists, whose size is not known beforehand."""
-        return [each.name for each in self.properties if each.counted]
+        return [name for name, _, counted in self.properties if counted]
 
     @property
     def size(self) -> int:
@@ -163,12 +156,12 @@ def _with_property(element: PlyElement, words: Sequence[str], fail: Fail) -> Ply
     for each in types:
         if each not in TYPES:
             raise fail(f"{shown(each)} is no type; types: {', '.join(TYPES)}")
-    if any(name == known.name for known in element.properties):
+    if any(name == known for known, _, _ in element.properties):
         raise fail(f"property {shown(name)} of {shown(element.name)} stands twice")
     codes = [TYPES[each] for each in types]
     if is_list and codes[0][0] == "f":
         raise fail(f"{shown(types[0])} counts the values of a list; it has to be an integer")
-    made = PlyProperty(name, codes[-1], codes[0] if is_list else "")
+    made = name, codes[-1], codes[0] if is_list else ""
     return element._replace(properties=(*element.properties, made))
 
 
@@ -253,7 +246,7 @@ class PlyFile(CloudFile):
         before, vertex, self.after = elements[:at], elements[at], elements[at + 1 :]
         self.others = before + self.after
         _check_lists(before, vertex, self.order, file.name)
-        self.codes = {each.name: each.code for each in vertex.properties}
+        self.codes = {name: code for name, code, _ in vertex.properties}
         record = record_of((self.order or "<") + code for code in self.codes.values())
         super().__init__(file, tuple(self.codes), record, vertex.instances, "vertices")
         self.line = vertex.line
