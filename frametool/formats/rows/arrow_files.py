@@ -17,7 +17,7 @@ import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, printable, shown, warn
 from frametool.formats.rows.arrow import ArrowBatch, kind_of, require_pyarrow, type_of, typed
-from frametool.formats.rows.column_file import Collected, ColumnFile, kept_in_file
+from frametool.formats.rows.column_file import Collected, ColumnFile, seekable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -89,12 +89,12 @@ class ArrowFile(ColumnFile):
                 return
             yield rows
 
-    def seekable(self, file: InputFile) -> Any:
+    def random_access(self, file: InputFile) -> Any:
         """Return what pyarrow reads at any place; what comes by a pipe is put into a file without a name first."""
         pa = require_pyarrow(self.name)
         if file.path != "-" and os.path.isfile(file.path):
             return pa.OSFile(file.path)
-        stream: Any = file.stream if file.stream.seekable() else kept_in_file(file.stream, self)
+        stream = seekable(file, self)
         stream.seek(0)
         return pa.PythonFile(stream, mode="r")
 
@@ -229,7 +229,7 @@ class IpcFile(ArrowFile):
         ipc = require_pyarrow(self.name, "ipc")
         self.codec = codec_in(file.head()[BODY_AT if self.form == "arrow" else 0 :])
         if self.form == "arrow":
-            self.reader = ipc.open_file(self.seekable(file))
+            self.reader = ipc.open_file(self.random_access(file))
         else:
             self.reader = ipc.open_stream(require_pyarrow(self.name).PythonFile(file.stream, mode="r"))
         return self.reader.schema
@@ -327,7 +327,7 @@ class ParquetFile(ArrowFile):
 
     def opened(self, file: InputFile) -> Any:
         """Open the file and return its schema."""
-        self.source = self.seekable(file)
+        self.source = self.random_access(file)
         self.file = require_pyarrow(self.name, "parquet").ParquetFile(self.source, pre_buffer=False)
         self.about = self.file.metadata
         self.warned = False

@@ -97,12 +97,13 @@ class Batch(Protocol):
         A float of seconds counts as the decimal that it prints as, as it does in a table of text.
         """
         numbers = self.column(place)
-        if numbers.dtype.kind in WHOLE:
-            stamps = numbers.astype(np.int64)
-            bad = np.zeros(0, np.bool_) if in_ns else abs(numbers) > FURTHEST
-            stamps *= 1 if in_ns else BILLION
-        elif in_ns:
+        is_whole = numbers.dtype.kind in WHOLE
+        if in_ns and is_whole:
+            return numbers.astype(np.int64), {}
+        if in_ns:
             raise ValueInvalid(f"nanoseconds are integers, found {numbers.dtype}")
+        if is_whole:
+            stamps, bad = numbers.astype(np.int64) * BILLION, abs(numbers) > FURTHEST
         else:
             stamps, bad = nanoseconds_of(numbers.astype(np.float64))
         return stamps, dict.fromkeys(np.flatnonzero(bad).tolist(), "not a time in seconds")
@@ -270,12 +271,14 @@ def temporary_file(owner: object) -> Any:
     return file
 
 
-def kept_in_file(stream: BinaryIO, owner: object) -> Any:
-    """Return a file with the rest of a stream, for what has to be read here and there; it is closed with its owner."""
-    file = temporary_file(owner)
-    copyfileobj(stream, file, PIECE)
-    file.seek(0)
-    return file
+def seekable(file: InputFile, owner: object) -> Any:
+    """Return the stream of a file, to be read here and there; of a pipe a copy, which is closed with its owner."""
+    if bytes_left(file.stream) is not None:
+        return file.stream
+    copy = temporary_file(owner)
+    copyfileobj(file.stream, copy, PIECE)
+    copy.seek(0)
+    return copy
 
 
 # --- writing ---

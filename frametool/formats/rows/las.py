@@ -22,8 +22,8 @@ from frametool.formats.rows.column_file import (
     StructuredBatch,
     bytes_left,
     check_declared,
-    kept_in_file,
     pieces,
+    seekable,
     temporary_file,
 )
 
@@ -104,8 +104,7 @@ class LasFile(ColumnFile):
         """Read the header; raises FormatError for a broken one, FileProblem where the extra is missing."""
         laspy = _laspy(file.name, packed=file.head()[PACKED_AT : PACKED_AT + 1] >= PACKED)
         self.file = file
-        if bytes_left(file.stream) is None:
-            file.stream = kept_in_file(file.stream, self)
+        file.stream = seekable(file, self)
         whole = bytes_left(file.stream) or 0
         with _translated(file.name, BROKEN):
             self.reader = laspy.open(file.stream, closefd=False)
@@ -116,8 +115,7 @@ class LasFile(ColumnFile):
                 check_declared(file, header.point_count, header.point_format.size, "points", last=last)
             elif header.point_count > whole * MOST_PACKED:
                 raise FormatError(f"the header says {header.point_count} points, in {whole} bytes", source=file.name)
-            others = [name for name in header.point_format.dimension_names if name not in STORED]
-            self.names = (*XYZ, *others)
+            self.names = (*XYZ, *(name for name in header.point_format.dimension_names if name not in STORED))
             probe = laspy.ScaleAwarePointRecord.zeros(1, header=header)
             kinds = [np.array(probe[name]) for name in self.names]
         self.width = len(self.names)

@@ -14,7 +14,7 @@ from zipfile import BadZipFile, ZipFile, ZipInfo
 from frametool.documents.source import InputFile
 from frametool.errors import BadAnswer, FormatError, Unanswered, alternatives, listing, shown
 from frametool.formats.rows import npy
-from frametool.formats.rows.column_file import PIECE, XYZ, Collected, bytes_left, kept_in_file
+from frametool.formats.rows.column_file import PIECE, XYZ, Collected, seekable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -48,9 +48,8 @@ class NpzFile(npy.NpyFile):
     def __init__(self, file: InputFile, wanted: str) -> None:
         """Find the array; raises FormatError, Unanswered where several fit, BadAnswer for one that is not there."""
         self.name = file.name
-        is_file = bytes_left(file.stream) is not None
         with _whole(self.name):
-            self.zip = ZipFile(file.stream if is_file else kept_in_file(file.stream, self))
+            self.zip = ZipFile(seekable(file, self))
             self.members = self.zip.infolist()
             self.member = self._chosen(wanted)
             super().__init__(self._opened(self.member))

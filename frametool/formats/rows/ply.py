@@ -62,7 +62,6 @@ NEW_NAMES |= {"b1": "uchar", "f2": "float"}
 VERTEX = "vertex"
 OWN_LINES: tuple[list[bytes], ...] = ([b"property"], [b"comment"], [b"obj_info"], [])  # how those of an element begin
 SPLAT = ("rot_1", "rot_2", "rot_3", "rot_0")  # x y z w
-HARMONICS = "f_rest_0"
 
 
 class PlyElement(NamedTuple):
@@ -290,7 +289,7 @@ class PlyFile(CloudFile):
             warn(f"{name}: rot_0 .. rot_3, the rotations of splats, are left as they are: {why}")
             return
         self.turn = pose[3:]
-        if HARMONICS in self.names:
+        if "f_rest_0" in self.names:
             warn(f"{name}: f_rest_*, spherical harmonics, are left as they are: colours keep to the old axes")
 
     def batches(self) -> Iterator[Batch]:
