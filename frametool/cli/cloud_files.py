@@ -124,11 +124,9 @@ class BagOfClouds:
         texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
         name = re.sub(r"\{(\w+)\}", lambda found: texts[found[1]], self.pattern)
         if name in self.names:
-            first, remedy = self.names[name], "{number}" if "{" in self.pattern else "{stamp_ns}"
-            raise FormatError(
-                f"messages {first} and {cloud.number} would both become {shown(name)}; put {remedy} into its name",
-                source=self.path,
-            )
+            both = f"messages {self.names[name]} and {cloud.number} would both become {shown(name)}"
+            remedy = "{number}" if "{" in self.pattern else "{stamp_ns}"
+            raise FormatError(f"{both}; put {remedy} into its name", source=self.path)
         return name
 
 

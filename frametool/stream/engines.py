@@ -156,8 +156,8 @@ def _check(given: Sequence[Any], made: Sequence[Any], fields: Sequence[Any], nul
             row = int(np.argmin(finite))
             for numbers, each in zip(given, fields, strict=True):
                 if not np.isfinite(numbers[row]):
-                    remedy = "make it null, or leave the row out"
-                    raise ValueInvalid(f"{each.name}[{row}]: {numbers[row]} is not finite; {remedy}")
+                    found = f"{each.name}[{row}]: {numbers[row]} is not finite"
+                    raise ValueInvalid(f"{found}; make it null, or leave the row out")
             raise ValueInvalid(f"{field.name}[{row}]: the result is too large for {field.type}")
 
 

@@ -88,6 +88,7 @@ class ArrowFile(ColumnFile):
             if rows is None:
                 return
             yield rows
+            del rows  # before the next are read
 
     def random_access(self, file: InputFile) -> Any:
         """Return what pyarrow reads at any place; what comes by a pipe is put into a file without a name first."""
@@ -246,6 +247,7 @@ class IpcFile(ArrowFile):
         for rows in found:
             rows.validate(full=True)  # what is broken ends the process where it is touched
             yield rows
+            del rows
 
     def read(self) -> Iterator[ArrowBatch]:
         """Yield the rows; raises FormatError where the file is broken."""

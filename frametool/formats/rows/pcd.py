@@ -326,8 +326,7 @@ class PcdFile(CloudFile):
             return
         tx, ty, tz, w, x, y, z = self.head.viewpoint
         if quaternion.complaint(x, y, z, w):
-            words = " ".join(f"{each:g}" for each in (w, x, y, z))
-            warn(f"{name}: VIEWPOINT is left as it is: {words} is no rotation")
+            warn(f"{name}: VIEWPOINT is left as it is: {w:g} {x:g} {y:g} {z:g} is no rotation")
             return
         self.viewpoint = viewpoint_words(rigid.compose(*pose, tx, ty, tz, *quaternion.repaired(x, y, z, w, floats)))
 
