@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import ExitStack
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,6 +16,7 @@ from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
 from frametool.formats.detect import of_folder
 from frametool.formats.table import BAG, FORMATS, by_suffix, holds_arrays, writers
+from frametool.frames.stamps import format_stamp
 from frametool.stream.faults import Fault
 
 if TYPE_CHECKING:
@@ -26,7 +28,13 @@ if TYPE_CHECKING:
     from frametool.ros.point_clouds import PointCloud
     from frametool.stream.faults import BadRows
 
-PLACES = ("stamp_ns", "stamp", "number", "topic", "frame")
+PLACES: dict[str, Callable[[PointCloud], str]] = {
+    "stamp_ns": lambda cloud: str(cloud.stamp_ns),
+    "stamp": lambda cloud: format_stamp(cloud.stamp_ns),
+    "number": lambda cloud: f"{cloud.number:06d}",
+    "topic": lambda cloud: cloud.topic.strip("/"),
+    "frame": lambda cloud: cloud.frame,
+}  # {NAME} in -o -> what stands there
 _HEAD = 64
 _UNUSED = {"columns": "--columns", "keep": "--keep", "prefix": "--prefix", "given": "--from"}
 
@@ -49,20 +57,19 @@ class BagOfClouds:
             forms = ", ".join(writers("arrays"))
             raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; forms: {forms}")
         self.pattern = str(output.path)
-        _check(self.pattern)
+        for place in re.findall(r"\{(\w*)\}", self.pattern):
+            if place not in PLACES:
+                known = ", ".join(f"{{{each}}}" for each in PLACES)
+                raise click.UsageError(f"-o {self.pattern}: {{{place}}} has no meaning; there are {known}")
         self.tally = Tally()
-        self.kept = ExitStack()
-        self.reader = self.kept.enter_context(opened_bag(path, self.tally))
-        context = click.get_current_context()
-        reading = context.meta.setdefault(READING, {})
+        reading = click.get_current_context().meta.setdefault(READING, {})
         chosen = reading.get("topics", ())
-        try:
+        with ExitStack() as opened:
+            self.reader = opened.enter_context(opened_bag(path, self.tally))
             self.topics = cloud_topics(self.reader, chosen, path)
-        except BaseException:
-            self.kept.close()
-            raise
-        ours = {topic.strip("/") for topic in self.topics}
-        reading["topics"] = tuple(topic for topic in chosen if topic.strip("/") not in ours)
+            self.opened = opened.pop_all()
+        clouds = {topic.strip("/") for topic in self.topics}
+        reading["topics"] = tuple(topic for topic in chosen if topic.strip("/") not in clouds)
         self.names: dict[str, int] = {}
 
     def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None) -> int:
@@ -74,14 +81,8 @@ class BagOfClouds:
 
         bad = self.stream.policy(self.path, "message")
         count = points = 0
-        said: set[str] = set()
-
-        def once(message: str, rule: str, kind: type[FrametoolWarning]) -> None:
-            if message not in said:
-                said.add(message)
-                say_warning(message, rule, kind)
-
-        with self.kept, heard_by(once):
+        once: Any = cache(say_warning)
+        with self.opened, heard_by(once):
             for cloud in read_clouds(self.reader, self.topics, self.path, self.tally):
                 count += 1
                 if isinstance(cloud, FormatError):
@@ -109,66 +110,39 @@ class BagOfClouds:
             return 0
         name = self._name(cloud)
         style = self.output.style.in_form(self.output.told or "")
-        faults: list[Fault] = []
         with writing(name, force=self.output.force) as write:
             for outcome in moved_cloud(cloud, pose, style, self.path):
-                faults += outcome.faults
-                if faults:
-                    break
+                for fault in outcome.faults:
+                    reason = f"point {fault.line + 1}: {fault.reason}"
+                    raise FormatError(f"message {cloud.number}: {reason}", source=self.path)
                 write(outcome.text)
-            if faults:
-                reason = f"point {faults[0].line + 1}: {faults[0].reason}"
-                raise FormatError(f"message {cloud.number}: {reason}", source=self.path)
         self.names[name] = cloud.number
         return len(cloud.rows)
 
     def _name(self, cloud: PointCloud) -> str:
         """Return the name of a cloud's file; raises FormatError for one that another has."""
-        name = re.sub(r"\{(\w+)\}", lambda found: _filled(found[1], cloud), self.pattern)
+        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
+        name = re.sub(r"\{(\w+)\}", lambda found: texts[found[1]], self.pattern)
         if name in self.names:
-            first, remedy = self.names[name], "{number}" if "{" in self.pattern else "{stamp_ns}"
-            raise FormatError(
-                f"messages {first} and {cloud.number} would both become {shown(name)}; put {remedy} into its name",
-                source=self.path,
-            )
+            both = f"messages {self.names[name]} and {cloud.number} would both become {shown(name)}"
+            remedy = "{number}" if "{" in self.pattern else "{stamp_ns}"
+            raise FormatError(f"{both}; put {remedy} into its name", source=self.path)
         return name
-
-
-def _filled(place: str, cloud: PointCloud) -> str:
-    """Return what stands in a place of a pattern; a slash or two dots would be another folder."""
-    seconds, below = divmod(cloud.stamp_ns, 1_000_000_000)
-    values = {
-        "stamp_ns": str(cloud.stamp_ns), "stamp": f"{seconds}.{below:09d}", "number": f"{cloud.number:06d}",
-        "topic": cloud.topic.strip("/"), "frame": cloud.frame,
-    }  # fmt: skip
-    return re.sub(r"[/\0]|^\.+", "_", values[place])
-
-
-def _check(pattern: str) -> None:
-    """Refuse places that have no meaning."""
-    for place in re.findall(r"\{(\w*)\}", pattern):
-        if place not in PLACES:
-            known = ", ".join(f"{{{each}}}" for each in PLACES)
-            raise click.UsageError(f"-o {pattern}: {{{place}}} has no meaning; there are {known}")
 
 
 def clouds_of(stream: Stream, output: Output) -> BagOfClouds | None:
     """Return the clouds of a bag if -i names one."""
-    path = stream.path
-    return BagOfClouds(path, output, stream) if path is not None and _is_bag(path) else None
+    return BagOfClouds(stream.path, output, stream) if stream.path and _is_bag(stream.path) else None
 
 
 def _is_bag(path: str) -> bool:
     """Tell a bag by its first bytes, or as a folder."""
-    rows = [row for row in FORMATS.values() if row.reader == BAG]
-    if os.path.isdir(path):
-        form = of_folder(path)
-        return form is not None and FORMATS[form].reader == BAG
+    bags = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
     if not os.path.isfile(path):
-        return False
+        return of_folder(path) in bags
     with open(path, "rb") as file:
         head = file.read(_HEAD)
-    magics: list[Any] = [what for row in rows for kind, what in row.signs if kind == "magic"]
-    return any(re.match(magic, head, re.DOTALL) for magic in magics) or (
-        not head and by_suffix(path, tuple(name for name, row in FORMATS.items() if row.reader == BAG)) is not None
-    )
+    if not head:
+        return by_suffix(path, bags) is not None
+    magics: list[Any] = [what for name in bags for kind, what in FORMATS[name].signs if kind == "magic"]
+    return any(re.match(magic, head, re.DOTALL) for magic in magics)

@@ -98,16 +98,15 @@ def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
         code = DATATYPES.get(int(field.datatype))
         if code is None:
             raise ValueInvalid(f"field {shown(field.name)} has the datatype {field.datatype}, known are 1 to 8")
-        count, size = max(int(field.count), 1), int(code[1])
-        if int(field.offset) + count * size > step:
-            end = int(field.offset) + count * size
+        count, offset, size = max(int(field.count), 1), int(field.offset), int(code[1])
+        end = offset + count * size
+        if end > step:
             raise ValueInvalid(f"field {shown(field.name)} ends at byte {end}, a point has {step} (point_step)")
         if len(names) + count > _MOST_VALUES:
             raise ValueInvalid(f"a point has more than {_MOST_VALUES} values")
-        for place in range(count):
-            names.append(field.name if count == 1 else f"{field.name}_{place}")
-            formats.append(order + code)
-            offsets.append(int(field.offset) + place * size)
+        names += [field.name] if count == 1 else [f"{field.name}_{place}" for place in range(count)]
+        formats += [order + code] * count
+        offsets += range(offset, end, size)
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise ValueInvalid(f"field {shown(twice[0])} stands twice")
     if missing := [name for name in "xyz" if name not in names]:

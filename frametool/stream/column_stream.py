@@ -11,9 +11,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, warn
-from frametool.formats.rows.column_file import FLOATS, Made, MovesAlong, OutColumn
-from frametool.formats.rows.pcd import NORMALS, PcdWriter, viewpoint_words
-from frametool.formats.rows.structured import StructuredBatch, is_number, not_finite, rows_of_batch
+from frametool.formats.rows import pcd
+from frametool.formats.rows.clouds import NORMALS
+from frametool.formats.rows.column_file import (
+    FLOATS,
+    ColumnFile,
+    Made,
+    OutColumn,
+    StructuredBatch,
+    not_finite,
+    rows_of_batch,
+)
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.stream.evaluate import Run, State
@@ -34,7 +42,7 @@ from frametool.text.spans import Spans, framed
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Mapping, Sequence
 
-    from frametool.formats.rows.column_file import Batch, ColumnFile, ColumnWriter, Kind
+    from frametool.formats.rows.column_file import Batch, ColumnWriter, Kind
     from frametool.geometry.types import Rigid
     from frametool.grammar.result import Style
     from frametool.ros.point_clouds import PointCloud
@@ -448,7 +456,7 @@ class _InOtherForm:
         values, nulls = batch.numbers(column.passed or 0)
         return values.astype(column.kind), nulls
 
-    def end(self) -> bytes | Iterator[bytes]:
+    def end(self) -> Iterator[bytes]:
         """Return what comes behind the last batch."""
         return self.writer.end()
 
@@ -456,7 +464,7 @@ class _InOtherForm:
 def move_along(file: ColumnFile, request: Request) -> None:
     """Let what else has a place among the points of a file move with them."""
     operation, timed = request.operation, request.timed
-    if isinstance(file, MovesAlong) and operation.moves and not request.keep and request.gathered is None:
+    if operation.moves and not request.keep and request.gathered is None:
         by_row = request.edge_of is not None or (timed is not None and bool(timed.name))
         file.moved_by(None if by_row else operation.left)
 
@@ -474,7 +482,7 @@ def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults)
     return made
 
 
-class MessageColumns:
+class MessageColumns(ColumnFile):
     """The points of a message as a file of columns."""
 
     vectors = NORMALS
@@ -485,18 +493,14 @@ class MessageColumns:
         self.cloud = cloud
         self.names: tuple[str, ...] | None = cloud.names
         self.width = len(cloud.names)
-
-    def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers."""
-        kind = self.cloud.rows.dtype[place]
-        return kind if is_number(kind) else None
+        self.kinds = [cloud.rows.dtype[place] for place in range(self.width)]
 
     def batches(self) -> Iterator[StructuredBatch]:
         """Yield the points."""
-        rows, fields = self.cloud.rows, self.cloud.rows.dtype.names or ()
+        rows = self.cloud.rows
         step = rows_of_batch(rows.dtype.itemsize)
         for first in range(0, len(rows), step):
-            yield StructuredBatch(rows[first : first + step], fields)
+            yield StructuredBatch(rows[first : first + step])
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Refuse: messages are written in other forms."""
@@ -516,10 +520,9 @@ class _GridOfForm:
     def create(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
         """Return what writes the points."""
         del count
-        writer: ColumnWriter = self.module.create(columns, len(self.cloud.rows), style)
-        if isinstance(writer, PcdWriter):
-            writer.words |= {"WIDTH": str(self.cloud.width), "HEIGHT": str(self.cloud.height)}
-            writer.words["VIEWPOINT"] = viewpoint_words(self.pose)
+        cloud = self.cloud
+        kept = {"grid": (cloud.width, cloud.height), "sensor": self.pose} if self.module is pcd else {}
+        writer: ColumnWriter = self.module.create(columns, len(cloud.rows), style, **kept)
         return writer
 
 

@@ -1,9 +1,7 @@
-"""Rows of Arrow tables moved into another frame: the function that engines call for each of their batches.
+"""Points moved inside of engines: a function for their Arrow batches, and a transform as SQL or expressions of Polars.
 
-A transform written out for engines that compute by themselves: as SQL, and as expressions of Polars.
-
-Both multiply and add in the order in which `Transform.apply` does, so that the same doubles come out of engines that
-contract no products; the tests hold DuckDB and Polars to it.
+SQL and expressions multiply and add in the order in which `Transform.apply` does, so that the same doubles come out of
+engines that contract no products; the tests hold DuckDB and Polars to it.  Knows no file.
 """
 
 from __future__ import annotations
@@ -13,37 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import FileProblem, ValueInvalid, shown
-from frametool.formats.rows.arrow import (
-    ArrowFloats,
-    column_of,
-    floats_of,
-    in_one,
-    is_floating,
-    nulls_of,
-    place_of,
-    require_pyarrow,
-    rounded,
-    stamps_of,
-)
+from frametool.errors import FileProblem, ValueInvalid, alternatives, shown
+from frametool.formats.rows.arrow import in_one, is_floating, kind_of, nulls_of, require_pyarrow, stamps_of
 from frametool.geometry import arrays, quaternion, rigid
 from frametool.geometry.transform import Transform
 from frametool.stream.row_layout import POINT, POSE, VECTOR
 from frametool.stream.stamp_columns import NOWHERE
-from frametool.text.parse import nanoseconds_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
-    from frametool.text.spans import Flags, Ints
+    from frametool.text.spans import Flags
 
-COLUMNS = {
-    POINT: ("x", "y", "z"),
-    VECTOR: ("x", "y", "z"),
-    POSE: ("x", "y", "z", "qx", "qy", "qz", "qw"),
-}  # as_ -> the columns where none are named
+XYZ = ("x", "y", "z")
+COLUMNS = {POINT: XYZ, VECTOR: XYZ, POSE: (*XYZ, "qx", "qy", "qz", "qw")}  # as_ -> the columns where none are named
 
 
 def apply_arrow(
@@ -70,23 +53,39 @@ def apply_arrow(
         kind = f"{type(data).__module__}.{type(data).__name__}"
         raise ValueInvalid(f"expected a pyarrow RecordBatch or Table, got {kind}")
     names = _named(columns, as_)
-    places = [place_of(name, data.schema.names) for name in names]
-    given = [floats_of(data.column(place), name) for place, name in zip(places, names, strict=True)]
-    nulls = _either(each.nulls for each in given)
+    places = [_place_of(name, data.schema.names) for name in names]
+    fields = [data.schema.field(place) for place in places]
+    for field in fields:
+        if not is_floating(field.type):
+            message = f"column {shown(field.name)} is {field.type}, not floating point; cast it to float64 first"
+            raise ValueInvalid(message)
+    given = [in_one(data.column(place)) for place in places]
+    masks = [mask for mask in map(nulls_of, given) if mask is not None]
+    nulls = np.logical_or.reduce(masks) if masks else None
     if tree is None:
         mover = _one_or_each(transform, data.num_rows, tree=bool(target or source or time_column))
     elif transform is None and target and source:
         mover = _looked_up(tree, target, source, data, time_column, nulls)
     else:
         raise ValueInvalid("give a transform, or tree, target and source")
-    moved = _moved(mover.components, given, as_, nulls)
-    fields = [data.schema.field(place) for place in places]
-    made = [rounded(numbers, field.type) for numbers, field in zip(moved, fields, strict=True)]
-    _check(given, made, fields, nulls)
+    numbers = [column.to_numpy(zero_copy_only=False) for column in given]
+    moved = _moved(mover.components, numbers, as_, nulls)
+    with np.errstate(over="ignore"):  # what is too large becomes infinite
+        made = [np.asarray(each, kind_of(field.type)) for each, field in zip(moved, fields, strict=True)]
+    _check(numbers, made, fields, nulls)
     new = list(data.columns)
-    for place, numbers, field in zip(places, made, fields, strict=True):
-        new[place] = column_of(numbers, nulls, field.type)
+    for place, each, field in zip(places, made, fields, strict=True):
+        new[place] = pa.array(each, type=field.type, mask=nulls)
     return type(data).from_arrays(new, schema=data.schema)
+
+
+def _place_of(name: str, names: Sequence[str]) -> int:
+    """Return the place of a column; raises ValueInvalid for one that is not there, or twice."""
+    if name not in names:
+        raise ValueInvalid(f"no column {shown(name)}{alternatives(name, names, 'columns')}")
+    if names.count(name) > 1:
+        raise ValueInvalid(f"column {shown(name)} stands twice")
+    return names.index(name)
 
 
 def _named(columns: Sequence[str] | None, as_: str) -> tuple[str, ...]:
@@ -116,7 +115,11 @@ def _looked_up(
     """Look the frames up, at the latest time or at that of each row; those of null rows are not looked at."""
     if time_column is None:
         return tree.lookup(target, source)
-    stamps, missing = _stamps(data.column(place_of(time_column, data.schema.names)), time_column)
+    column = data.column(_place_of(time_column, data.schema.names))
+    stamps, missing, bad = stamps_of(column, time_column)
+    if len(bad):
+        seconds = column[int(bad[0])].as_py()
+        raise ValueInvalid(f"{time_column}[{bad[0]}]: {seconds} is no time in seconds; integers are nanoseconds")
     needed = np.ones(len(stamps), np.bool_) if nulls is None else ~nulls
     if missing is not None and (missing & needed).any():
         row = int(np.argmax(missing & needed))
@@ -129,25 +132,8 @@ def _looked_up(
     return Transform.of(*poses)
 
 
-def _stamps(column: Any, name: str) -> tuple[Ints, Flags | None]:
-    """Read a column of times as nanoseconds, and which are null."""
-    if not is_floating(column.type):
-        return stamps_of(column, name)
-    whole = in_one(column)
-    missing = nulls_of(whole)
-    seconds = whole.to_numpy(zero_copy_only=False).astype(np.float64)
-    stamps, none = nanoseconds_of(seconds)
-    if missing is not None:
-        none &= ~missing
-    if none.any():
-        row = int(np.argmax(none))
-        raise ValueInvalid(f"{name}[{row}]: {seconds[row]} is no time in seconds; integers are nanoseconds")
-    return stamps, missing
-
-
-def _moved(mover: Components, given: Sequence[ArrowFloats], as_: str, nulls: Flags | None) -> Components:
+def _moved(mover: Components, numbers: Sequence[Any], as_: str, nulls: Flags | None) -> Components:
     """Return the moved numbers, one array a column; what null rows hold has no meaning."""
-    numbers = tuple(each.values for each in given)
     if as_ == POINT:
         return arrays.run(rigid.apply, 3, (*mover, *numbers))
     if as_ == VECTOR:
@@ -159,34 +145,20 @@ def _moved(mover: Components, given: Sequence[ArrowFloats], as_: str, nulls: Fla
     return (*poses.components[:3], *poses.xyzw.T)
 
 
-def _check(given: Sequence[ArrowFloats], made: Sequence[Any], fields: Sequence[Any], nulls: Flags | None) -> None:
+def _check(given: Sequence[Any], made: Sequence[Any], fields: Sequence[Any], nulls: Flags | None) -> None:
     """Raise ValueInvalid for the first row that is not finite, or null where a column may hold no null."""
-    kept = np.True_ if nulls is None else ~nulls
     for values, field in zip(made, fields, strict=True):
         if nulls is not None and not field.nullable:
             row = int(np.argmax(nulls))
             raise ValueInvalid(f"{field.name}[{row}] becomes null, and the schema allows none there; make it nullable")
-        if not (finite := np.isfinite(values) | ~kept).all():
-            _refuse(int(np.argmin(finite)), given, fields)
-            raise ValueInvalid(f"{field.name}[{int(np.argmin(finite))}]: the result is too large for {field.type}")
-
-
-def _refuse(row: int, given: Sequence[ArrowFloats], fields: Sequence[Any]) -> None:
-    """Raise ValueInvalid for the first number of a row that is not finite, if there is one."""
-    for (values, _), field in zip(given, fields, strict=True):
-        if not np.isfinite(values[row]):
-            remedy = "make it null, or leave the row out"
-            raise ValueInvalid(f"{field.name}[{row}]: {values[row]} is not finite; {remedy}")
-
-
-def _either(masks: Any) -> Flags | None:
-    """Return where any of some masks is set."""
-    found = [mask for mask in masks if mask is not None]
-    return np.logical_or.reduce(found) if found else None
-
-
-XYZ = ("x", "y", "z")
-Row = tuple[float, ...]
+        finite = np.isfinite(values) if nulls is None else np.isfinite(values) | nulls
+        if not finite.all():
+            row = int(np.argmin(finite))
+            for numbers, each in zip(given, fields, strict=True):
+                if not np.isfinite(numbers[row]):
+                    found = f"{each.name}[{row}]: {numbers[row]} is not finite"
+                    raise ValueInvalid(f"{found}; make it null, or leave the row out")
+            raise ValueInvalid(f"{field.name}[{row}]: the result is too large for {field.type}")
 
 
 def sql(transform: Transform, columns: Sequence[str] = XYZ, *, as_: str = "point", quote: str = '"') -> str:
@@ -221,7 +193,7 @@ def polars_exprs(transform: Transform, columns: Sequence[str] = XYZ, *, as_: str
     return made
 
 
-def _rows(transform: Transform, columns: Sequence[str], as_: str) -> list[Row]:
+def _rows(transform: Transform, columns: Sequence[str], as_: str) -> list[tuple[float, ...]]:
     """Return what x, y and z are multiplied with, and the shift of a point; raises ValueInvalid."""
     if not isinstance(transform, Transform) or transform.shape:
         found = f"{transform!r}" if isinstance(transform, Transform) else type(transform).__name__

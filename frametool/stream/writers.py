@@ -15,9 +15,8 @@ import numpy as np
 
 from frametool.documents.json import Verbatim, dump
 from frametool.errors import ValueInvalid, listing, warn
-from frametool.formats.rows.column_file import STAMP_NS, Made, OutColumn
+from frametool.formats.rows.column_file import STAMP_NS, Made, OutColumn, not_finite
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, Lost, Numbers, RowForm, field, image_name, is_turned, turned
-from frametool.formats.rows.structured import not_finite
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion

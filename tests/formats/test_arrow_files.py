@@ -13,7 +13,7 @@ import pytest
 
 import frametool
 from frametool.formats.rows.arrow import type_of, typed
-from frametool.formats.rows.arrow_ipc import codec_in
+from frametool.formats.rows.arrow_files import codec_in
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -466,8 +466,7 @@ def test_columns_that_cannot_be_moved_are_named(use: Use, columns: dict[str, Any
 
 
 def test_a_group_too_large_to_be_held_is_written_in_parts(use: Use, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("parquet", "arrow_writer"):
-        monkeypatch.setattr(f"frametool.formats.rows.{module}.LARGEST", 1 << 20)
+    monkeypatch.setattr("frametool.formats.rows.arrow_files.LARGEST", 1 << 20)
     xyz = np.random.default_rng(4).normal(size=(200_000, 3))
     given = pa.table(dict(zip(XYZ, xyz.T, strict=True)))
     done = use("apply", "--transform", POSE, data=encoded(given, rows=None))

@@ -2,7 +2,7 @@
 
 x y z are integers of 32 bits, times a scale, plus an offset.  The scale stays; the offset is chosen anew, whole metres
 near the first points that are written, and what does not fit then is an error.  All other dimensions, VLRs and EVLRs
-are kept, a coordinate system among them, which is told.
+are kept, a coordinate system among them, which a warning says.
 """
 
 from __future__ import annotations
@@ -10,21 +10,21 @@ from __future__ import annotations
 from contextlib import contextmanager
 from copy import deepcopy
 from importlib import import_module
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
-from weakref import finalize
 
 import numpy as np
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown, warn
-from frametool.formats.rows.column_file import ColumnNumbers
-from frametool.formats.rows.structured import (
+from frametool.formats.rows.column_file import (
     MOST_ROWS,
+    XYZ,
+    ColumnFile,
+    StructuredBatch,
     bytes_left,
     check_declared,
-    kept_in_file,
     pieces,
-    stamps_of_numbers,
+    seekable,
+    temporary_file,
 )
 
 if TYPE_CHECKING:
@@ -33,15 +33,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.documents.source import InputFile
-    from frametool.formats.rows.column_file import Kind, Made, OutColumn
+    from frametool.formats.rows.column_file import Made, OutColumn
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
-XYZ = ("x", "y", "z")
 STORED = ("X", "Y", "Z")
-DOUBLE = np.dtype(np.float64)
 LIMITS = np.iinfo(np.int32)
 NEW_SCALE = 0.001  # metres, of a file that is made
 COLOURS = {"red", "green", "blue"}
@@ -71,7 +69,7 @@ REFUSED = "it cannot be written as las: {}"
 
 
 @contextmanager
-def _told(name: str, what: str) -> Iterator[None]:
+def _translated(name: str, what: str) -> Iterator[None]:
     """Turn whatever the library raises into one error, with what the library says in the place of {}."""
     try:
         yield
@@ -82,55 +80,33 @@ def _told(name: str, what: str) -> Iterator[None]:
         raise FormatError(what.format(said), source=name) from None
 
 
-class LasBatch:
+class LasBatch(StructuredBatch):
     """Some points."""
 
     def __init__(self, points: Any, names: Sequence[str]) -> None:
         """Take a record of the library and the names of the columns."""
+        super().__init__(points.array)
         self.points = points
         self.names = names
-
-    @property
-    def size(self) -> int:
-        """Count the points."""
-        return len(self.points)
-
-    @property
-    def bytes_read(self) -> int:
-        """Count the bytes of the points, unpacked."""
-        return int(self.points.array.nbytes)
-
-    def numbers(self, place: int) -> ColumnNumbers:
-        """Return a column as floats."""
-        return ColumnNumbers(self.column(place).astype(np.float64))
-
-    def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
-        """Return a column as nanoseconds, and why points have none."""
-        return stamps_of_numbers(self.column(place), in_ns=in_ns)
-
-    def texts(self, place: int) -> list[str]:
-        """Return a column as texts."""
-        return [str(value) for value in self.column(place).tolist()]
 
     def column(self, place: int) -> NDArray[Any]:
         """Return a column as it is."""
         return np.array(self.points[self.names[place]])
 
 
-class LasFile:
+class LasFile(ColumnFile):
     """A scan whose points are read one batch after the other."""
 
-    vectors: tuple[tuple[str, ...], ...] = (("x_t", "y_t", "z_t"),)  # directions of waveforms
+    vectors = (("x_t", "y_t", "z_t"),)  # directions of waveforms
     gaps = False
 
     def __init__(self, file: InputFile) -> None:
         """Read the header; raises FormatError for a broken one, FileProblem where the extra is missing."""
         laspy = _laspy(file.name, packed=file.head()[PACKED_AT : PACKED_AT + 1] >= PACKED)
         self.file = file
-        if bytes_left(file.stream) is None:
-            file.stream = kept_in_file(file.stream, self)
+        file.stream = seekable(file, self)
         whole = bytes_left(file.stream) or 0
-        with _told(file.name, BROKEN):
+        with _translated(file.name, BROKEN):
             self.reader = laspy.open(file.stream, closefd=False)
             header = self.header = self.reader.header
             if not header.are_points_compressed:
@@ -139,19 +115,14 @@ class LasFile:
                 check_declared(file, header.point_count, header.point_format.size, "points", last=last)
             elif header.point_count > whole * MOST_PACKED:
                 raise FormatError(f"the header says {header.point_count} points, in {whole} bytes", source=file.name)
-            others = [name for name in header.point_format.dimension_names if name not in STORED]
-            self.names = (*XYZ, *others)
+            self.names = (*XYZ, *(name for name in header.point_format.dimension_names if name not in STORED))
             probe = laspy.ScaleAwarePointRecord.zeros(1, header=header)
             kinds = [np.array(probe[name]) for name in self.names]
         self.width = len(self.names)
-        self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]
-
-    def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers; None for several in one."""
-        return self.kinds[place]
+        self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]  # several in one are no number
 
     def moved_by(self, pose: Rigid | None) -> None:
-        """Tell that a coordinate system is kept."""
+        """Warn that a coordinate system is kept."""
         del pose
         if any(type(vlr).__name__.startswith(("Wkt", "Geo")) for vlr in self.header.vlrs):
             warn(f"{self.file.name}: its coordinate system (CRS) is kept as it is; is it still that of the points?")
@@ -160,13 +131,13 @@ class LasFile:
         """Yield the points; raises FormatError where the file ends too early."""
         count, done = self.header.point_count, 0
         while done < count:
-            with _told(self.file.name, BROKEN):
-                points = self.reader.read_points(min(MOST_ROWS, count - done))
-            if not len(points) or len(points) < min(MOST_ROWS, count - done):
-                there = done + len(points)
-                raise FormatError(f"the file ends after {there} of {count} points", source=self.file.name)
-            yield LasBatch(points, self.names)
+            wanted = min(MOST_ROWS, count - done)
+            with _translated(self.file.name, BROKEN):
+                points = self.reader.read_points(wanted)
             done += len(points)
+            if len(points) < wanted:
+                raise FormatError(f"the file ends after {done} of {count} points", source=self.file.name)
+            yield LasBatch(points, self.names)
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> LasWriter:
         """Return what writes a file of the same kind."""
@@ -174,7 +145,7 @@ class LasFile:
         if [column.name for column in columns] != list(self.names):
             raise ValueInvalid("the dimensions of las stay as they are; -f npy or csv writes others")
         packed = self.header.are_points_compressed if style.form not in ("las", LAZ) else style.form == LAZ
-        return LasWriter(deepcopy(self.header), columns, packed=packed, given=self)
+        return LasWriter(deepcopy(self.header), columns, packed=packed, name=self.file.name)
 
 
 MOST_PACKED = 1 << 16  # points in a packed byte: far more than any packer makes
@@ -183,22 +154,18 @@ MOST_PACKED = 1 << 16  # points in a packed byte: far more than any packer makes
 class LasWriter:
     """Write points into a file that can be gone back in, as the header wants, and give it out at the end."""
 
-    def __init__(
-        self, header: Any, columns: Sequence[OutColumn], *, packed: bool, given: LasFile | None = None
-    ) -> None:
+    def __init__(self, header: Any, columns: Sequence[OutColumn], *, packed: bool, name: str = "las") -> None:
         """Take a header, whose offsets are chosen when the first points come."""
         self.header = header
         self.columns = columns
         self.packed = packed
-        self.given = given
-        self.name = given.file.name if given else "las"
-        self.kept = TemporaryFile()  # noqa: SIM115 - closed with the writer
-        finalize(self, self.kept.close)
+        self.name = name
+        self.kept = temporary_file(self)
         self.writer: Any = None
         self.count = 0
         self.left_out = 0  # points without numbers
 
-    def of_rows(self, batch: LasBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
+    def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
         """Take the points of a batch, those that have a place; nothing is written yet."""
         columns = [each for each in self.columns if each.passed is None]
         new = {column.name: np.asarray(each.values) for column, each in zip(columns, made, strict=True)}
@@ -210,7 +177,7 @@ class LasWriter:
         if not there.any():
             return b""
         self._begin(new)
-        with _told(self.name, REFUSED):
+        with _translated(self.name, REFUSED):
             self.writer.write_points(self._points(batch, rows, new))
         self.count += len(there)
         return b""
@@ -221,10 +188,9 @@ class LasWriter:
             return
         if set(XYZ) <= new.keys():
             self.header.offsets = np.rint([np.median(new[name]) for name in XYZ])
-        with _told(self.name, REFUSED):
-            self.writer = _laspy(self.name, packed=self.packed).LasWriter(
-                self.kept, self.header, do_compress=self.packed, closefd=False
-            )
+        with _translated(self.name, REFUSED):
+            writer = _laspy(self.name, packed=self.packed).LasWriter
+            self.writer = writer(self.kept, self.header, do_compress=self.packed, closefd=False)
 
     def _points(self, batch: LasBatch | None, rows: Ints | None, new: dict[str, Any]) -> Any:
         """Return points as the library writes them."""
@@ -248,20 +214,17 @@ class LasWriter:
             stored = np.rint((values - offset) / scale)
         bad = ~((stored >= LIMITS.min) & (stored <= LIMITS.max))
         if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            raise FormatError(
-                f"point {self.count + row + 1}: {XYZ[axis]} = {values[row]:g} does not fit 32 bits of {scale:g} m "
-                f"around {offset:g}; give the file a coarser scale, or write -f npy",
-                source=self.name,
-            )
+            row = int(np.argmax(bad))
+            found = f"point {self.count + row + 1}: {XYZ[axis]} = {values[row]:g}"
+            problem = f"{found} does not fit 32 bits of {scale:g} m around {offset:g}"
+            raise FormatError(f"{problem}; give the file a coarser scale, or write -f npy", source=self.name)
         return stored.astype(np.int32)
 
     def end(self) -> Iterator[bytes]:
         """Yield the file."""
         self._begin({})
-        with _told(self.name, REFUSED):
-            evlrs = getattr(self.header, "evlrs", None)
-            if evlrs:
+        with _translated(self.name, REFUSED):
+            if evlrs := getattr(self.header, "evlrs", None):
                 self.writer.write_evlrs(evlrs)
             self.writer.close()
         scales = ", ".join(f"{scale:g}" for scale in dict.fromkeys(map(float, self.header.scales)))
@@ -273,15 +236,13 @@ class LasWriter:
         yield from pieces(self.kept)
 
 
-def open_columns(file: InputFile, options: Options) -> LasFile:
+def open_columns(file: InputFile, _options: Options) -> LasFile:
     """Open a scan; raises FormatError, FileProblem where the extra is missing."""
-    del options
     return LasFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> LasWriter:
+def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> LasWriter:
     """Return what writes points made elsewhere: LAS 1.4, what is no dimension of it as extra bytes."""
-    del count
     laspy = _laspy(style.form)
     names = {column.name for column in columns}
     if not names >= set(XYZ):
@@ -293,6 +254,6 @@ def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> Las
         if column.kind is None:
             raise ValueInvalid(f"las holds numbers; column {shown(column.name)} of texts has no place in it")
         if column.name not in known and column.name not in XYZ:
-            with _told(style.form, REFUSED):
+            with _translated(style.form, REFUSED):
                 header.add_extra_dim(laspy.ExtraBytesParams(name=column.name, type=column.kind.newbyteorder("<")))
     return LasWriter(header, columns, packed=style.form == LAZ)

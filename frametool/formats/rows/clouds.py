@@ -1,0 +1,300 @@
+"""Clouds of points behind a header, as PCD and PLY hold them: records, or lines of numbers between blanks.
+
+What is not changed passes byte for byte: in text blanks, line ends and the digits of other columns too.
+Knows no format: what a header says, and how it is written anew, is theirs.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import chain
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from frametool.errors import FormatError, ValueInvalid, shown
+from frametool.formats.rows.column_file import (
+    WHOLE,
+    Batch,
+    ColumnFile,
+    ColumnNumbers,
+    CountedWriter,
+    encode_records,
+    pieces,
+    record_batches,
+)
+from frametool.text.cells import split_blank
+from frametool.text.lines import read_blocks
+from frametool.text.numbers import explain_number
+from frametool.text.parse import parse_floats
+from frametool.text.spans import MARGIN, Spans, framed, join
+from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from frametool.documents.source import InputFile
+    from frametool.formats.rows.column_file import Kind, Made, OutColumn
+    from frametool.grammar.result import Style
+    from frametool.text.cells import Cells
+    from frametool.text.spans import Ints
+
+Code = TypeVar("Code")
+
+LONGEST_HEAD = 1 << 20  # bytes of a header: a hundred times what the longest known has
+NORMALS: tuple[tuple[str, ...], ...] = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
+_MOST_POINTS = 1 << 62
+_NOT_FINITE = {"nan": np.nan, "inf": np.inf, "infinity": np.inf}
+_EXACT = 2.0**53
+_SINGLE = np.dtype(np.float32)
+
+
+class CloudFile(ColumnFile):
+    """The points of a file whose header is read."""
+
+    vectors = NORMALS
+    gaps = True
+
+    def __init__(self, file: InputFile, names: Sequence[str], record: Kind, count: int, what: str = "points") -> None:
+        """Take the columns, the type of a point as a record, and how many points there are, which are called so."""
+        self.file = file
+        self.names: tuple[str, ...] = tuple(names)
+        self.width = len(names)
+        self.record = record
+        self.kinds = [record[place] for place in range(len(names))]
+        self.count = count
+        self.what = what
+        self.text: TextRows | None = None
+        self.is_last = True  # nothing stands behind the points
+        self.behind = b""
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the points; raises FormatError where the file ends too early, or holds more."""
+        if self.text is not None:
+            yield from self.text.batches()
+            self.behind = self.text.check_end() if self.is_last else b""
+            return
+        yield from record_batches(self.file, self.record, self.count)
+        self.behind = self.file.stream.read(self.record.itemsize) if self.is_last else b""
+        if self.behind and len(self.behind) == self.record.itemsize:
+            raise FormatError(f"the header says {self.count} {self.what}, more follow", source=self.file.name)
+
+    def rest(self) -> Iterable[bytes]:
+        """Yield what stands behind the points."""
+        return (self.behind,)
+
+    def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
+        """Return the header with what changed in it, and all that stands before the points; raises ValueInvalid."""
+        raise NotImplementedError
+
+    def record_with(self, columns: Sequence[OutColumn]) -> Kind:
+        """Return the type of a point that has other columns; raises ValueInvalid for what the format cannot hold."""
+        raise NotImplementedError
+
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> CountedWriter:
+        """Return what writes a cloud of the same kind."""
+        head, count = partial(self.header, columns), None if drops else self.count
+        if self.text is None:
+            kind = self.record if same_columns(columns, self.width) else self.record_with(columns)
+            return CountedWriter(partial(encode_records, columns, kind), head, count, self.rest)
+        beyond = columns[self.width :]
+        if not same_columns(columns[: self.width], self.width) or any(column.passed is not None for column in beyond):
+            raise ValueInvalid("columns of an ascii cloud stay as they are; -f csv writes others")
+        return CountedWriter(partial(encode_text, columns, style), head, count, self.rest)
+
+
+def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
+    """Tell whether the columns of an output are those of the input, each in its place."""
+    return len(columns) == width and all(column.passed in (None, at) for at, column in enumerate(columns))
+
+
+def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
+    """Read how many there are of something, which an error calls `what`; raises FormatError."""
+    if not (word.isascii() and word.isdecimal()) or len(word) > 19 or int(word) > _MOST_POINTS:
+        raise fail(f"{what} is no count")
+    return int(word)
+
+
+def type_in(form: str, part: str, codes: Mapping[str, Code], column: OutColumn, taken: str = "") -> Code:
+    """Return how a format calls the type of a column; raises ValueInvalid for what it cannot hold.
+
+    part: what it calls a column; codes: what it calls the types of numpy, without their byte order
+    taken: a name that has a meaning
+    """
+    name = shown(column.name)
+    if column.kind is None:
+        raise ValueInvalid(f"{form} holds numbers; column {name} of texts has no place in it")
+    if column.kind.str[1:] not in codes:
+        raise ValueInvalid(f"{form} has no type for {column.kind}, that of column {name}")
+    if column.name.split() != [column.name] or column.name == taken:
+        raise ValueInvalid(f"{name} cannot be the name of a {part} of {form}: one word without blanks")
+    return codes[column.kind.str[1:]]
+
+
+# --- points as lines of text ---
+
+
+class TextRows:
+    """The rows of a stream of text, batch after batch, and what follows them.
+
+    line: that of the next row, from 1
+    """
+
+    def __init__(self, cloud: CloudFile, at: Sequence[int], width: int, line: int) -> None:
+        """Take where the columns of a cloud stand among the `width` cells of a row."""
+        self.cloud = cloud
+        self.at = at
+        self.width = width
+        self.line = line
+        self._rest = b""
+
+    def problem(self, message: str, line: int = 0) -> FormatError:
+        """Return the error for a line, or for the file."""
+        return FormatError(message, source=self.cloud.file.name, line=line)
+
+    def batches(self) -> Iterator[TextBatch]:
+        """Yield the rows; raises FormatError for a row of another width, or where the file ends too early."""
+        done, count = 0, self.cloud.count
+        for block in read_blocks(self.cloud.file.stream) if count else ():  # type: ignore[arg-type]
+            batch = self._batch(block, count - done)
+            done += batch.size
+            yield batch
+            self.line += len(batch.cells.counts)
+            if done == count:
+                return
+        if done < count:
+            raise self.problem(f"the header says {count} points, the file holds {done}")
+
+    def _batch(self, block: bytes, most: int) -> TextBatch:
+        """Split a block into cells, and keep what stands behind the last row that is wanted."""
+        cells = split_blank(block, self.width, comment=b"")
+        filled = np.flatnonzero(cells.counts)
+        if len(filled) > most:
+            end = int(cells.line_ends[filled[most - 1]]) - MARGIN
+            self._rest = block[end:]
+            cells = split_blank(block[:end], self.width, comment=b"")
+        wrong = np.flatnonzero((cells.counts != self.width) & (cells.counts != 0))
+        if wrong.size:
+            columns = " ".join(self.cloud.names[:8]) + " .." * (self.width > 8)
+            found = int(cells.counts[wrong[0]])
+            raise self.problem(f"expected {self.width} numbers ({columns}), found {found}", self.line + int(wrong[0]))
+        return TextBatch(cells, self)
+
+    def behind(self) -> Iterator[bytes]:
+        """Yield what stands behind the last row."""
+        return chain((self._rest,), pieces(self.cloud.file.stream))
+
+    def check_end(self) -> bytes:
+        """Return the blanks behind the last row; raises FormatError where more rows stand there."""
+        blanks: list[bytes] = []
+        for piece in self.behind():
+            if piece.strip():
+                count = self.cloud.count
+                raise self.problem(f"the header says {count} points, more rows follow; correct the header", self.line)
+            blanks.append(piece)
+        return b"".join(blanks)
+
+
+class TextBatch(Batch):
+    """Some rows; a number that is not finite stands for no number."""
+
+    def __init__(self, cells: Cells, table: TextRows) -> None:
+        """Take the cells of the rows that a table reads next."""
+        self.cells = cells
+        self.table = table
+        self.line = table.line
+        self.size = len(cells.rows)
+        self.bytes_read = len(cells.data) - 2 * MARGIN
+
+    def _problem(self, row: int, place: int, reason: str) -> FormatError:
+        message = f"{self.table.cloud.names[place]}: {reason}"
+        return self.table.problem(message, self.line + int(self.cells.rows[row]))
+
+    def numbers(self, place: int) -> ColumnNumbers:
+        """Return a column as floats; raises FormatError for a cell that is not a number."""
+        column = self.cells.column(self.table.at[place])
+        values, bad = parse_floats(column)
+        for row in bad.tolist():
+            text = column.text(row).decode("utf-8", "replace")
+            known = _NOT_FINITE.get(text.lower().lstrip("+-"))
+            if known is None:
+                raise self._problem(row, place, explain_number(text))
+            values[row] = -known if text.startswith("-") else known
+        return ColumnNumbers(values)
+
+    def texts(self, place: int) -> list[str]:
+        """Return a column as texts."""
+        column = self.cells.column(self.table.at[place])
+        return [column.text(row).decode("utf-8", "replace") for row in range(self.size)]
+
+    def column(self, place: int) -> Any:
+        """Return a column as numbers of its kind; raises FormatError for a number that is not of this kind."""
+        kind, values = self.table.cloud.record[place], self.numbers(place).values
+        if kind.kind not in WHOLE:
+            return values.astype(kind)
+        try:
+            return np.array([int(text) for text in self.texts(place)], kind)
+        except (ValueError, OverflowError):  # written with a point, or too large
+            limits = np.iinfo(kind)
+        whole = (values == np.rint(values)) & (abs(values) < _EXACT)
+        good = whole & (values >= limits.min) & (values <= limits.max)
+        if not good.all():
+            row = int(np.argmin(good))
+            raise self._problem(row, place, f"{self.texts(place)[row]} is no {kind.name}")
+        return values.astype(kind)
+
+
+def encode_text(
+    columns: Sequence[OutColumn], style: Style, batch: TextBatch, rows: Ints | None, made: Sequence[Made]
+) -> bytes:
+    """Return rows as they were, with what is made in the place of their cells, or behind them in further columns."""
+    cells = batch.cells
+    chosen = np.arange(batch.size) if rows is None else rows
+    if not len(chosen):
+        return b"" if rows is not None else cells.data[MARGIN:-MARGIN].tobytes()
+    lines = cells.rows[chosen]
+    at, ends = cells.line_starts[lines], cells.line_ends[lines]
+    if rows is None:  # what stands between rows, or behind the last, belongs to one of them
+        at = np.concatenate([[MARGIN], ends[:-1]])
+        ends = np.append(ends[:-1], len(cells.data) - MARGIN)
+    new, parts = iter(made), list[Spans]()
+    for place, column in enumerate(columns):
+        if column.passed is not None:
+            continue
+        values = next(new).values
+        written = _written(values, column, style)
+        if place < len(batch.table.at):
+            cell = batch.table.at[place]
+            start, end = cells.starts[chosen, cell], cells.ends[chosen, cell]
+            parts += [Spans(cells.data, at, start), _unless_lost(written, values, Spans(cells.data, start, end))]
+        else:
+            end, blank = cells.ends[chosen, -1], np.full(len(chosen), MARGIN)
+            parts += [Spans(cells.data, at, end), Spans(framed(b" "), blank, blank + 1), written]
+        at = end
+    return join([*parts, Spans(cells.data, at, ends)])
+
+
+def _written(numbers: Any, column: OutColumn, style: Style) -> Spans:
+    """Write numbers as the shortest text of their kind, or with so many decimals."""
+    if column.kind is None:
+        raise ValueInvalid(f"column {column.name} holds texts; the rows of a cloud are numbers")
+    values = np.asarray(numbers, np.float64).reshape(-1, 1)
+    if style.precision is not None:
+        spans = fixed_spans(values, style.precision, b" ")
+    else:
+        spans = shortest_spans(rounded_to_single(values) if column.kind == _SINGLE else values, b" ")
+    return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
+
+
+def _unless_lost(new: Spans, values: Any, old: Spans) -> Spans:
+    """Keep the text of cells that held no number, and still do: `-nan` stays."""
+    lost = np.flatnonzero(~np.isfinite(values))
+    first = old.data[old.starts[lost]]
+    first = old.data[old.starts[lost] + ((first == ord("-")) | (first == ord("+")))]
+    lost = lost[first >= ord("A")]
+    if not lost.size:
+        return new
+    starts, ends = new.starts.copy(), new.ends.copy()
+    starts[lost] = old.starts[lost] + len(new.data)
+    ends[lost] = old.ends[lost] + len(new.data)
+    return Spans(np.concatenate([new.data, old.data]), starts, ends)
