@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import repeat
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -60,6 +61,21 @@ class Samples(NamedTuple):
     def edges(self) -> Iterator[Edge]:
         """Yield the poses as edges."""
         return map(self.edge, range(len(self.stamps_ns)))
+
+
+class EdgeColumns(NamedTuple):
+    """Edges of several frames that move, column by column, in the order they were written."""
+
+    parents: Sequence[str]
+    children: Sequence[str]
+    components: Sequence[Rigid]
+    stamps_ns: Sequence[int]
+    lines: Sequence[int]
+    topics: Iterable[str] = ()
+
+    def edges(self) -> Iterator[Edge]:
+        """Yield them as edges."""
+        return map(Edge, *self[:5], repeat(None), repeat(()), self.topics or repeat(""))
 
 
 def stop(error: FormatError) -> None:

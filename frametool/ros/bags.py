@@ -166,7 +166,7 @@ def _edge(message: Any, number: int, path: str, options: Options, topic: str) ->
     named, moved, turned = _parts(message, topic, options)
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
     parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(named)
-    components = unit_components(tally, number, *numbers, normalize=options.normalize)
+    components = unit_components(numbers, number, tally, options.normalize)
     if components is None or not parent or not child:
         problem = _complaint(parent, child, numbers, normalize=options.normalize)
         edge = f"{shown(parent)} -> {shown(child)}"
