@@ -309,20 +309,18 @@ class Assembly:
     def add_columns(self, file: Recording, columns: EdgeColumns) -> None:
         """Add edges: what only goes on with its frame comes in whole, frame by frame, the rest one by one."""
         pairs = [*zip(columns.parents, columns.children, strict=True)]
-        found = {pair: Samples(*pair, [], [], []) for pair in dict.fromkeys(pairs)}
-        for pair, stamp_ns, pose, line in zip(pairs, columns.stamps_ns, columns.components, columns.lines, strict=True):
-            _, _, stamps_ns, poses, lines = found[pair]
-            stamps_ns.append(stamp_ns)
-            poses.append(pose)
-            lines.append(line)
+        rows: dict[tuple[str, str], list[tuple[int, Rigid, int]]] = {pair: [] for pair in pairs}
+        for pair, row in zip(pairs, zip(*columns[2:5], strict=True), strict=True):
+            rows[pair].append(row)
+        found = {pair: Samples(*pair, *zip(*each, strict=True)) for pair, each in rows.items()}
         whole = {}
         if all(self._goes_on(*pair) for pair in found):  # with a new edge among them their order decides on cycles
             whole = {pair: samples for pair, samples in found.items() if self._takes_whole(samples)}
         for samples in whole.values():
             self.add_samples(SamplesOfFile(file, samples))
-        for edge in columns.edges() if len(whole) < len(found) else ():
-            if (edge.parent, edge.child) not in whole:
-                self.add(edge.parent, edge.child, edge.components, edge.stamp_ns, EdgePlace(file, edge))
+        for pair, edge in zip(pairs, columns.edges(), strict=True) if len(whole) < len(found) else ():
+            if pair not in whole:
+                self.add(*pair, edge.components, edge.stamp_ns, EdgePlace(file, edge))
 
     def _goes_on(self, parent: str, child: str) -> bool:
         """Tell whether a frame is known to move, now in this parent."""

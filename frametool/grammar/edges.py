@@ -68,14 +68,17 @@ class EdgeColumns(NamedTuple):
 
     parents: Sequence[str]
     children: Sequence[str]
-    components: Sequence[Rigid]
     stamps_ns: Sequence[int]
+    components: Sequence[Rigid]
     lines: Sequence[int]
     topics: Iterable[str] = ()
 
     def edges(self) -> Iterator[Edge]:
         """Yield them as edges."""
-        return map(Edge, *self[:5], repeat(None), repeat(()), self.topics or repeat(""))
+        parents, children, stamps_ns, components, lines, topics = self
+        return map(
+            Edge, parents, children, components, stamps_ns, lines, repeat(None), repeat(()), topics or repeat("")
+        )  # fmt: skip
 
 
 def stop(error: FormatError) -> None:

@@ -162,8 +162,8 @@ def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Itera
 def piece_messages(piece: Piece, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:
     """Yield the messages of documents that end in `---`, or of lines."""
     if form == "jsonl":
-        for number, line in enumerate(piece.text.split("\n"), piece.line):
-            yield from line_messages(line, number, name, tally)
+        for number, text in enumerate(piece.text.split("\n"), piece.line):
+            yield from line_messages(text, number, name, tally)
         return
     at, line = 0, piece.line
     while at < len(piece.text):

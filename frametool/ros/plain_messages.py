@@ -16,6 +16,7 @@ messages are left to the full reader, so that both give the same records.
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from itertools import accumulate
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -107,8 +108,9 @@ def _pattern(layout: str, groups: Mapping[str, str]) -> str:
 
 def _layout(opening: str, entry: str, between: str, closing: str, *lines: int) -> Layout:
     """Make a layout from the patterns of its parts."""
-    parts = (opening, entry, f"{between}|{closing}{opening}", f"{closing}|\\Z" if lines else closing)
-    return Layout(*(re.compile(part, re.ASCII) for part in parts), *lines)
+    gap, end = f"{between}|{closing}{opening}", f"{closing}|\\Z" if lines else closing
+    first, each, inner, last = (re.compile(part, re.ASCII) for part in (opening, entry, gap, end))
+    return Layout(first, each, inner, last, *lines)
 
 
 def _echoed(entry: str) -> Layout:
@@ -164,7 +166,7 @@ def plain_columns(text: str, line: int, tally: Tally, *, normalize: bool = False
         named = (str(found[gap][1] or "")[1:-1] for gap in gaps)  # type: ignore[index]
         topics = accumulate(named, lambda before, topic: topic or before, initial=opened[1][1:-1])
     parents, children = ([names[each] for each in column] for column in (parents, children))
-    return EdgeColumns(parents, children, components, stamps_ns, lines, topics)
+    return EdgeColumns(parents, children, stamps_ns, components, lines, topics)
 
 
 def _components(
@@ -172,16 +174,16 @@ def _components(
 ) -> list[Rigid] | None:
     """Read tx, ty, tz, x, y, z, w of each row; None, and no notes, if one of them is refused."""
     rough = len(tally.rough)
-    found: list[Rigid | None] = []
-    try:
+    found: list[Rigid] = []
+    with suppress(ValueError):  # of float
         for row, line in zip(zip(*(map(float, column) for column in columns), strict=True), lines, strict=True):
-            found.append(unit_components(row, line, tally, normalize))
-    except ValueError:
-        found.append(None)
-    if None in found:
-        del tally.rough[rough:]
-        return None
-    return found
+            if (components := unit_components(row, line, tally, normalize)) is None:
+                break
+            found.append(components)
+    if len(found) == len(lines):
+        return found
+    del tally.rough[rough:]
+    return None
 
 
 def unit_components(numbers: Rigid, line: int, tally: Tally, normalize: bool) -> Rigid | None:  # noqa: FBT001 - fast
