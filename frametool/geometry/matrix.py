@@ -206,7 +206,8 @@ def as_six_d(x: N, y: N, z: N, w: N) -> Six[N]:
 
 def six_d_deviation(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> N:
     """Return 0 where two columns span a plane, else inf."""
-    sine = length(*quaternion.cross(*quaternion.unit_vector(ax, ay, az, xp), *quaternion.unit_vector(bx, by, bz, xp)), xp)
+    first, second = quaternion.unit_vector(ax, ay, az, xp), quaternion.unit_vector(bx, by, bz, xp)
+    sine = length(*quaternion.cross(*first, *second), xp)
     return xp.where(sine > PARALLEL, 0.0, inf)
 
 

@@ -13,9 +13,8 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Note
-from frametool.ros.message_parts import STAMPS, stamp_problem
+from frametool.ros.messages import STAMPS, body_of, stamp_problem
 from frametool.ros.messages import TYPES as POSES
-from frametool.ros.messages import body_of
 from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:

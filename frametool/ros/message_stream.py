@@ -339,9 +339,7 @@ def _read(
 ) -> tuple[str, str, Rigid, int | None]:
     """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
     if options.raw and "header" in transform:
-        from frametool.ros.tf2_input import read_transform
-
-        return read_transform(transform)
+        return messages.read_raw_transform(transform)
     if is_pose(transform):
         found = read_pose(transform, reading, body_of(topic, options.answers))
     else:

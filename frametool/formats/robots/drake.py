@@ -25,7 +25,7 @@ from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import read_name
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, read_texts, within
 from frametool.grammar.rotation_spelling import rotation_of
-from frametool.ros.message_parts import only
+from frametool.ros.messages import only
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -234,9 +234,7 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
 def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
     """Read one TransformStamped, checked, or as tf2 receives it."""
     if reading.raw:
-        from frametool.ros.tf2_input import read_transform
-
-        parent, child, components, stamp_ns = read_transform(message)
+        parent, child, components, stamp_ns = messages.read_raw_transform(message)
         return Edge(parent, child, components, stamp_ns, path=path)
     parent, child, position, rotation, stamp_ns = messages.read_transform(message, reading)
     return Edge(parent, child, (*position, *rotation), stamp_ns, path=path)
