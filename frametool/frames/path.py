@@ -10,6 +10,7 @@ from operator import attrgetter
 from frametool.errors import BadTopology, NotConnected, bare, shown
 from frametool.frames.track import StandingTrack
 from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry.rigid import IDENTITY
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     Edge = TypeVar("Edge")
 
 MOST_SHOWN = 16  # frames of a cycle
-IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
@@ -85,12 +85,12 @@ def compose_path(
 
 def _product(edges: Sequence[Edge], sample: Callable[[Edge], Rigid | None]) -> Rigid | None:
     """Compose the edges of one branch, topmost first."""
-    product = IDENTITY
+    product = None
     for here in map(sample, edges):
         if here is None:
             return None
-        product = here if product is IDENTITY else rigid.compose(*product, *here)
-    return product
+        product = here if product is None else rigid.compose(*product, *here)
+    return IDENTITY if product is None else product
 
 
 def cycle_message(frames: list[str]) -> str:

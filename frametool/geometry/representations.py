@@ -227,7 +227,7 @@ def _of_homogeneous(m: Components) -> tuple[Components, Components]:
     return (m[3], m[7], m[11]), (*m[0:3], *m[4:7], *m[8:11])
 
 
-LAST_ROW = (0.0, 0.0, 0.0, 1.0)
+LAST_ROW = (0.0, 0.0, 0.0, 1.0)  # of a homogeneous matrix
 HOMOGENEOUS = Whole(
     "m11 m12 m13 m14 m21 m22 m23 m24 m31 m32 m33 m34 m41 m42 m43 m44", _homogeneous, _of_homogeneous, LAST_ROW
 )

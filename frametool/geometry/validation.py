@@ -15,6 +15,7 @@ from math import isfinite
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.quaternion import SILENT
+from frametool.geometry.representations import LAST_ROW
 
 TYPE_CHECKING = False
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array, Components, Kernel, Numbers
 
-LAST_ROW = (0.0, 0.0, 0.0, 1.0)  # of a homogeneous matrix
 
 
 

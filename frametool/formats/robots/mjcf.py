@@ -23,9 +23,9 @@ from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.model import Joint, JointValue, Link
 from frametool.formats.robots.posture import Posture, Setting
-from frametool.frames.path import IDENTITY
 from frametool.geometry import floats, matrix, quaternion, rigid, vectors
 from frametool.geometry.quaternion import cross, unit_vector
+from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.trig import DEGREE, half_sincos, half_sincos_deg
 from frametool.grammar.edges import Edge, Options, Tally, Topics
 

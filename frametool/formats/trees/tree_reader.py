@@ -18,6 +18,7 @@ from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile, Pasted, Source, pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown, warn
 from frametool.frames.stamps import parse_stamp
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, within
@@ -37,7 +38,6 @@ TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
-IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 CHILDREN = frozenset(("children", *TIMED))
 
 
