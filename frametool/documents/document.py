@@ -15,8 +15,7 @@ import re
 from typing import Any, NamedTuple
 
 from frametool.documents.json import json_events, looks_like_json, parse_json
-from frametool.documents.marks import END, LEAF, MAP, find_marks, mark_of
-from frametool.documents.source import Source, check_text, error_at, places_of
+from frametool.documents.source import END, LEAF, MAP, Source, check_text, error_at, find_marks, mark_of, places_of
 from frametool.errors import FormatError
 from frametool.text.numbers import odd_characters
 
@@ -25,7 +24,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-    from frametool.documents.marks import Event, Path
+    from frametool.documents.source import Event, Path
 
 _BYTE_ORDER_MARK = "\ufeff"
 _TIGHT_COLON = r"([\w./-]+):(?=[^\s:/])"

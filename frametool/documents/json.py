@@ -11,8 +11,18 @@ from __future__ import annotations
 import re
 import sys
 
-from frametool.documents.marks import END, LEAF, LIST, MAP, repeated_key
-from frametool.documents.source import DEEPEST, MOST_CONTAINERS, Source, error_at, too_much
+from frametool.documents.source import (
+    DEEPEST,
+    END,
+    LEAF,
+    LIST,
+    MAP,
+    MOST_CONTAINERS,
+    Source,
+    error_at,
+    repeated_key,
+    too_much,
+)
 from frametool.errors import FormatError
 
 TYPE_CHECKING = False
@@ -21,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Any
 
-    from frametool.documents.marks import Event
+    from frametool.documents.source import Event
 
 JSON_NUMBER = r"-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+"
 _BLANKS = re.compile(r"[ \t\n\r]*")

@@ -34,8 +34,20 @@ from yaml.events import (
     StreamEndEvent,
 )
 
-from frametool.documents.marks import END, LEAF, LIST, MAP, repeated_key
-from frametool.documents.source import DEEPEST, MOST_CONTAINERS, Source, error_at, line_of, paused_collector, too_much
+from frametool.documents.source import (
+    DEEPEST,
+    END,
+    LEAF,
+    LIST,
+    MAP,
+    MOST_CONTAINERS,
+    Source,
+    error_at,
+    line_of,
+    paused_collector,
+    repeated_key,
+    too_much,
+)
 from frametool.errors import FormatError, shown
 from frametool.text.numbers import odd_characters
 
@@ -45,7 +57,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
     from typing import Any, TypeAlias
 
-    from frametool.documents.marks import Event
+    from frametool.documents.source import Event
 
     Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent

@@ -10,9 +10,9 @@ from frametool.errors import printable
 from frametool.explain.formula_tree import latex_number
 from frametool.explain.operations import between, compose, inverse
 from frametool.explain.sheet import upright
-from frametool.frames.path import IDENTITY
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import floats, rigid
+from frametool.geometry.rigid import IDENTITY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

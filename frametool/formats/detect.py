@@ -75,7 +75,7 @@ class Beginning:
     def json_paths(self) -> set[tuple[str, ...]]:
         """Return the ways to the keys of JSON; lists on the way do not count."""
         from frametool.documents.json import json_events, looks_like_json
-        from frametool.documents.marks import END, LEAF, MAP
+        from frametool.documents.source import END, LEAF, MAP
 
         text = self.text[:LOOKED_AT].lstrip()
         paths: set[tuple[str, ...]] = set()
@@ -110,7 +110,7 @@ class Beginning:
 
         A list in between is a `[`.
         """
-        from frametool.documents.marks import END, LEAF, LIST, MAP
+        from frametool.documents.source import END, LEAF, LIST, MAP
         from frametool.documents.yaml import yaml_events
 
         found: set[str] = set()

@@ -32,7 +32,7 @@ from frametool.formats.detect import detect, of_folder
 from frametool.formats.table import BAG, FORMATS, readers
 from frametool.frames.lookups import FrameTree
 from frametool.frames.policy import Refused
-from frametool.grammar.edges import Answers, Edge, Options, Samples, Tally, Topics, stop
+from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, stop
 
 TYPE_CHECKING = False
 
@@ -129,15 +129,15 @@ class Recording(InputFile):
     ) -> Iterator[Edge]:
         """Yield the edges in the order they were written, then warn of what was odd; otherwise as `pieces`."""
         for piece in self.pieces(report, tell=tell, raw=raw, normalize=normalize):
-            if isinstance(piece, Samples):
-                yield from piece.edges()
-            else:
+            if isinstance(piece, Edge):
                 yield piece
+            else:
+                yield from piece.edges()
 
     def pieces(
         self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
-    ) -> Iterator[Edge | Samples]:
-        """Yield edges, and the poses of one frame that come in bulk as one piece, in the order they were written.
+    ) -> Iterator[Edge | Samples | EdgeColumns]:
+        """Yield edges, one by one or in bulk, in the order they were written.
 
         report: takes the errors, and reading goes on behind them where it can; without it the first one is raised.
         tell: without it what was odd is only kept, in `tally`.  raw: messages as tf2 receives them, unchecked.
@@ -305,6 +305,27 @@ class Assembly:
             return
         for at, (stamp_ns, pose) in enumerate(zip(stamps_ns, components, strict=True)):
             self.add(parent, child, pose, stamp_ns, placed.place(at))
+
+    def add_columns(self, file: Recording, columns: EdgeColumns) -> None:
+        """Add edges: what only goes on with its frame comes in whole, frame by frame, the rest one by one."""
+        pairs = [*zip(columns.parents, columns.children, strict=True)]
+        rows: dict[tuple[str, str], list[tuple[int, Rigid, int]]] = {pair: [] for pair in pairs}
+        for pair, row in zip(pairs, zip(*columns[2:5], strict=True), strict=True):
+            rows[pair].append(row)
+        found = {pair: Samples(*pair, *zip(*each, strict=True)) for pair, each in rows.items()}
+        whole = {}
+        if all(self._goes_on(*pair) for pair in found):  # with a new edge among them their order decides on cycles
+            whole = {pair: samples for pair, samples in found.items() if self._takes_whole(samples)}
+        for samples in whole.values():
+            self.add_samples(SamplesOfFile(file, samples))
+        for pair, edge in zip(pairs, columns.edges(), strict=True) if len(whole) < len(found) else ():
+            if pair not in whole:
+                self.add(*pair, edge.components, edge.stamp_ns, EdgePlace(file, edge))
+
+    def _goes_on(self, parent: str, child: str) -> bool:
+        """Tell whether a frame is known to move, now in this parent."""
+        track = None if self.buffer is None or child not in self._moves else self.buffer.track(child)
+        return track is not None and not track.standing and track.parent == parent
 
     def _takes_whole(self, samples: Samples) -> bool:
         """Tell whether samples can only follow what is known: of a frame that is new or moves in the same parent."""
@@ -522,7 +543,9 @@ def _add(assembly: Assembly, file: Recording) -> None:
     piece = None
     rules = assembly.rules
     for piece in file.pieces(raw=rules.policy != "frametool", normalize=rules.normalize):
-        if isinstance(piece, Samples):
+        if isinstance(piece, EdgeColumns):
+            assembly.add_columns(file, piece)
+        elif isinstance(piece, Samples):
             assembly.add_samples(SamplesOfFile(file, piece))
         elif piece.parent is None:
             assembly.add_root(piece.child)

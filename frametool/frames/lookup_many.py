@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.frames.lookups import Frames
-    from frametool.frames.query import Query
+    from frametool.frames.path import Query
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
 

@@ -14,9 +14,8 @@ from math import ceil, floor
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadTopology, NoDataAt, NotConnected, ValueInvalid, shown, warn
-from frametool.frames.path import cycle_message, edges_between, to_root
+from frametool.frames.path import Query, cycle_message, edges_between, to_root
 from frametool.frames.policy import FRAMETOOL
-from frametool.frames.query import Query
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.track import StandingTrack
 from frametool.geometry import rigid

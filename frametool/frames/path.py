@@ -1,24 +1,28 @@
-"""The way between two frames of a tree: which edges, and their product.
+"""The way between two frames of a tree: which edges, and their product, now or at a time.
 
-Knows names and parents only. Trees that stand still and trees that move both ask here.
+Trees that stand still and trees that move both ask here; what stands still is composed once for all times.
 """
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 from frametool.errors import BadTopology, NotConnected, bare, shown
-from frametool.geometry import rigid
+from frametool.frames.track import StandingTrack
+from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry.rigid import IDENTITY
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import TypeVar
 
+    from frametool.frames.track import Track
     from frametool.geometry.types import Rigid
 
     Edge = TypeVar("Edge")
 
 MOST_SHOWN = 16  # frames of a cycle
-IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
@@ -81,12 +85,12 @@ def compose_path(
 
 def _product(edges: Sequence[Edge], sample: Callable[[Edge], Rigid | None]) -> Rigid | None:
     """Compose the edges of one branch, topmost first."""
-    product = IDENTITY
+    product = None
     for here in map(sample, edges):
         if here is None:
             return None
-        product = here if product is IDENTITY else rigid.compose(*product, *here)
-    return product
+        product = here if product is None else rigid.compose(*product, *here)
+    return IDENTITY if product is None else product
 
 
 def cycle_message(frames: list[str]) -> str:
@@ -95,3 +99,66 @@ def cycle_message(frames: list[str]) -> str:
         left_out = f"({len(frames) - MOST_SHOWN} more)"
         frames = [*frames[: MOST_SHOWN // 2], left_out, *frames[-MOST_SHOWN // 2 :]]
     return f"frames form a cycle: {' <- '.join(map(bare, reversed(frames)))}"
+
+
+class Query:
+    """The way between two frames, from their common ancestor down to the target and down to the source.
+
+    fixed: the answer, where nothing on the way moves; otherwise None
+    moving: the edges that move
+    """
+
+    __slots__ = ("fixed", "moving", "to_source", "to_target")
+
+    def __init__(self, to_target: Sequence[Track], to_source: Sequence[Track]) -> None:
+        """Compose what stands still; both branches come topmost edge first."""
+        self.moving = [track for track in (*to_target, *to_source) if not track.standing]
+        self.fixed: Rigid | None = None
+        self.to_target: Sequence[Track] = ()
+        self.to_source: Sequence[Track] = ()
+        if self.moving:
+            self.to_target, self.to_source = _folded(to_target), _folded(to_source)
+        else:
+            self.fixed = compose_path(to_target, to_source, attrgetter("components"))
+
+    def compose(self, sample: Callable[[Track], Rigid | None]) -> Rigid | None:
+        """Return target_from_source of the poses that `sample` finds for the edges."""
+        return compose_path(self.to_target, self.to_source, sample)
+
+    def at(self, at_ns: int) -> Rigid | None:
+        """Return target_from_source at a time; None if an edge has no data then."""
+        found = self.fixed or self.compose(lambda track: track.at(at_ns))
+        if found is None or found is self.fixed:
+            return found
+        tx, ty, tz, x, y, z, w = found
+        return tx, ty, tz, *quaternion.unit(x, y, z, w, floats)
+
+    def latest(self, *, zero_counts: bool = True) -> int | None:
+        """Return the newest stamp that every moving edge has reached; None when all stand still.
+
+        zero_counts: otherwise edges whose newest stamp is 0 are passed over, as tf2 does.
+        """
+        newest = [track.last_ns for track in self.moving]
+        return min((stamp for stamp in newest if stamp or zero_counts), default=None)
+
+    @property
+    def span(self) -> tuple[int, int] | None:
+        """Return the first and last time at which every moving edge has data; None if none moves.
+
+        They never overlap where the first is after the last.
+        """
+        if not self.moving:
+            return None
+        return max(track.first_ns for track in self.moving), min(track.last_ns for track in self.moving)
+
+
+def _folded(tracks: Sequence[Track]) -> list[Track]:
+    """Compose neighbours that stand still."""
+    pieces: list[Track] = []
+    for track in tracks:
+        if pieces and track.standing and pieces[-1].standing:
+            pose = rigid.compose(*pieces[-1].components, *track.components)
+            pieces[-1] = StandingTrack(track.child, pieces[-1].parent, pose)
+        else:
+            pieces.append(track)
+    return pieces

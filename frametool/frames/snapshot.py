@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 from frametool.errors import BadTopology, LookupFailed
-from frametool.frames.path import IDENTITY
 from frametool.geometry import rigid
+from frametool.geometry.rigid import IDENTITY
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

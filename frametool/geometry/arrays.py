@@ -1,6 +1,7 @@
 """The functions kernels find in `xp` when their components are numpy arrays, and the walk over long ones in blocks.
 
-The only module of the core that needs numpy at import.
+The array that a caller wants results in may have any strides, and may lie where the input lies: the results are those
+of a fresh array all the same.  The only module of the core that needs numpy at import.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 from numpy import fmod, frexp, ldexp, maximum, minimum, sqrt
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import out_array, trig
+from frametool.geometry import trig
 
 __all__ = [
     "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
@@ -176,10 +177,10 @@ def rows(
     """
     shape = (*batch_shape(parts), *inner)
     if out is not None:
-        out_array.require_fitting(out, shape)
-        columns = out_array.flat_columns(out, len(inner))
-        touched = tuple(part for part in parts if out_array.shares_memory(out, (part,)))
-        if columns is not None and (not touched or out_array.in_step(out, len(inner), touched)):
+        require_fitting(out, shape)
+        columns = flat_columns(out, len(inner))
+        touched = tuple(part for part in parts if shares_memory(out, (part,)))
+        if columns is not None and (not touched or in_step(out, len(inner), touched)):
             walk(kernel, parts, columns, *args)
             return out
     fresh = np.empty(shape)
@@ -263,3 +264,42 @@ def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:
 def _cut(column: Number, start: int, stop: int) -> Number:
     """Return a block of a column as contiguous float64; a float stands for every row."""
     return column if isinstance(column, float) else np.ascontiguousarray(column[start:stop], dtype=np.float64)
+
+
+def require_fitting(out: object, shape: tuple[int, ...]) -> None:
+    """Raise ValueInvalid unless `out` is a numpy array of float64, writable and of this shape."""
+    if not isinstance(out, np.ndarray):
+        found = f"a {type(out).__name__}"
+    elif out.dtype != np.float64:
+        found = f"one of {out.dtype}"
+    elif out.shape != shape:
+        found = f"shape {out.shape}"
+    elif not out.flags.writeable:
+        found = "a read-only one"
+    else:
+        return
+    raise ValueInvalid(f"out: expected a writable float64 array of shape {shape}, got {found}")
+
+
+def flat_columns(out: Array, axes: int) -> Sequence[Array] | None:
+    """Return flat views of each component of rows that fill the last axes; None where strides allow no such view."""
+    out, shape = out.view(np.ndarray), out.shape[out.ndim - axes :]  # of a np.matrix no component has one axis
+    if out.flags.c_contiguous:
+        return list(out.reshape(-1, int(np.prod(shape))).T)
+    columns = [out[(..., *place)].reshape(-1) for place in np.ndindex(*shape)]
+    return columns if np.may_share_memory(columns[0], out) else None
+
+
+def shares_memory(out: Array, parts: Components) -> bool:
+    """Tell whether writing to `out` changes components that are arrays."""
+    return any(not isinstance(part, float) and np.shares_memory(out, part) for part in parts)
+
+
+def in_step(out: Array, axes: int, parts: Components) -> bool:
+    """Tell whether components are those of `out` itself, in their order: a row is read before it is written."""
+    own = [out[(..., *place)] for place in np.ndindex(*out.shape[out.ndim - axes :])]
+    return len(own) == len(parts) and all(_place(part) == _place(mine) for part, mine in zip(parts, own, strict=True))
+
+
+def _place(part: Array) -> tuple[object, ...]:
+    return part.dtype, part.__array_interface__["data"][0], part.shape, part.strides

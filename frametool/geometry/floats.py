@@ -22,6 +22,7 @@ LEVEL, RIGHT_ANGLE, RIGHT_ANGLE_REST = trig.LEVEL, trig.RIGHT_ANGLE, trig.RIGHT_
 maximum, minimum = max, min
 some = mask = bool
 least = float
+reduced_exactly = trig.reduced_exactly
 
 
 def where(condition: Condition, yes: float, no: float) -> float:
@@ -64,10 +65,3 @@ def doubled_arctan(tangent: float) -> float:
     above = ((((squared * A6 + A5) * squared + A4) * squared + A3) * squared + A2) * squared + A1
     below = (((((squared + B6) * squared + B5) * squared + B4) * squared + B3) * squared + B2) * squared + B1
     return (tangent - above / below * squared * tangent) * 2.0
-
-
-def reduced_exactly(x: float) -> tuple[float, float]:
-    """Return what is left of any angle less the nearest whole number of quarter turns, and that number modulo 2."""
-    from frametool.geometry import trig
-
-    return trig.reduced_exactly(x)

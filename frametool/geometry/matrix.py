@@ -1,21 +1,25 @@
-"""Kernels of the rotation matrix, nine components row-major: to the quaternion, and to the nearest rotation."""
+"""Kernels of the rotation matrix, nine components row-major: to the quaternion, and to the nearest rotation.
+
+Six numbers stand for its first two columns, which say all of it (Zhou et al. 2019).
+"""
 
 from __future__ import annotations
 
 from math import inf, isfinite
 
 from frametool.errors import ValueInvalid, warn
-from frametool.geometry import floats
+from frametool.geometry import floats, quaternion
 from frametool.geometry.quaternion import EPS, FARTHEST, SILENT, TOLERATED, largest_of, length
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from frametool.geometry.types import Condition, Four, Functions, N, Nine
+    from frametool.geometry.types import Components, Condition, Four, Functions, N, Nine, Six
 
 ORTHONORMAL = 8 * EPS  # of the Gram matrix: what rounding alone leaves on a correctly rounded rotation
 SINGULAR = 1e-12  # of det / (|row 1| |row 2| |row 3|): below, rounding decides which rotation is nearest
+PARALLEL = 1e-12  # sine between two columns: below, rounding decides the plane they span
 
 
 def to_quaternion(
@@ -177,3 +181,58 @@ def nine(values: Iterable[N]) -> Nine[N]:
 def _shown(entries: tuple[float, ...]) -> str:
     """Show a matrix on one line."""
     return ", ".join(" ".join(f"{value:g}" for value in entries[row : row + 3]) for row in (0, 3, 6))
+
+
+def from_six_d(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[N]:
+    """Return the quaternion of two columns, orthonormalised by Gram and Schmidt.
+
+    The columns need be neither unit nor at right angles, but not parallel.
+    The second is cleared of the first twice: once leaves a residue where they are nearly parallel (Giraud 2005).
+    """
+    ax, ay, az = quaternion.unit_vector(ax, ay, az, xp)
+    along = ax * bx + ay * by + az * bz
+    bx, by, bz = quaternion.unit_vector(bx - along * ax, by - along * ay, bz - along * az, xp)
+    rest = ax * bx + ay * by + az * bz
+    bx, by, bz = bx - rest * ax, by - rest * ay, bz - rest * az
+    cx, cy, cz = quaternion.cross(ax, ay, az, bx, by, bz)
+    return to_quaternion(ax, bx, cx, ay, by, cy, az, bz, cz, xp)
+
+
+def as_six_d(x: N, y: N, z: N, w: N) -> Six[N]:
+    """Return r11, r21, r31 and r12, r22, r32."""
+    r11, r12, _, r21, r22, _, r31, r32, _ = quaternion.to_matrix(x, y, z, w)
+    return r11, r21, r31, r12, r22, r32
+
+
+def six_d_deviation(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> N:
+    """Return 0 where two columns span a plane, else inf."""
+    first, second = quaternion.unit_vector(ax, ay, az, xp), quaternion.unit_vector(bx, by, bz, xp)
+    sine = length(*quaternion.cross(*first, *second), xp)
+    return xp.where(sine > PARALLEL, 0.0, inf)
+
+
+def six_d_furthest(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> float:
+    """Return 0 where all pairs of columns span a plane, else inf."""
+    return xp.furthest(six_d_deviation(ax, ay, az, bx, by, bz, xp))
+
+
+def six_d_repaired(ax: N, ay: N, az: N, bx: N, by: N, bz: N, _xp: Functions[N]) -> Six[N]:
+    """Return two columns as they are: `from_six_d` takes any that span a plane."""
+    return ax, ay, az, bx, by, bz
+
+
+def check_six_d(*columns: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any two that span a plane
+    """Return one pair of columns back.
+
+    Raises:
+        ValueInvalid: not finite, zero or parallel.
+    """
+    ax, ay, az, bx, by, bz = columns
+    shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
+    if not all(map(isfinite, columns)):
+        raise ValueInvalid(f"{shown} are not finite; give six finite numbers", rule="not-finite")
+    if not (ax or ay or az) or not (bx or by or bz):
+        raise ValueInvalid(f"{shown} span no plane: one is zero", rule="denormalized")
+    if six_d_deviation(ax, ay, az, bx, by, bz, floats):
+        raise ValueInvalid(f"{shown} span no plane: they are parallel", rule="denormalized")
+    return columns

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf, isfinite
 
 from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown
-from frametool.geometry import axis_angle, euler, matrix, mrp, quaternion, rotvec, six_d
+from frametool.geometry import euler, matrix, quaternion, vectors
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -211,7 +211,7 @@ def _of_wxyz(kernel: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _check_mrp(*parameters: float, normalize: bool = False) -> Components:
-    return rotvec.check(*parameters, normalize=normalize, what="mrp")
+    return vectors.check_rotvec(*parameters, normalize=normalize, what="mrp")
 
 
 def _homogeneous(position: Components, rows: Components) -> Components:
@@ -227,7 +227,7 @@ def _of_homogeneous(m: Components) -> tuple[Components, Components]:
     return (m[3], m[7], m[11]), (*m[0:3], *m[4:7], *m[8:11])
 
 
-LAST_ROW = (0.0, 0.0, 0.0, 1.0)
+LAST_ROW = (0.0, 0.0, 0.0, 1.0)  # of a homogeneous matrix
 HOMOGENEOUS = Whole(
     "m11 m12 m13 m14 m21 m22 m23 m24 m31 m32 m33 m34 m41 m42 m43 m44", _homogeneous, _of_homogeneous, LAST_ROW
 )
@@ -268,12 +268,12 @@ REPRESENTATIONS: dict[str, Representation] = {
     "axis_angle": Representation(
         "axis_x axis_y axis_z angle", (3,), "axis of any length, then the angle about it",
         names="x y z angle", label="axis-angle", shape={"axis": 3, "angle": 1}, overview=("_rad",),
-        forward=_angular(axis_angle.to_quaternion), backward=_angular(axis_angle.from_quaternion),
-        check=axis_angle.check,
+        forward=_angular(vectors.from_axis_angle), backward=_angular(vectors.as_axis_angle),
+        check=vectors.check_axis_angle,
     ),
     "rotvec": Representation(
         "rotvec_x rotvec_y rotvec_z", (0, 1, 2), "rotation vector: unit axis times angle", label="rotation vector",
-        forward=_angular(rotvec.to_quaternion), backward=_angular(rotvec.from_quaternion), check=rotvec.check,
+        forward=_angular(vectors.from_rotvec), backward=_angular(vectors.as_rotvec), check=vectors.check_rotvec,
     ),
     "matrix": Representation(
         "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "rotation matrix, row by row",
@@ -283,13 +283,13 @@ REPRESENTATIONS: dict[str, Representation] = {
     ),
     "mrp": Representation(
         "mrp_x mrp_y mrp_z", (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
-        forward=_arithmetic(mrp.to_quaternion), backward=_plain(mrp.from_quaternion), check=_check_mrp,
+        forward=_arithmetic(vectors.from_mrp), backward=_plain(vectors.as_mrp), check=_check_mrp,
     ),
     "six_d": Representation(
         "r11 r21 r31 r12 r22 r32", (), "first two columns of the matrix (Zhou's continuous 6D)", label="6d",
         searched=False,
-        forward=_plain(six_d.to_quaternion), backward=_arithmetic(six_d.from_quaternion), check=six_d.check,
-        batch=BatchRule("pairs of columns", six_d.deviation, six_d.furthest, six_d.repaired, inf),
+        forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), check=matrix.check_six_d,
+        batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_furthest, matrix.six_d_repaired, inf),
     ),
 }  # fmt: skip
 for _name, _row in REPRESENTATIONS.items():

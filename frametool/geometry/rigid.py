@@ -23,7 +23,7 @@ from __future__ import annotations
 from math import isfinite
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import quaternion, rotvec
+from frametool.geometry import quaternion, vectors
 from frametool.geometry.quaternion import cross, either, length, settled
 from frametool.geometry.trig import half_sincos, half_sincos_deg, incline, polynomial
 
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         Vector,
     )
 
+IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 SERIES_EXP = 1.5  # rad: above, a - sin(a) loses less than a digit; below, ten terms of its series are exact
 SERIES_LOG = 0.6  # rad: the same for 1 - (a/2) cot(a/2) and six terms
 # (-1)^n / (2n + 3)! : the series of (a - sin a)/a^3 in a^2
@@ -149,7 +150,7 @@ def check_twist(vx: float, vy: float, vz: float, wx: float, wy: float, wz: float
     """Raise ValueInvalid for a twist that is not finite, or turns so far that no digit of the angle is left."""
     if not all(isfinite(value) for value in (vx, vy, vz)):
         raise ValueInvalid(f"twist {vx:g} {vy:g} {vz:g} is not finite; give finite numbers")
-    rotvec.check(wx, wy, wz)
+    vectors.check_rotvec(wx, wy, wz)
 
 
 def exp(vx: N, vy: N, vz: N, wx: N, wy: N, wz: N, xp: Functions[N]) -> Seven[N]:
@@ -179,7 +180,7 @@ def log(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Six[N]
 
     Source: v = t - w x t / 2 + D w x (w x t), D = (1 - (a/2) cot(a/2))/a^2, by its series below 0.6 rad.
     """
-    wx, wy, wz = rotvec.from_quaternion(x, y, z, w, xp)
+    wx, wy, wz = vectors.as_rotvec(x, y, z, w, xp)
     sine, cosine = length(x, y, z, xp), abs(w)
     half = incline(sine, cosine, xp)
     squared = 4.0 * half * half

@@ -15,6 +15,7 @@ from math import isfinite
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.quaternion import SILENT
+from frametool.geometry.representations import LAST_ROW
 
 TYPE_CHECKING = False
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array, Components, Kernel, Numbers
 
-LAST_ROW = (0.0, 0.0, 0.0, 1.0)  # of a homogeneous matrix
 
 
 
@@ -268,12 +268,12 @@ def moved(
     inner = (len(given),)
     if single(given) and single(mover):
         return _one_row(kernel(*mover, *given), inner, out)
-    from frametool.geometry import arrays, out_array
+    from frametool.geometry import arrays
 
     parts = (*mover, *given)
     if flatten and single(mover):
         kernel, parts = _matrix_kernel(flatten(*mover)), given
-    if out is None or not out_array.shares_memory(out, given):
+    if out is None or not arrays.shares_memory(out, given):
         kernel = arrays.guarded(kernel, lambda: all_finite(given, name))
     elif not arrays.finite_throughout(given):
         all_finite(given, name)
@@ -285,9 +285,9 @@ def _one_row(components: Components, inner: tuple[int, ...], out: Array | None) 
     row = stacked(components).reshape(inner)
     if out is None:
         return row
-    from frametool.geometry import out_array
+    from frametool.geometry import arrays
 
-    out_array.require_fitting(out, inner)
+    arrays.require_fitting(out, inner)
     out[...] = row
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import repeat
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -60,6 +61,24 @@ class Samples(NamedTuple):
     def edges(self) -> Iterator[Edge]:
         """Yield the poses as edges."""
         return map(self.edge, range(len(self.stamps_ns)))
+
+
+class EdgeColumns(NamedTuple):
+    """Edges of several frames that move, column by column, in the order they were written."""
+
+    parents: Sequence[str]
+    children: Sequence[str]
+    stamps_ns: Sequence[int]
+    components: Sequence[Rigid]
+    lines: Sequence[int]
+    topics: Iterable[str] = ()
+
+    def edges(self) -> Iterator[Edge]:
+        """Yield them as edges."""
+        parents, children, stamps_ns, components, lines, topics = self
+        return map(
+            Edge, parents, children, components, stamps_ns, lines, repeat(None), repeat(()), topics or repeat("")
+        )  # fmt: skip
 
 
 def stop(error: FormatError) -> None:

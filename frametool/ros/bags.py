@@ -13,9 +13,8 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Note
-from frametool.ros.message_parts import STAMPS, stamp_problem
+from frametool.ros.messages import STAMPS, body_of, stamp_problem
 from frametool.ros.messages import TYPES as POSES
-from frametool.ros.messages import body_of
 from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:
@@ -166,7 +165,7 @@ def _edge(message: Any, number: int, path: str, options: Options, topic: str) ->
     named, moved, turned = _parts(message, topic, options)
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
     parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(named)
-    components = unit_components(tally, number, *numbers, normalize=options.normalize)
+    components = unit_components(numbers, number, tally, options.normalize)
     if components is None or not parent or not child:
         problem = _complaint(parent, child, numbers, normalize=options.normalize)
         edge = f"{shown(parent)} -> {shown(child)}"

@@ -19,8 +19,7 @@ from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, rotation_numbers
-from frametool.ros.message_parts import STAMPS, stamp_problem
-from frametool.ros.messages import MESSAGE_KEYS
+from frametool.ros.messages import MESSAGE_KEYS, STAMPS, stamp_problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

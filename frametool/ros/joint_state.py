@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import shown
 from frametool.grammar.readers import Misfit, kind, within
-from frametool.ros.message_parts import header_stamp, whole_list
+from frametool.ros.messages import header_stamp, whole_list
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

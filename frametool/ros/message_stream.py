@@ -19,7 +19,6 @@ What the echo tools or the shell print between messages.
 from __future__ import annotations
 
 import re
-from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.chunks import Piece, counted_from, documents, lines
@@ -32,7 +31,7 @@ from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Misfit, Reading, as_mapping
 from frametool.ros import messages
 from frametool.ros.messages import body_of, is_pose, read_pose
-from frametool.ros.plain_messages import Blocks, plain_line
+from frametool.ros.plain_messages import plain_columns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options, Tally
+    from frametool.grammar.edges import EdgeColumns, Options, Tally
     from frametool.grammar.readers import Path
 
 
@@ -153,19 +152,19 @@ class Message(NamedTuple):
 
 def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:
     """Yield the messages of a recording; where one cannot be read the error stands in its place."""
-    if form == "echo":
-        for piece in documents(stream, name):
-            yield from document_messages(piece, name, tally)
-    elif form == "jsonl":
-        for piece in lines(stream, name):
-            for number, line in enumerate(piece.text.split("\n"), piece.line):
-                yield from line_messages(line, number, name, tally)
+    if form in {"echo", "jsonl"}:
+        for piece in (documents if form == "echo" else lines)(stream, name):
+            yield from piece_messages(piece, name, form, tally)
     else:
         yield from _csv(stream, name, form, tally)
 
 
-def document_messages(piece: Piece, name: str, tally: Tally) -> Iterator[Message | FormatError]:
-    """Yield the messages of documents that end in `---`."""
+def piece_messages(piece: Piece, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:
+    """Yield the messages of documents that end in `---`, or of lines."""
+    if form == "jsonl":
+        for number, text in enumerate(piece.text.split("\n"), piece.line):
+            yield from line_messages(text, number, name, tally)
+        return
     at, line = 0, piece.line
     while at < len(piece.text):
         end = end_of_document(piece.text, at)
@@ -257,53 +256,50 @@ def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Messa
 _HEADER = re.compile(r"\bheader\b")
 
 
-def read(file: InputFile, options: Options) -> Iterator[Edge]:
+STRETCH = 1 << 17  # characters read at once
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
     """Yield the transforms of every message, in the order they were recorded."""
-    if file.form == "echo":
-        for piece in documents(file.stream, file.name):
-            yield from _echo(piece, file.name, options)
-    elif file.form == "jsonl":
-        for piece in lines(file.stream, file.name):
-            yield from _json_lines(piece, file.name, options)
+    if file.form in {"echo", "jsonl"} and not options.raw and (file.form == "echo" or not options.topics.chosen):
+        cut, end = (documents, "---\n") if file.form == "echo" else (lines, "\n")
+        for piece in cut(file.stream, file.name):
+            for stretch in _cut(piece, end, STRETCH):
+                yield from _plain(stretch, end, file, options)
     else:
         for message in read_messages(file.stream, file.name, file.form, options.tally):
             yield from _message_edges(message, options)
 
 
-def _echo(piece: Piece, name: str, options: Options) -> Iterator[Edge]:
-    """Read plain documents fast and the others in full."""
-    blocks = Blocks(piece.text, piece.line, options.tally, normalize=options.normalize)
-    while True:
-        if not options.raw:
-            yield from blocks.edges()
-        if blocks.at >= len(piece.text):
-            return
-        text = piece.text[blocks.at : end_of_document(piece.text, blocks.at)]
-        for message in document_messages(Piece(text, blocks.line), name, options.tally):
+def _cut(piece: Piece, end: str, size: int) -> Iterator[Piece]:
+    """Cut a piece, where documents or lines end, into stretches of a size, or of one document that is longer."""
+    text, line = piece
+    at = 0
+    while at < len(text):
+        last = text.rfind(end, at, at + size) if at + size < len(text) else len(text)
+        if last < 0:
+            last = text.find(end, at)
+        stretch = text[at : last + len(end) if last >= 0 else len(text)]
+        yield Piece(stretch, line)
+        line += stretch.count("\n")
+        at += len(stretch)
+
+
+def _plain(piece: Piece, end: str, file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
+    """Read plain messages fast, all at once or by halves, and the others in full."""
+    found = plain_columns(*piece, options.tally, normalize=options.normalize)
+    if found and not found.topics:
+        yield found
+    elif found:
+        for edge in found.edges():
+            if options.topics.takes(edge.topic):
+                yield _on_topic(edge, file.name, options)
+    elif len(halves := [*_cut(piece, end, len(piece.text) // 2 + 1)]) > 1:
+        for half in halves:
+            yield from _plain(half, end, file, options)
+    else:
+        for message in piece_messages(piece, file.name, file.form, options.tally):
             yield from _message_edges(message, options)
-        blocks.at += len(text)
-        blocks.line += text.count("\n")
-
-
-def _json_lines(piece: Piece, name: str, options: Options) -> Iterator[Edge]:
-    """Read plain lines fast and the others in full."""
-    at, text = 0, piece.text
-    plains = not options.raw and not options.topics.chosen
-    for line in count(piece.line):
-        if at >= len(text):
-            return
-        if plains and (plain := plain_line(text, at, line, options.tally, normalize=options.normalize)):
-            topic, edges, at = plain
-            for edge in edges:
-                if not topic:
-                    yield edge
-                elif options.topics.takes(topic):
-                    yield _on_topic(edge, topic, name, options)
-        else:
-            end = text.find("\n", at) + 1 or len(text) + 1
-            for message in line_messages(text[at : end - 1], line, name, options.tally):
-                yield from _message_edges(message, options)
-            at = end
 
 
 def _message_edges(message: Message | FormatError, options: Options) -> Iterator[Edge]:
@@ -327,15 +323,15 @@ def _message_edges(message: Message | FormatError, options: Options) -> Iterator
         except Misfit as misfit:
             options.report(message.error(misfit.below(*path)))
             continue
-        edge = Edge(parent, child, components, stamp_ns, line, message.received_ns)
-        yield _on_topic(edge, topic, message.source.name, options) if topic else edge
+        edge = Edge(parent, child, components, stamp_ns, line, message.received_ns, (), topic)
+        yield _on_topic(edge, message.source.name, options) if topic else edge
 
 
-def _on_topic(edge: Edge, topic: str, name: str, options: Options) -> Edge:
-    """Keep the topic that an edge came by: what comes by tf_static has no stamp; one frame by two topics is a fault."""
-    if problem := options.topics.conflict(topic, edge.child):
+def _on_topic(edge: Edge, name: str, options: Options) -> Edge:
+    """Take the stamp from an edge that came by tf_static; one frame by two topics is a fault."""
+    if problem := options.topics.conflict(edge.topic, edge.child):
         options.report(FormatError(problem, source=name, line=edge.line, column=1, rule="two-topics"))
-    return edge._replace(topic=topic, stamp_ns=None if topic.endswith("tf_static") else edge.stamp_ns)
+    return edge._replace(stamp_ns=None) if edge.topic.endswith("tf_static") else edge
 
 
 def _read(
@@ -343,9 +339,7 @@ def _read(
 ) -> tuple[str, str, Rigid, int | None]:
     """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
     if options.raw and "header" in transform:
-        from frametool.ros.tf2_input import read_transform
-
-        return read_transform(transform)
+        return messages.read_raw_transform(transform)
     if is_pose(transform):
         found = read_pose(transform, reading, body_of(topic, options.answers))
     else:

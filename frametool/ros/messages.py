@@ -1,40 +1,51 @@
-"""ROS messages that hold transforms: TransformStamped and what contains it, in the spellings of ROS 1 and ROS 2.
+"""ROS messages that hold transforms or poses: read from plain values, in the spellings of ROS 1 and ROS 2.
 
     {header: {stamp: {sec: 1, nanosec: 0}, frame_id: map}, child_frame_id: base, transform: {translation: {..}, ..}}
-
-Quaternions x, y, z, w; metres; header.frame_id is the parent: parent_from_child. Stamps become int nanoseconds.
-Also read: the envelope of rosbridge, and Foxglove's FrameTransform.
-
-Messages that are poses of a body over time: PoseStamped, PoseWithCovarianceStamped, Odometry.
-
     {header: {stamp: .., frame_id: map}, pose: {position: {x, y, z}, orientation: {x, y, z, w}}}        PoseStamped
     {header: {..}, child_frame_id: base, pose: {pose: {..}, covariance: [..]}, twist: {..}}             Odometry
+    {timestamp: {sec: 1, nsec: 0}, parent_frame_id: map, child_frame_id: base, translation: {..}, ..}   Foxglove
 
-The pose of the body in header.frame_id: Odometry names the body, the others do not. Metres, quaternion x, y, z, w.
+Quaternions x, y, z, w; metres; header.frame_id is the parent: parent_from_child. Stamps become int nanoseconds.
 """
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import shown
-from frametool.grammar.readers import Misfit, as_mapping, within
+from frametool.errors import ValueInvalid, shown
+from frametool.frames.stamps import BILLION
+from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import read_rotation
-from frametool.ros import foxglove
-from frametool.ros.message_parts import PARTS, frame_of, header_stamp, only, part, read_rigid, whole_list
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Answers
     from frametool.grammar.readers import Path, Quaternion, Reading, Vector
 
+STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
+SECONDS = {"sec": range(-(1 << 31), 1 << 32), "secs": range(1 << 32)}  # int32 of ROS 2, uint32 of the others
+PARTS = "a TransformStamped has header, child_frame_id, transform"
+MOST_DIGITS = 25
+_INTEGER = rf"(?a) *[-+]?\d{{1,{MOST_DIGITS}}}"
+_LEFT_OUT = "<(array|sequence) type: .*>"
 LISTS = ("transforms", "static_transforms")
 MESSAGE_KEYS = frozenset(("header", "linear", "force"))  # of messages that hold geometry
 MARKS = frozenset(("child_frame_id", *LISTS))
 STALE = "euler_angles_degree"  # Apollo writes it beside the quaternion and does not keep it up to date
 BESIDE_LIST = ("timestamp",)  # of a FrameTransforms message
 STALE_DEGREES = 0.1
+EPOCH = 719_163  # the day 1970-01-01, counted from year 1
+_DATE = (
+    r"(?a)(\d{4}-\d\d-\d\d)[Tt ](?P<h>[01]\d|2[0-3]):(?P<m>[0-5]\d):(?P<s>[0-5]\d|60)(?:\.(?P<part>\d{1,9})0*)?"
+    r"(?:[Zz]|(?P<sign>[-+])(?P<oh>[01]\d|2[0-3]):(?P<om>[0-5]\d))"
+)
+ODD = {"nan": "nan", ".nan": "nan"} | {
+    f"{sign}{word}": f"{sign}inf" for sign in ("", "+", "-") for word in ("inf", ".inf", "infinity")
+}
 
 
 def is_message(value: dict[str, Any]) -> bool:
@@ -77,8 +88,8 @@ def read_transform(
 
     may_be_nameless: as a pose it needs no frames; their names are then "".
     """
-    if foxglove.is_frame_transform(message):
-        return foxglove.read_transform(message, reading)
+    if "parent_frame_id" in message:
+        return _read_frame_transform(message, reading)
     only(message, ("header", "child_frame_id", "transform"))
     header = part(message, "header", PARTS)
     transform = part(message, "transform", PARTS)
@@ -137,3 +148,153 @@ def read_pose(
     parent = frame_of(header, "frame_id", ("header",), reading)
     child = frame_of(message, "child_frame_id", (), reading) if message.get("child_frame_id") else body
     return parent, child, position, rotation, header_stamp(header)
+
+
+def _read_frame_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str, Vector, Quaternion, int | None]:
+    """Read one FrameTransform as (parent, child, position, rotation, stamp_ns); no timestamp is None."""
+    only(message, ("timestamp", "parent_frame_id", "child_frame_id", "translation", "rotation"))
+    parent = frame_of(message, "parent_frame_id", (), reading)
+    child = frame_of(message, "child_frame_id", (), reading)
+    position, rotation = read_rigid(message, ("translation", "rotation"), reading)
+    stamp_ns = within(("timestamp",), _read_timestamp, message["timestamp"]) if "timestamp" in message else None
+    return parent, child, position, rotation, stamp_ns
+
+
+def _read_timestamp(value: Any) -> int:
+    """Read {sec, nsec}, or a date as RFC 3339 has it, `2023-11-14T22:13:20.123456789Z`, to the nanosecond."""
+    if type(value) is not str:
+        return read_stamp(value)
+    from datetime import date
+
+    found = re.fullmatch(_DATE, value)
+    try:
+        days = date.fromisoformat(found[1]).toordinal() - EPOCH if found else None
+    except ValueError:
+        days = None
+    if not found or days is None:
+        raise Misfit(f"expected a time as {{sec, nsec}} or 2023-11-14T22:13:20.5Z, found {kind(value)}")
+    hours, minutes, seconds, off_hours, off_minutes = (int(found[name] or 0) for name in ("h", "m", "s", "oh", "om"))
+    sign = -1 if found["sign"] == "-" else 1
+    whole = days * 86_400 + (hours - sign * off_hours) * 3600 + (minutes - sign * off_minutes) * 60 + seconds
+    return whole * BILLION + int((found["part"] or "").ljust(9, "0"))
+
+
+def read_raw_transform(message: dict[str, Any]) -> tuple[str, str, Rigid, int | None]:
+    """Read a TransformStamped as tf2 takes it: any numbers, of any norm, and empty names; no stamp is None.
+
+    Returns parent, child, tx, ty, tz (metres), x, y, z, w and the stamp.  Raises Misfit where a number is none at all.
+    """
+    header = part(message, "header", PARTS)
+    transform = part(message, "transform", PARTS)
+    tx, ty, tz = within(("transform",), _raw_numbers, transform, "translation", "xyz")
+    x, y, z, w = within(("transform",), _raw_numbers, transform, "rotation", "xyzw")
+    names = header.get("frame_id"), message.get("child_frame_id")
+    parent, child = (name if type(name) is str else "" for name in names)
+    stamp_ns = None if header.get("stamp") is None else header_stamp(header, raw=True)
+    return parent, child, (tx, ty, tz, x, y, z, w), stamp_ns
+
+
+def _raw_numbers(transform: dict[str, Any], key: str, axes: str) -> list[float]:
+    """Read numbers, which may be infinite or none."""
+    mapping = part(transform, key, f"a transform has {key}")
+    return [within((key, axis), _raw_number, mapping.get(axis)) for axis in axes]
+
+
+def _raw_number(text: Any) -> float:
+    if type(text) is not str:
+        raise Misfit(f"expected a number, found {kind(text)}")
+    try:
+        return float(ODD[text.lower()]) if text.lower() in ODD else parse_number(text)
+    except ValueInvalid as error:
+        raise Misfit(str(error)) from None
+
+
+def only(mapping: dict[str, Any], known: tuple[str, ...]) -> None:
+    """Refuse keys that are not known."""
+    for key in mapping:
+        if key not in known:
+            raise Misfit(f"unknown key {shown(key)}; expected {', '.join(known)}", (key,), key=True)
+
+
+def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
+    """Return a mapping inside a message; `what` says which keys the message has."""
+    if key not in message:
+        raise Misfit(f"missing {key}; {what}")
+    inner: dict[str, Any] = within((key,), as_mapping, message[key], f"{key} as a mapping")
+    return inner
+
+
+def frame_of(
+    mapping: dict[str, Any], key: str, path: Path, reading: Reading, *, may_be_empty: bool = False
+) -> str:
+    """Read a frame's name; one leading `/` goes, as tf2 does it, and is noted."""
+    name = mapping.get(key)
+    if may_be_empty and name in ("", None) and key in mapping:
+        return ""
+    here = (*path, key) if key in mapping else path
+    if type(name) is not str or not name:
+        raise Misfit(f"{key} must name a frame, found {kind(name or None)}", here)
+    return reading.bare(name, *here)
+
+
+def header_stamp(header: dict[str, Any], *, raw: bool = False) -> int | None:
+    """Read the stamp of a header as nanoseconds; None where there is none."""
+    if "stamp" not in header:
+        return None
+    stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"], raw=raw)
+    return stamp_ns
+
+
+def read_stamp(value: Any, *, raw: bool = False) -> int:
+    """Read {sec, nanosec}, {secs, nsecs} or {sec, nsec} as nanoseconds.
+
+    raw: add up whatever stands there, as tf2 does.
+    """
+    stamp = as_mapping(value, "stamp as {sec, nanosec}")
+    for names in STAMPS:
+        if (*stamp,) == names or set(stamp) == set(names):
+            seconds, nanoseconds = (_whole(stamp, name) for name in names)
+            if not raw and (problem := stamp_problem(seconds, nanoseconds, names)):
+                raise problem
+            return seconds * BILLION + nanoseconds
+    raise Misfit("expected stamp as {sec, nanosec} or {secs, nsecs}")
+
+
+def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Misfit | None:
+    """Return what is wrong with a stamp that no message can hold."""
+    allowed = SECONDS[names[0]]
+    if seconds not in allowed:
+        return Misfit(f"{names[0]} {seconds} is beyond {allowed[0]} .. {allowed[-1]}", (names[0],))
+    if not 0 <= nanoseconds < BILLION:
+        return Misfit(f"{names[1]} {nanoseconds} is beyond 0 .. 999999999", (names[1],))
+    return None
+
+
+def _whole(stamp: dict[str, Any], key: str) -> int:
+    text = stamp[key]
+    if type(text) is str and len(text) <= MOST_DIGITS and text.isascii() and text.isdigit():
+        return int(text)
+    if type(text) is not str or not re.fullmatch(_INTEGER, text):
+        raise Misfit(f"{key} must be a whole number, found {kind(text)}", (key,))
+    return int(text)
+
+
+def whole_list(value: Any, what: str) -> list[Any]:
+    """Take a value for a list that was printed whole; the tools cut long ones unless told otherwise."""
+    if type(value) is str and re.fullmatch(_LEFT_OUT, value):
+        raise Misfit(f"the numbers are not there, only {shown(value)}: record without --no-arr (--noarr)")
+    if type(value) is not list:
+        raise Misfit(f"expected {what}, found {kind(value)}")
+    if "..." in value:
+        raise Misfit("the list was cut short here; record with `ros2 topic echo --full-length`", (value.index("..."),))
+    return value
+
+
+def read_rigid(mapping: dict[str, Any], keys: tuple[str, str], reading: Reading) -> tuple[Vector, Quaternion]:
+    """Read position and rotation under the keys that a kind of message has for them."""
+    for key in keys:
+        if key not in mapping:
+            raise Misfit(f"missing {key}")
+    x, y, z = within(keys[:1], read_numbers, mapping[keys[0]], ("x", "y", "z"))
+    _, rotation = within(keys[1:], read_rotation, "quaternion", mapping[keys[1]], reading)
+    return (x, y, z), rotation

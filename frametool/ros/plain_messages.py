@@ -1,46 +1,38 @@
-"""The fast way through `ros2 topic echo /tf` and `rostopic echo /tf`: one pattern for one transform.
+"""The fast way through transforms as tools print them: one pattern for one transform.
 
-    transforms:
+    transforms:                                                           ros2 topic echo, rostopic echo
     - header:
         stamp:
           sec: 1683377979
     ..
-
-The pattern takes what the two tools print for plain numbers and plain names, and nothing else: other documents are
-left to the full reader, so that both give the same records.
-
-The fast way through JSON lines of transforms: one pattern for one TransformStamped.
-
     {"header": {"stamp": {"sec": 12, "nanosec": 0}, "frame_id": "odom"}, "child_frame_id": "base", "transform": ..}
     {"transforms": [{"header": ..}, ..]}
     {"op": "publish", "topic": "/tf", "msg": {"transforms": [..]}}
 
-The pattern takes plain numbers and plain names in the order of the message's definition, and nothing else: other
-lines are left to the full reader, so that both give the same records.
+The patterns take plain numbers and plain names in the order of the message's definition, and nothing else: other
+messages are left to the full reader, so that both give the same records.
 """
 
 from __future__ import annotations
 
 import re
+from contextlib import suppress
+from itertools import accumulate
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.json import JSON_NUMBER
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, quaternion
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import EdgeColumns
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Tally
 
 INFINITE = float("inf")
 LATEST = 1 << 32  # seconds that no message can hold
-NUMBER = "([-+0-9.eE]+)"
-WHOLE = " *([0-9]{1,20})"
-NAME = r"""([A-Za-z0-9_/][\w/.+-]*|"[^"\\\n]+"|'[^'\n]+')"""
-
 FIELDS = """\
 header:
   stamp:
@@ -64,151 +56,150 @@ ROS1 = (
     ("  -\n" + FIELDS[:-1]).replace("\n", "\n    ").replace("nanosec", "nsecs").replace(" sec:", " secs:")
     .replace("header:", "header:\n      seq: [0-9]+") + "\n"
 )  # fmt: skip
+ECHO_GROUPS = {
+    ":\n": ": ?\n",  # rostopic leaves a blank where a block opens
+    "-\n": "- ?\n",
+    "NUMBER": "([-+0-9.eE]+)",
+    "WHOLE": " *([0-9]{1,20})",
+    "NAME": r"""([A-Za-z0-9_/][\w/.+-]*|"[^"\\\n]+"|'[^'\n]+')""",
+}
+JSON_FIELDS = (
+    '{"header": {STAMP, "frame_id": NAME}, "child_frame_id": NAME, '
+    '"transform": {"translation": {"x": NUMBER, "y": NUMBER, "z": NUMBER}, '
+    '"rotation": {"x": NUMBER, "y": NUMBER, "z": NUMBER, "w": NUMBER}}}'
+)
+STAMPS = '"stamp": {"sec": WHOLE, "nanosec": WHOLE}', '"seq": [0-9]+, "stamp": {"secs": WHOLE, "nsecs": WHOLE}'
+PUBLISHED = '{"op": "publish", "topic": TOPIC, "msg": '
+TRANSFORMS = '{"transforms": LIST'
+JSON_GROUPS = {
+    "{": r"\{",
+    "}": r"\}",
+    ": ": ": ?",  # some tools leave the blanks behind colons and commas out
+    ", ": ", ?",
+    "LIST": r"\[",
+    "NUMBER": f"({JSON_NUMBER})",
+    "WHOLE": "(0|[1-9][0-9]{0,19})",
+    "NAME": r'("[A-Za-z0-9_][\w/.+-]*")',  # a leading / is told of, with its place
+    "TOPIC": r'("/[\w/]+")',
+}
 
 
-class Spelling(NamedTuple):
-    """How one of the tools prints a transform: a matcher of it, how many lines it takes, in which it begins."""
+class Layout(NamedTuple):
+    """How a tool writes messages of transforms: the pattern of one transform, and of what stands around it.
 
-    match: Callable[[str, int], re.Match[str] | None]
-    lines: int
-    first: int
-
-
-def _spelling(layout: str) -> Spelling:
-    """Make the matcher of a layout; rostopic leaves a blank where a block opens."""
-    pattern = layout.replace(":\n", ": ?\n").replace("-\n", "- ?\n")
-    for mark, group in (("NUMBER", NUMBER), ("WHOLE", WHOLE), ("NAME", NAME)):
-        pattern = pattern.replace(mark, group)
-    first = layout[: layout.index("header")].count("\n")
-    return Spelling(re.compile(pattern, re.ASCII).match, layout.count("\n"), first)
-
-
-SPELLINGS = (_spelling(ROS2), _spelling(ROS1))
-HEAD = re.compile("transforms: ?\n").match
-TAIL = "---\n"
-
-
-class Blocks:
-    """Read plain documents of a text one after the other; stop where one is not plain.
-
-    `at` is the offset reached, always at the beginning of a document, and `line` its number.
+    opening: of a message, with a group if it names a topic; closing: of the last one; gap: between two transforms
+    lines: of one transform, 0 if a message is one line; first: which of them counts as its place
     """
 
-    __slots__ = ("at", "line", "normalize", "tally", "text")
-
-    def __init__(self, text: str, line: int, tally: Tally, *, normalize: bool = False) -> None:
-        """Start at the top of a text; normalize: take any non-zero quaternion."""
-        self.normalize = normalize
-        self.text = text
-        self.at = 0
-        self.line = line
-        self.tally = tally
-
-    def edges(self) -> Iterator[Edge]:
-        """Yield the records of the documents from `at` on, up to one that is not plain."""
-        text = self.text
-        while head := HEAD(text, self.at):
-            spelling = SPELLINGS[text.startswith("  ", head.end())]
-            found = []
-            rough = len(self.tally.rough)
-            at, line = head.end(), self.line + 1
-            while entry := spelling.match(text, at):
-                edge = plain_edge(entry.groups(), self.tally, line + spelling.first, normalize=self.normalize)
-                if edge is None:
-                    del self.tally.rough[rough:]
-                    return
-                found.append(edge)
-                at = entry.end()
-                line += spelling.lines
-            if not text.startswith(TAIL, at) and (at < len(text) or not found):
-                del self.tally.rough[rough:]
-                return
-            self.at, self.line = at + len(TAIL), line + 1
-            yield from found
+    opening: re.Pattern[str]
+    entry: re.Pattern[str]
+    gap: re.Pattern[str]
+    closing: re.Pattern[str]
+    lines: int = 0
+    first: int = 0
 
 
-def plain_edge(texts: tuple[str, ...], tally: Tally, line: int, *, normalize: bool) -> Edge | None:
-    """Make the record of one transform's texts; None for one that needs a closer look."""
-    parent, child = tally.names[texts[2]], tally.names[texts[3]]
-    try:
-        components = unit_components(tally, line, *map(float, texts[4:]), normalize=normalize)
-    except ValueError:
+def _pattern(layout: str, groups: Mapping[str, str]) -> str:
+    """Put patterns in the place of the words of a layout."""
+    for mark, group in groups.items():
+        layout = layout.replace(mark, group)
+    return layout
+
+
+def _layout(opening: str, entry: str, between: str, closing: str, *lines: int) -> Layout:
+    """Make a layout from the patterns of its parts."""
+    gap, end = f"{between}|{closing}{opening}", f"{closing}|\\Z" if lines else closing
+    first, each, inner, last = (re.compile(part, re.ASCII) for part in (opening, entry, gap, end))
+    return Layout(first, each, inner, last, *lines)
+
+
+def _echoed(entry: str) -> Layout:
+    """Make the layout of documents that a tool prints."""
+    opening, pattern = (_pattern(part, ECHO_GROUPS) for part in ("transforms:\n", entry))
+    return _layout(opening, pattern, "", "---\n", entry.count("\n"), entry[: entry.index("header")].count("\n"))
+
+
+def _on_lines(opening: str, between: str, closing: str) -> list[Layout]:
+    """Make the layouts of a kind of lines, in ROS 2 and in ROS 1."""
+    entries = (JSON_FIELDS.replace("STAMP", stamp) for stamp in STAMPS)
+    return [_layout(_pattern(opening, JSON_GROUPS), _pattern(each, JSON_GROUPS), between, closing) for each in entries]
+
+
+LAYOUTS = (
+    (_echoed(ROS2), _echoed(ROS1)),
+    _on_lines(PUBLISHED + TRANSFORMS, ", ?", r"\]\}\}\n"),
+    _on_lines(TRANSFORMS, ", ?", r"\]\}\n"),
+    _on_lines("", "\n", "\n"),
+)
+ROS1_BEGINS = "  ", '{"header": {"seq"', '{"header":{"seq"'
+EACH = 12  # what `split` gives for a transform: the text before it, two parts of its stamp, two names, seven numbers
+
+
+def plain_columns(text: str, line: int, tally: Tally, *, normalize: bool = False) -> EdgeColumns | None:
+    """Return the edges of a text that begins on a line; None, and no notes, where not every message is plain.
+
+    One `split` finds all transforms, and what is left between them tells whether anything else is there.
+    normalize: take any non-zero quaternion.
+    """
+    layouts, opened = next((row, match) for row in LAYOUTS if (match := row[0].opening.match(text)))
+    layout = layouts[text.startswith(ROS1_BEGINS, opened.end())]
+    parts = layout.entry.split(text)
+    begin, *gaps, end = parts[::EACH] if len(parts) > 1 else ("none", "")
+    found = {gap: layout.gap.fullmatch(gap) for gap in {*gaps}}
+    if begin != opened[0] or not all(found.values()) or not layout.closing.fullmatch(end):
         return None
-    seconds, nanoseconds = int(texts[0]), int(texts[1])
-    if not parent or not child or components is None or nanoseconds >= BILLION or seconds >= LATEST:
+    seconds, nanoseconds = ([*map(int, parts[at::EACH])] for at in (1, 2))
+    if max(seconds) >= LATEST or max(nanoseconds) >= BILLION:
         return None
-    return Edge(parent, child, components, seconds * BILLION + nanoseconds, line)
+    parents, children = parts[3::EACH], parts[4::EACH]
+    names = tally.names
+    if not all(names[name] for pair in dict.fromkeys(zip(parents, children, strict=True)) for name in pair):
+        return None
+    steps = {gap: gap.count("\n") + layout.lines for gap in found}
+    lines = [*accumulate(map(steps.__getitem__, gaps), initial=line + begin.count("\n") + layout.first)]
+    components = _components([parts[at::EACH] for at in range(5, EACH)], lines, tally, normalize=normalize)
+    if components is None:
+        return None
+    stamps_ns = [second * BILLION + part for second, part in zip(seconds, nanoseconds, strict=True)]
+    topics: Iterator[str] | tuple[()] = ()
+    if opened.re.groups:
+        named = (str(found[gap][1] or "")[1:-1] for gap in gaps)  # type: ignore[index]
+        topics = accumulate(named, lambda before, topic: topic or before, initial=opened[1][1:-1])
+    parents, children = ([names[each] for each in column] for column in (parents, children))
+    return EdgeColumns(parents, children, stamps_ns, components, lines, topics)
 
 
-def unit_components(
-    tally: Tally, line: int, tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float, *,
-    normalize: bool = False,
-) -> Rigid | None:
-    """Check the numbers of one transform as every door does; None for those that are refused there."""
+def _components(
+    columns: Sequence[Sequence[str]], lines: Sequence[int], tally: Tally, *, normalize: bool
+) -> list[Rigid] | None:
+    """Read tx, ty, tz, x, y, z, w of each row; None, and no notes, if one of them is refused."""
+    rough = len(tally.rough)
+    found: list[Rigid] = []
+    with suppress(ValueError):  # of float
+        for row, line in zip(zip(*(map(float, column) for column in columns), strict=True), lines, strict=True):
+            if (components := unit_components(row, line, tally, normalize)) is None:
+                break
+            found.append(components)
+    if len(found) == len(lines):
+        return found
+    del tally.rough[rough:]
+    return None
+
+
+def unit_components(numbers: Rigid, line: int, tally: Tally, normalize: bool) -> Rigid | None:  # noqa: FBT001 - fast
+    """Return tx, ty, tz, x, y, z, w with a unit quaternion; None for numbers that every reader refuses.
+
+    normalize: take any non-zero quaternion.  The tally notes the line of one that was off.
+    """
+    tx, ty, tz, x, y, z, w = numbers
     squared = x * x + y * y + z * z + w * w
     if not abs(tx) + abs(ty) + abs(tz) < INFINITE:
         return None
     if abs(squared - 1.0) <= quaternion.UNIT:
-        return tx, ty, tz, x, y, z, w
+        return numbers
     off = abs(squared**0.5 - 1.0)
     if not off <= quaternion.TOLERATED and not (normalize and 0.0 < squared < INFINITE):
         return None
     if off > quaternion.SILENT and not normalize:
         tally.rough.append(line)
     return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)
-
-
-GROUPS = {
-    "NUMBER": f"({JSON_NUMBER})",
-    "WHOLE": "(0|[1-9][0-9]{0,19})",
-    "NAME": r'("[A-Za-z0-9_][\w/.+-]*")',  # a leading / is told of, with its place
-    "TOPIC": r'("/[\w/]+")',
-}
-JSON_FIELDS = (
-    '{"header": {"stamp": {"sec": WHOLE, "nanosec": WHOLE}, "frame_id": NAME}, "child_frame_id": NAME, '
-    '"transform": {"translation": {"x": NUMBER, "y": NUMBER, "z": NUMBER}, '
-    '"rotation": {"x": NUMBER, "y": NUMBER, "z": NUMBER, "w": NUMBER}}}'
-)
-ENVELOPE = '(?:{"op": "publish", "topic": TOPIC, "msg": )?'
-
-
-def _pattern(layout: str) -> re.Pattern[str]:
-    """Make the pattern of a layout; some tools leave the blanks behind colons and commas out."""
-    layout = layout.replace("{", r"\{").replace("}", r"\}").replace(": ", ": ?").replace(", ", ", ?")
-    for mark, group in GROUPS.items():
-        layout = layout.replace(mark, group)
-    return re.compile(layout, re.ASCII)
-
-
-TRANSFORM = _pattern(JSON_FIELDS).match
-BETWEEN = re.compile(", ?").match
-LISTED = _pattern(ENVELOPE + r'{"transforms": \[').match
-
-
-def plain_line(
-    text: str, at: int, line: int, tally: Tally, *, normalize: bool = False
-) -> tuple[str, list[Edge], int] | None:
-    """Read the line of a text that begins at an offset: its topic, its edges, and where the next line begins.
-
-    line: its number; normalize: take any non-zero quaternion.
-    None for a line that is not plain; the tally is then as it was.
-    """
-    head = LISTED(text, at)
-    topic = head[1] if head else None
-    close = "" if head is None else "]}" if topic is None else "]}}"
-    found = []
-    rough = len(tally.rough)
-    end = at if head is None else head.end()
-    while entry := TRANSFORM(text, end):
-        edge = plain_edge(entry.groups(), tally, line, normalize=normalize)
-        if edge is None:
-            break
-        found.append(edge)
-        end = entry.end()
-        if head is None or (comma := BETWEEN(text, end)) is None:
-            if text.startswith(close + "\n", end):
-                return (topic or "")[1:-1], found, end + len(close) + 1
-            break
-        end = comma.end()
-    del tally.rough[rough:]
-    return None

@@ -8,7 +8,7 @@ import numpy as np
 
 from frametool.errors import FormatError, Unanswered, ValueInvalid, listing, shown
 from frametool.frames.stamps import BILLION
-from frametool.ros.message_parts import STAMPS, stamp_problem
+from frametool.ros.messages import STAMPS, stamp_problem
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence

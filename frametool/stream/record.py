@@ -18,7 +18,7 @@ from frametool.grammar.names import NAME_KEYS, PARENT_KEYS
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position, unknown_keys
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
-from frametool.ros.message_parts import read_stamp, whole_list
+from frametool.ros.messages import read_stamp, whole_list
 from frametool.stream.row_layout import (
     COVARIANCE,
     POINT,

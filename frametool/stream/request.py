@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import quaternion, rigid, rotvec, spatial
+from frametool.geometry import quaternion, rigid, spatial, vectors
 from frametool.geometry.representations import notation
 from frametool.geometry.trig import RADIAN
 from frametool.grammar.pose import VELOCITY
@@ -227,7 +227,7 @@ class Operation(NamedTuple):
 
         Linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt: position and rotation on their own.
         """
-        turned = rotvec.from_quaternion(parts[3], parts[4], parts[5], parts[6], xp)
+        turned = vectors.as_rotvec(parts[3], parts[4], parts[5], parts[6], xp)
         return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
 
     def _pair(self, poses: Sequence[Rigid]) -> tuple[Rigid, Rigid]:

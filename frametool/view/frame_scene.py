@@ -11,9 +11,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
-from frametool.frames.path import IDENTITY
 from frametool.frames.snapshot import Snapshot
 from frametool.geometry import rigid
+from frametool.geometry.rigid import IDENTITY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.ros.tf2_input import ODD
+from frametool.ros.messages import ODD
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -335,3 +335,11 @@ def test_a_rotation_looked_up_between_samples_is_their_slerp_to_the_bit() -> Non
             at_ns = EPOCH + 1000 * number + after
             expected = start.slerp(end, after / 1000).as_quaternion().tolist()
             assert buffer.lookup("map", "base", at_ns).xyzw.tolist() == expected
+
+
+def test_edges_in_a_circle_that_held_one_after_the_other_do_not_stop_a_third() -> None:
+    buffer = TransformBuffer()
+    for parent, child, stamp_ns in (("a", "b", 1), ("b", "a", 2), ("a", "b", 3), ("c", "d", 1)):
+        buffer.insert(parent, child, shifted(1), stamp_ns)
+    buffer.insert("a", "c", shifted(1), 2)
+    assert x_of(buffer.lookup("c", "d", 1)) == 1

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import samples
 
-from frametool.geometry import arrays, euler, floats, matrix, quaternion, rigid, six_d, trig
+from frametool.geometry import arrays, euler, floats, matrix, quaternion, rigid, trig
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -139,7 +139,7 @@ KERNELS: dict[str, tuple[Callable[..., Any], Sequence[Row]]] = {
     "magnitude": (quaternion.magnitude, SHIFTS),
     "matrix deviation": (matrix.deviation, [*MATRICES, [0.0] * 9, [1.0] * 9, [-1.0, 0, 0, 0, 1, 0, 0, 0, 1]]),
     "nearest": (matrix.nearest, MATRICES),
-    "six_d deviation": (six_d.deviation, [[*row[0::3], *row[1::3]] for row in MATRICES]),
+    "six_d deviation": (matrix.six_d_deviation, [[*row[0::3], *row[1::3]] for row in MATRICES]),
     "exp": (rigid.exp, TWISTS),
     "log": (rigid.log, POSES),
     "extent": (rigid.extent, POSES),

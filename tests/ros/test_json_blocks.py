@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import json
+import random
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.formats.load import Recording
+from frametool.errors import FormatError
+from frametool.formats.load import Recording, load
 from frametool.grammar.edges import Tally
-from frametool.ros.plain_messages import plain_line
+from frametool.grammar.result import Style
+from frametool.ros import message_stream
+from frametool.ros.echo_format import message_text
+from frametool.ros.plain_messages import plain_columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
-
-    from frametool.errors import FormatError
 
 HALF = 0.7071067811865476
 
@@ -94,14 +98,14 @@ def in_full(line: str) -> str:
 
 @pytest.mark.parametrize("line", PLAIN)
 def test_plain_lines_take_the_fast_way(line: str) -> None:
-    assert plain_line(line + "\n", 0, 1, Tally()) is not None
-    assert plain_line(in_full(line) + "\n", 0, 1, Tally()) is None
+    assert plain_columns(line + "\n", 1, Tally()) is not None
+    assert plain_columns(in_full(line) + "\n", 1, Tally()) is None
 
 
 @pytest.mark.parametrize("line", OTHER)
 def test_other_lines_are_left_alone(line: str) -> None:
     tally = Tally()
-    assert plain_line(line + "\n", 0, 1, tally) is None
+    assert plain_columns(line + "\n", 1, tally) is None
     assert not tally.rough
 
 
@@ -123,7 +127,6 @@ def test_all_together(normalize: bool, tmp_path: Path) -> None:  # noqa: FBT001
 
 
 
-
 def test_text_and_json_normalize_alike(tmp_path: Path) -> None:
     numbers = "translation: {x: 0.2, y: -2.0, z: 1e-7}", "rotation: {x: 0.0, y: 0.0, z: 0.7075, w: 0.7071067811865476}"
     head = "transforms:\n- header:\n    stamp:\n      sec: 2\n      nanosec: 5\n    frame_id: odom\n  child_frame_id: base\n"
@@ -138,3 +141,63 @@ def test_text_and_json_normalize_alike(tmp_path: Path) -> None:
         (one,), (other,) = (list(each.edges(tell=False, normalize=normalize)) for each in (text, lines))
         assert one.components == other.components
         assert len(text.tally.rough) == len(lines.tally.rough) == rough
+
+
+def recorded(seed: int) -> list[dict[str, Any]]:
+    """Build messages of frames that move, with one now and then that is late, comes twice or hangs elsewhere."""
+    rng = random.Random(seed)  # noqa: S311 - no secret
+    odd = {f"frame_{number}" for number in range(5) if rng.random() < 0.4}
+    found = []
+    for second in range(1, 60):
+        for number in range(rng.randrange(1, 6)):
+            child = f"frame_{number}"
+            parent = f"frame_{number - 1}" if number else "odom"
+            edge = transform(second, child)
+            edge["header"]["frame_id"] = parent
+            if child in odd and rng.random() < 0.1:
+                edge["header"]["stamp"]["sec"] = rng.choice((second, second - 1, 7))
+                edge["header"]["frame_id"] = rng.choice((parent, parent, "odom", "map", f"frame_{number + seed % 2}"))
+            found.append(edge)
+    return [{"transforms": found[at : at + 3]} for at in range(0, len(found), 3)]
+
+
+def loaded(path: Path) -> tuple[Any, ...]:
+    """Load a recording; return all samples and the warnings, or the error."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            tree = load(path)
+        except FormatError as error:
+            return error.line, str(error)
+    samples = [(frame, track and [*track.walk()]) for frame in tree.frames for track in [tree.track(frame)]]
+    return samples, [str(each.message) for each in caught]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_stretches_and_single_messages_make_the_same_tree(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.jsonl"
+    path.write_text("".join(json.dumps(message) + "\n" for message in recorded(seed)))
+    for size in (2000, 1 << 17):
+        monkeypatch.setattr(message_stream, "STRETCH", size)
+        whole = loaded(path)
+        monkeypatch.setattr(message_stream, "STRETCH", 1)
+        assert loaded(path) == whole
+
+
+@pytest.mark.parametrize("ros", ["ros1", "ros2"])
+@pytest.mark.parametrize("odd", [None, 0, 40, 99])
+def test_echoed_stretches_give_what_the_full_reader_gives(ros: str, odd: int | None, tmp_path: Path) -> None:
+    messages = [message_text({"transforms": [transform(second), transform(second, "laser")]}, Style(ros)) for second in range(100)]
+    if odd is not None:
+        messages[odd] = "A message was lost!!!\n" + messages[odd].replace("base", "Körper")
+    plain, full = tmp_path / "plain.txt", tmp_path / "full.txt"
+    plain.write_text("".join(messages))
+    full.write_text("".join(messages).replace("stamp:", "stamp: #"))
+    edges = [list(Recording(path).edges(tell=False)) for path in (plain, full)]
+    assert edges[0] == edges[1]
+    assert len(edges[0]) == 200
+    found = plain_columns("".join(messages), 1, Tally())
+    assert (found is None) == (odd is not None)
+    assert found is None or list(found.edges()) == edges[0]

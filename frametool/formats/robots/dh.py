@@ -22,8 +22,8 @@ from frametool.errors import FormatError, Unanswered, ValueInvalid, shown
 from frametool.formats.robots.model import Joint, Link
 from frametool.formats.robots.posture import Posture
 from frametool.formats.trees.tree_reader import line_error
-from frametool.frames.path import IDENTITY
 from frametool.geometry import euler, floats, rigid
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.readers import kind
 from frametool.text.csv_line import LineCell, split_line
 from frametool.text.numbers import LENGTHS, NotFinite, parse_angle, parse_length, parse_number

@@ -19,13 +19,13 @@ from frametool.errors import did_you_mean, listing, shown
 from frametool.formats.load import Recording
 from frametool.formats.trees.matrices import Stated, edges_of
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named
-from frametool.frames.path import IDENTITY
 from frametool.geometry.representations import notation
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import read_name
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, read_texts, within
 from frametool.grammar.rotation_spelling import rotation_of
-from frametool.ros.message_parts import only
+from frametool.ros.messages import only
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -23,9 +23,9 @@ from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.model import Joint, JointValue, Link
 from frametool.formats.robots.posture import Posture, Setting
-from frametool.frames.path import IDENTITY
-from frametool.geometry import axis_angle, floats, matrix, quaternion, rigid
+from frametool.geometry import floats, matrix, quaternion, rigid, vectors
 from frametool.geometry.quaternion import cross, unit_vector
+from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.trig import DEGREE, half_sincos, half_sincos_deg
 from frametool.grammar.edges import Edge, Options, Tally, Topics
 
@@ -407,7 +407,7 @@ class PoseReader:
     def _axisangle(self, attributes: Attributes) -> Quaternion:
         x, y, z, angle = self.numbers(attributes, "axisangle", 4, ())
         axis = self._unit(attributes, "axisangle", (x, y, z))
-        return axis_angle.to_quaternion(*axis, angle, floats, degrees=self.degrees)
+        return vectors.from_axis_angle(*axis, angle, floats, degrees=self.degrees)
 
     def _euler(self, attributes: Attributes) -> Quaternion:
         """Multiply the turns about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""

@@ -21,9 +21,10 @@ from typing import Any, NamedTuple, TypeAlias
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
-from frametool.frames.path import IDENTITY, edges_between
+from frametool.frames.path import edges_between
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
+from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 from frametool.geometry.trig import DEGREE, RADIAN
 from frametool.geometry.validation import as_numbers, scalars, single

@@ -25,9 +25,9 @@ from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
 from frametool.formats.robots.posture import Posture
-from frametool.frames.path import IDENTITY
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.quaternion import unit_vector
+from frametool.geometry.rigid import IDENTITY
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -22,10 +22,10 @@ from frametool.formats.load import Recording, refuse_unknown_joints
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
-from frametool.frames.path import IDENTITY
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import Note

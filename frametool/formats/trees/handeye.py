@@ -21,7 +21,7 @@ from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, within
-from frametool.ros.message_parts import only, read_rigid
+from frametool.ros.messages import only, read_rigid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

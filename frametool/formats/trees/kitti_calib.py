@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FormatError, Unanswered, ValueInvalid
 from frametool.formats.trees.matrices import MATRIX
 from frametool.formats.trees.tree_reader import line_error
-from frametool.frames.path import IDENTITY
 from frametool.geometry import rigid
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Reading
 from frametool.grammar.rotation_spelling import rotation_of

@@ -18,9 +18,9 @@ from frametool.documents.yaml import TAG
 from frametool.errors import bare, shown
 from frametool.formats.table import DIRECTIONS
 from frametool.formats.trees.tree_reader import Unclear, dotted
-from frametool.frames.path import IDENTITY
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Answers, Edge, Tally
 from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AGREEMENT, read_spelled, rotation_of

@@ -19,8 +19,8 @@ from frametool.documents.source import InputFile
 from frametool.errors import FormatError, bare, shown
 from frametool.formats.trees.matrices import grid_of, read_turn
 from frametool.formats.trees.tree_reader import document_edges
-from frametool.frames.path import IDENTITY
 from frametool.geometry.representations import notation
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import rotation_of

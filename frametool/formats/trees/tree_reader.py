@@ -18,6 +18,7 @@ from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile, Pasted, Source, pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown, warn
 from frametool.frames.stamps import parse_stamp
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, within
@@ -37,7 +38,6 @@ TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
-IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 CHILDREN = frozenset(("children", *TIMED))
 
 
@@ -234,9 +234,7 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
 def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
     """Read one TransformStamped, checked, or as tf2 receives it."""
     if reading.raw:
-        from frametool.ros.tf2_input import read_transform
-
-        parent, child, components, stamp_ns = read_transform(message)
+        parent, child, components, stamp_ns = messages.read_raw_transform(message)
         return Edge(parent, child, components, stamp_ns, path=path)
     parent, child, position, rotation, stamp_ns = messages.read_transform(message, reading)
     return Edge(parent, child, (*position, *rotation), stamp_ns, path=path)
