@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import READING
+from frametool.cli.group import settings
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
@@ -53,16 +53,14 @@ class BagOfClouds:
         self.tally = Tally()
         self.kept = ExitStack()
         self.reader = self.kept.enter_context(opened_bag(path, self.tally))
-        context = click.get_current_context()
-        reading = context.meta.setdefault(READING, {})
-        chosen = reading.get("topics", ())
+        chosen = settings().topics
         try:
             self.topics = cloud_topics(self.reader, chosen, path)
         except BaseException:
             self.kept.close()
             raise
         ours = {topic.strip("/") for topic in self.topics}
-        reading["topics"] = tuple(topic for topic in chosen if topic.strip("/") not in ours)
+        settings().topics = tuple(topic for topic in chosen if topic.strip("/") not in ours)
         self.names: dict[str, int] = {}
 
     def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None) -> int:

@@ -13,6 +13,7 @@ is processed by its parameter, and one that was not is what click made of an emp
 from __future__ import annotations
 
 import os
+from copy import copy
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -29,6 +30,52 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from click.shell_completion import CompletionItem
+
+
+SETTINGS = "frametool.settings"  # the key in a context's `meta`
+
+
+class Settings:
+    """What the options of the running command say about its inputs, each under its parameter's name.
+
+    These options are no parameters of the command's function: `keep_setting` is their callback, and `settings` is
+    where the rest of the command line asks. Like click's `meta`, a command shares them with its group.
+
+    reads_trees: no option, but set when files of frames are opened: --in is then about these too
+    """
+
+    all_versions = False
+    verbose = False
+    quiet = False
+    input_forms: Sequence[str] = ()
+    topics: Sequence[str] = ()
+    joints: Sequence[str] = ()
+    joint_files: Sequence[str] = ()
+    named_frames: Sequence[str] = ()
+    direction: str | None = None
+    camera_axes: str | None = None
+    dh: str | None = None
+    stamps: str | None = None
+    edges = False
+    array: str | None = None
+    reads_trees = False
+
+
+def settings(context: click.Context | None = None) -> Settings:
+    """Return the settings of a context, or of the running command; where none runs, nothing is set but --quiet."""
+    context = context or click.get_current_context(silent=True)
+    if context is not None:
+        found: Settings = context.meta.setdefault(SETTINGS, Settings())
+        return found
+    silent = Settings()
+    silent.quiet = True
+    return silent
+
+
+def keep_setting(context: click.Context, option: click.Parameter, chosen: Any) -> Any:
+    """Keep the value of an option in the settings of its context (a callback of click)."""
+    setattr(settings(context), option.name or "", chosen)
+    return chosen
 
 
 def show_help(ctx: click.Context) -> None:
@@ -177,18 +224,11 @@ class Group(WithHelp, click.Group):
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
-ALL_VERSIONS = "frametool.all_versions"  # where the context keeps that --version is to tell more
-
-
-def _keep_all_versions(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
-    ctx.meta[ALL_VERSIONS] = chosen
-
-
 def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
     """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
     if chosen:
         with writing(None) as write:
-            write(f"frametool {__version__}\n{_surroundings() if ctx.meta.get(ALL_VERSIONS) else ''}")
+            write(f"frametool {__version__}\n{_surroundings() if settings(ctx).all_versions else ''}")
         ctx.exit()
 
 
@@ -211,7 +251,7 @@ def _surroundings() -> str:
 
 
 @click.command(cls=Group, help=HELP, no_args_is_help=True)
-@click.option("-v", "all_versions", is_flag=True, is_eager=True, expose_value=False, callback=_keep_all_versions,
+@click.option("-v", "all_versions", is_flag=True, is_eager=True, expose_value=False, callback=keep_setting,
               help="with --version: of Python and of its packages too")  # fmt: skip
 @click.option("--version", is_flag=True, expose_value=False, callback=_show_version,
               help="Show the version and exit.")  # fmt: skip
@@ -288,7 +328,7 @@ class Prepared(NamedTuple):
     direct: the same, in which short names are found at once
     params: all of them
     absent: what the parser says of arguments that are not there
-    values, meta: what parameters that are not there leave in a context
+    values, settings: what parameters that are not there leave in a context
     """
 
     parser: Any
@@ -296,14 +336,14 @@ class Prepared(NamedTuple):
     params: list[click.Parameter]
     absent: Mapping[str, Any]
     values: Mapping[str, Any]
-    meta: Mapping[str, Any]
+    settings: Settings
 
 
 class Reused(click.Command):
     """A command that is parsed by click at its first call, and with what that left at all others.
 
     Its parameters must not change, and their callbacks must do no more for an absent value than keep it in the
-    context's `meta`, in mappings at most one level deep.
+    settings.
     """
 
     _calls = 0
@@ -323,14 +363,14 @@ class Reused(click.Command):
             return super().parse_args(ctx, args)
         if self._prepared is None:
             self._prepared = self._prepare(ctx)
-        parser, direct, params, absent, values, meta = self._prepared
+        parser, direct, params, absent, values, absent_settings = self._prepared
         if not any(each[2:3] == "=" for each in args):  # -f=x is no -f x
             parser = direct
         parser.ctx = ctx
         given, rest, order = parser.parse_args(args=list(args))
         if rest or not args:
             return super().parse_args(ctx, args)  # has the words for what is wrong
-        ctx.meta.update({key: dict(kept) if isinstance(kept, dict) else kept for key, kept in meta.items()})
+        ctx.meta[SETTINGS] = copy(absent_settings)
         wanted = [each for each in params if each.required or _is_given(each.name or "", given, absent)]
         for param in iter_params_for_processing(order, wanted):
             param.handle_parse_result(ctx, given, rest)
@@ -346,7 +386,7 @@ class Reused(click.Command):
         parser, direct = self.make_parser(ctx), self.make_parser(ctx)
         # click looks for -f among the long names first, and fails with all that an error message needs
         direct._long_opt.update(direct._short_opt)  # noqa: SLF001
-        return Prepared(parser, direct, params, parser.parse_args(args=[])[0], empty.params, empty.meta)
+        return Prepared(parser, direct, params, parser.parse_args(args=[])[0], empty.params, settings(empty))
 
 
 def _is_given(name: str, given: Mapping[str, Any], absent: Mapping[str, Any]) -> bool:

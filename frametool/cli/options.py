@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.group import Reused, WithHelp
+from frametool.cli.group import Reused, WithHelp, keep_setting, settings
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, readers, writers
@@ -170,22 +170,13 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
 TEXT = Text()
 UTF8 = Utf8()
 FILE = File()
-VERBOSE = "frametool.verbose"  # where a command's context keeps that -v was given
 
 
-def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:
-    context.meta[VERBOSE] = chosen
+def _setting(*names: str, **rest: Any) -> Callable[[Any], Any]:
+    return click.option(*names, expose_value=False, callback=keep_setting, **rest)
 
 
-verbose_option = click.option(
-    "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
-    help="say what each input was taken for",
-)  # fmt: skip
-
-
-READING = "frametool.reading"  # where a command's context keeps the options about files of frames
-TREES_OPENED = "frametool.trees_opened"  # set in a command's context once it reads files of frames
-FORMS = "frametool.forms"  # where a command's context keeps those of --in
+verbose_option = _setting("-v", "--verbose", is_flag=True, help="say what each input was taken for")
 
 
 class Form(Text):
@@ -217,17 +208,12 @@ class Form(Text):
         return [CompletionItem(name, help=FORMATS[name].summary) for name in self.names if name.startswith(incomplete)]
 
 
-def _keep_forms(context: click.Context, _: click.Parameter, chosen: Sequence[str]) -> None:
-    context.meta[FORMS] = chosen
-
-
 def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
     """Return the forms that --in names for files of frames, in their order, and the form of the stream.
 
     streams: there is a stream; its form is the last one that can be streamed, "" if there is none
     """
-    context = click.get_current_context(silent=True)
-    told = [] if context is None else list(context.meta.get(FORMS, ()))
+    told = list(settings().input_forms)
     streamed = [form for form in told if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
     if not streamed:
         return told, ""
@@ -235,17 +221,15 @@ def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
     return told[:last] + told[last + 1 :], streamed[-1]
 
 
-in_option = click.option(
-    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM", expose_value=False,
-    callback=_keep_forms,
+in_option = _setting(
+    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM",
     help="form of the input (`frametool formats`), once a file",
 )  # fmt: skip
 
 
 def say_if_verbose(text: str) -> None:
     """Write a line on stderr if the command was called with -v."""
-    context = click.get_current_context(silent=True)
-    if context is not None and context.meta.get(VERBOSE):
+    if settings().verbose:
         say(text)
 
 
@@ -366,10 +350,6 @@ def _names_in(path: str) -> list[str]:
         return []  # nothing to offer, and a completion must not print
 
 
-def _keep(context: click.Context, option: click.Parameter, chosen: Any) -> None:
-    context.meta.setdefault(READING, {})[option.name] = chosen
-
-
 def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
     """Add to a command the options that say how files of frames are read; `opened` heeds them.
 
@@ -379,33 +359,29 @@ def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
     return lambda function: decorated(function, (*own, *_READING_OPTIONS))
 
 
-def _option(*names: str, **rest: Any) -> Callable[[Any], Any]:
-    return click.option(*names, expose_value=False, callback=_keep, **rest)
-
-
-_quiet_option = _option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
-_CAMERA_AXES = _option(
+_quiet_option = _setting("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+_CAMERA_AXES = _setting(
     "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
     help="turn cameras to these axes  [default: those that the form of the file has]",
 )  # fmt: skip
-_STAMPS = _option(
+_STAMPS = _setting(
     "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
 )
-array_option = _option("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
-_EDGES = _option("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
+array_option = _setting("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
+_EDGES = _setting("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
 _READING_OPTIONS = (
-    _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
+    _setting("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
             help="read only this topic; may be repeated"),
-    _option("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
+    _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
             help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
-    _option("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
+    _setting("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
             help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
-    _option("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
+    _setting("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
             help="names of frames that a form does not name; may be repeated, in the order of the files"),
-    _option("--direction", "direction", type=click.Choice(DIRECTIONS),
+    _setting("--direction", "direction", type=click.Choice(DIRECTIONS),
             help="of matrices whose key does not say which frame they are seen from"),
     _CAMERA_AXES,
-    _option("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
+    _setting("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
     _STAMPS,
 )  # fmt: skip
 

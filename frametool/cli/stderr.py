@@ -67,9 +67,9 @@ def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = Fra
     With --quiet nothing is said of names that lost their leading slash: their tree is as it was meant.
     """
     if rule == "slash":
-        from frametool.cli.trees import is_quiet
+        from frametool.cli.group import settings
 
-        if is_quiet():
+        if settings().quiet:
             return
     tell(printable(message if kind is Tf2Warning else f"frametool: {_place()}warning: {message}"))
 

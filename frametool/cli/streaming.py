@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import keep_setting, settings
 from frametool.cli.options import (
     FILE,
-    READING,
     STREAMED,
-    TREES_OPENED,
     UTF8,
     ColumnNames,
     Notations,
@@ -76,7 +75,9 @@ OPTIONS = {
         "--jobs", type=click.IntRange(0, MOST_JOBS), default=1, show_default=True, metavar="N",
         help="processes for a stream; 0 is all cores",
     ),
-    "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
+    "quiet": click.option(
+        "--quiet", is_flag=True, callback=keep_setting, help="no progress and no word on forms on stderr"
+    ),
 }  # fmt: skip
 
 
@@ -131,9 +132,7 @@ class Stream:
     def told_form() -> str:
         """Return the form that --in names for the stream, "" if it names none."""
         others, form = forms_told(streams=True)
-        context = click.get_current_context(silent=True)
-        reads_trees = context is not None and TREES_OPENED in context.meta
-        if others and not reads_trees:
+        if others and not settings().reads_trees:
             both = f"--in {others[0]} and --in {form}: there is one stream"
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
         return form
@@ -172,7 +171,7 @@ class Stream:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
                 say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
-            if any(click.get_current_context().meta.get(READING, {}).values()):
+            if settings().stamps or settings().edges:
                 from frametool.cli.trees import say_not_needed
 
                 say_not_needed((form,), "stamps", "edges")

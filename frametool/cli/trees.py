@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.options import FORMS, READING, TREES_OPENED, VERBOSE, Text, forms_told
+from frametool.cli.group import settings
+from frametool.cli.options import Text, forms_told
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import HEAD, noting_files, states_of
@@ -194,38 +195,29 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     cache = None if context is None else context.find_object(TreeCache)
     if context is None or cache is None:
         return read()
-    context.meta[TREES_OPENED] = True
+    settings(context).reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    return cache.read(named, f"{options} {context.meta.get(FORMS)} {context.meta.get(READING)}", read)
+    return cache.read(named, f"{options} {vars(settings(context))}", read)
 
 
 def state(files: Sequence[Recording]) -> None:
     """Say on stderr what files that were read were taken for: those of other forms than ours, with -v all."""
-    context = click.get_current_context(silent=True)
-    if context is None:
-        return
     for file in files:
-        if context.meta.get(VERBOSE):
+        if settings().verbose:
             say(file.known)
-        if file.stated and not is_quiet():
+        if file.stated and not settings().quiet:
             say(file.stated)
 
 
 def say_not_needed(forms: Collection[str], *asked: str) -> None:
     """Say on stderr which options answer what none of these forms leaves open: they change nothing."""
-    if is_quiet():
+    if settings().quiet:
         return
     for ask in asked:
-        told = _reading("named_frames" if ask == "frames" else ask)
+        told = getattr(settings(), "named_frames" if ask == "frames" else ask)
         if told and not any(ask in FORMATS[form].asks for form in forms):
             option = f"--{ask.replace('_', '-')}"
             say(f"note: {option} changes nothing: {' and '.join(dict.fromkeys(forms))} does not leave that open")
-
-
-def is_quiet() -> bool:
-    """Return whether the command was called with --quiet, or is only completed."""
-    context = click.get_current_context(silent=True)
-    return context is None or bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
 
 
 def opened(
@@ -247,11 +239,9 @@ def opened(
     if not streams:
         _refuse_more("--in", forms, of or len(arguments))
     told = iter(forms[behind:] or forms)
-    context = click.get_current_context(silent=True)
-    if context is not None:
-        context.meta[TREES_OPENED] = True
-    topics = _reading("topics")
-    named = _reading("named_frames")
+    chosen = settings()
+    chosen.reads_trees = True
+    named = chosen.named_frames
     if not streams:
         _refuse_more("--frames", named, of or len(arguments))
     frames = iter(named[behind:] or named)
@@ -262,7 +252,7 @@ def opened(
         else Recording(
             tree_file(each),
             form=next(told, None),
-            topics=topics,
+            topics=chosen.topics,
             answers=general._replace(frames=_frame_names(next(frames, ""))),
         )
         for each in arguments
@@ -287,17 +277,11 @@ def _refuse_more(option: str, values: Sequence[str], files: int) -> None:
         raise click.UsageError(f"{option} is given {len(values)} times for {files} file{'s' * (files != 1)}")
 
 
-def _reading(name: str) -> Any:
-    """Return what an option about files of frames says."""
-    context = click.get_current_context(silent=True)
-    return (context.meta.get(READING, {}) if context is not None else {}).get(name, ())
-
-
 def answers() -> Answers:
     """Return what the options say about all files whose form leaves it open."""
-    named = {name: _reading(name) for name in Answers._fields if name not in ("joints", "frames")}
-    given = {name: value for name, value in named.items() if value}
-    return Answers(joints=_joints(_reading("joints")), **given)
+    chosen = settings()
+    named = {name: getattr(chosen, name) for name in Answers._fields if name not in ("joints", "frames")}
+    return Answers(joints=_joints(chosen.joints), **{name: value for name, value in named.items() if value})
 
 
 def _joints(texts: Sequence[str]) -> dict[str, str]:

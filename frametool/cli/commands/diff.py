@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import settings
 from frametool.cli.options import (
     FILE,
     TIME,
@@ -20,7 +21,7 @@ from frametool.cli.options import (
 )
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
-from frametool.cli.trees import FRAME, frame_name, is_quiet, load_sides
+from frametool.cli.trees import FRAME, frame_name, load_sides
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.load import lines_of
 from frametool.lint.findings import github_command
@@ -116,7 +117,7 @@ def command(
     one, other = load_sides((a, *with_a), (b, *with_b), normalize=normalize, places=places)
     start = seen_from and frame_name(seen_from, one)
     comparison = diff(one, other, at_ns=at_ns(at), seen_from=start, tolerance=tolerance)
-    for note in () if is_quiet() else comparison.notes:
+    for note in () if settings().quiet else comparison.notes:
         say(note)
     _write(output, comparison, places, everything=everything)
     if comparison.uncompared:
