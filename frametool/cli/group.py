@@ -1,13 +1,6 @@
-"""The group of all commands: each is imported when it is called; help and completion come from the table.
+"""How click is used: the group of all commands, what their options keep, their help, their calls and their misuse.
 
-The help option of all commands, made without click's translations: those load `locale`, 2 ms of every start.
-
-What click says of arguments, as errors and lines of ours.
-
-Commands that are called many times in one process: parser and values of options that are not given, made once.
-
-Both come from click itself, so there is no second list of options: the parser is click's own, a value that was given
-is processed by its parameter, and one that was not is what click made of an empty line.
+Each command is imported when it is called; help and completion come from the table.
 """
 
 from __future__ import annotations
@@ -90,32 +83,22 @@ def _help(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # clic
         ctx.exit()
 
 
-def _has_many_choices(option: click.Option, ctx: click.Context) -> bool:
-    """Tell whether the choices of an option are too long to stand beside it."""
-    has_choices = isinstance(option.type, click.Choice) and not option.metavar
-    return has_choices and len(option.make_metavar(ctx)) > LONGEST_CHOICE
-
-
-def _spelled(option: click.Option, ctx: click.Context) -> str:
-    """Return the names of an option and what it takes."""
-    names = ", ".join((*option.opts, *option.secondary_opts))
-    if option.is_flag or option.count:
-        return names
-    taken = option.make_metavar(ctx)
-    return f"{names} {option.opts[-1].strip('-').upper() if _has_many_choices(option, ctx) else taken}"
-
-
-def option_row(option: click.Option, ctx: click.Context) -> tuple[str, str]:
-    """Return an option and its meaning, with the choices that its name does not list."""
-    text = option.help or ""
-    if _has_many_choices(option, ctx):
-        what, bracket, default = text.partition("  [")
-        text = f"{what}: {', '.join(getattr(option.type, 'choices', ()))}{bracket}{default}"
+def option_row(option: click.Option) -> tuple[str, str]:
+    """Return the names of an option with what it takes, and its meaning; long lists of choices stand in the latter."""
+    names, text = ", ".join((*option.opts, *option.secondary_opts)), option.help or ""
+    taken = option.metavar or option.type.name.upper()
+    if isinstance(option.type, click.Choice) and not option.metavar:
+        taken = f"[{'|'.join(option.type.choices)}]"
+        if len(taken) > LONGEST_CHOICE:
+            taken = option.opts[-1].strip("-").upper()
+            what, bracket, default = text.partition("  [")
+            text = f"{what}: {', '.join(option.type.choices)}{bracket}{default}"
     if option.show_default and option.default is not None:
         text += f"  [default: {option.default}]"
-    return _spelled(option, ctx), text
+    return names if option.is_flag or option.count else f"{names} {taken}", text
 
 
+# made without click's translations: those load `locale`, 2 ms of every start
 HELP_OPTION = click.Option(
     ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_help, help="Show this message."
 )
@@ -140,32 +123,35 @@ WIDEST = 24  # of the left column
 LONGEST_CHOICE = 14  # of choices beside their option
 
 
+def option_groups(command: click.Command, ctx: click.Context) -> dict[str, list[click.Option]]:
+    """Return the options of a command under the headings of GROUPS, those of its own first; no heading is empty."""
+    placed = {name: title for title, names in GROUPS.items() for name in names}
+    groups: dict[str, list[click.Option]] = {title: [] for title in ("Options", *GROUPS)}
+    for each in command.get_params(ctx):
+        if isinstance(each, click.Option) and not each.hidden:
+            groups[placed.get(each.name or "", "Options")].append(each)
+    return {title: options for title, options in groups.items() if options}
+
+
 class WithHelp(click.Command):
     """A command with -h and --help, its options in groups."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options group by group, those of this command first; then the commands of a group."""
-        self._format_groups(ctx, formatter)
-        if isinstance(self, click.Group):
-            self.format_commands(ctx, formatter)
-
-    def _format_groups(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        options = [each for each in self.get_params(ctx) if isinstance(each, click.Option) and not each.hidden]
-        placed = {name: title for title, names in GROUPS.items() for name in names}
-        shown = [each for each in options if placed.get(each.name or "") != NAMES_ONLY]
-        width = max((size for each in shown if (size := len(_spelled(each, ctx))) <= WIDEST), default=0)
+        groups = option_groups(self, ctx)
+        rows = [option_row(each) for title, options in groups.items() if title != NAMES_ONLY for each in options]
+        width = max((len(left) for left, _ in rows if len(left) <= WIDEST), default=0)
         formatter.write_paragraph()
-        for title in ("Options", *GROUPS):
-            ours = [each for each in options if placed.get(each.name or "", "Options") == title]
-            if not ours:
-                continue
+        for title, options in groups.items():
             formatter.write(f"{title}:\n")
             with formatter.indentation():
                 if title == NAMES_ONLY:
-                    formatter.write_text("  ".join(each.opts[-1] for each in ours))
+                    formatter.write_text("  ".join(each.opts[-1] for each in options))
                 else:
-                    rows = [option_row(each, ctx) for each in ours]
-                    formatter.write_dl([(left.ljust(width), text) for left, text in rows], WIDEST, col_spacing=1)
+                    padded = [(left.ljust(width), text) for left, text in map(option_row, options)]
+                    formatter.write_dl(padded, WIDEST, col_spacing=1)
+        if isinstance(self, click.Group):
+            self.format_commands(ctx, formatter)
 
     def get_help_option(self, ctx: click.Context) -> click.Option | None:  # noqa: ARG002 - click's signature
         """Return the one help option."""
@@ -189,6 +175,13 @@ class Group(WithHelp, click.Group):
     """The commands of a table, each imported when it is called and not before."""
 
     table = COMMANDS
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Answer a call without arguments with help; click's own way to it has changed with its versions."""
+        if not args and not ctx.resilient_parsing:
+            show_help(ctx)
+            ctx.exit()
+        return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Name the commands, in the table's order."""
@@ -250,7 +243,7 @@ def _surroundings() -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-@click.command(cls=Group, help=HELP, no_args_is_help=True)
+@click.command(cls=Group, help=HELP)
 @click.option("-v", "all_versions", is_flag=True, is_eager=True, expose_value=False, callback=keep_setting,
               help="with --version: of Python and of its packages too")  # fmt: skip
 @click.option("--version", is_flag=True, expose_value=False, callback=_show_version,
@@ -292,17 +285,11 @@ def _status(result: object) -> int:
 
 
 def answered(call: Callable[[], int], arguments: Sequence[str]) -> int:
-    """Return the status of a call of a command; a call without arguments may have help for an answer.
-
-    Raises FrametoolError for all that a user did wrong.
-    """
+    """Return the status of a call of a command; raise FrametoolError for all that a user did wrong."""
     try:
         return call()
     except click.exceptions.Exit as end:
         return end.exit_code
-    except click.exceptions.NoArgsIsHelpError as error:
-        show_help(error.ctx)
-        return 0
     except click.ClickException as error:
         raise Misused(_usage(error, arguments)) from None
 

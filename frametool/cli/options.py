@@ -1,10 +1,6 @@
-"""What all commands share: negative numbers as arguments, the options of every result, where it is written.
+"""What commands share: the types of arguments, the options of inputs, results and times; adding them reads nothing.
 
-What the shell offers in the place of names that are in no list of choices: axes, and columns of the input.
-
-The options about files of frames, which `frametool.cli.trees` heeds; adding them to a command reads nothing yet.
-
-Times on the command line: decimal seconds or nanoseconds, `latest`, ranges and files; never through a float.
+Times are decimal seconds or nanoseconds, `latest`, ranges and files; they never pass through a float.
 """
 
 from __future__ import annotations
@@ -25,9 +21,7 @@ from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, nota
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-
-    from click.shell_completion import CompletionItem
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from frametool.formats.load import Rules
     from frametool.geometry.representations import Notation
@@ -80,7 +74,7 @@ def _with_form(args: list[str]) -> list[str]:
     return [f"{each}=text" if each == "--explain" else each for each in joined]
 
 
-class Text(click.ParamType[str]):
+class Text(click.types.StringParamType):
     """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes."""
 
     name = "text"
@@ -88,6 +82,19 @@ class Text(click.ParamType[str]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
         """Remove the blank."""
         return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
+        """Return what the shell may complete, and what it means; None for names of files, which the shell knows."""
+        return {}
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Offer what begins as the incomplete word does."""
+        from click.shell_completion import CompletionItem
+
+        offered = self.offers(ctx, incomplete)
+        if offered is None:
+            return [CompletionItem(incomplete, type="file")]
+        return [CompletionItem(word, help=about) for word, about in offered.items() if word.startswith(incomplete)]
 
 
 class Utf8(Text):
@@ -101,15 +108,13 @@ class Utf8(Text):
 
 
 class File(Text):
-    """A file's name, which the shell completes."""
+    """A file's name."""
 
     name = "file"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> None:  # noqa: ARG002
         """Leave it to the shell."""
-        from click.shell_completion import CompletionItem
-
-        return [CompletionItem(incomplete, type="file")]
+        return
 
 
 class Number(Text):
@@ -138,7 +143,7 @@ class Digits(Text):
         return FULL if value in ("full", FULL) else click.IntRange(0, 30).convert(value, param, ctx)
 
 
-class Notations(click.ParamType["tuple[Notation, ...]"]):
+class Notations(Text):
     """Names of representations, separated by commas."""
 
     name = "rep[,rep..]"
@@ -155,28 +160,14 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
             self.fail(str(error), param, ctx)
         return chosen
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
-        """Complete the last name of the list."""
-        from click.shell_completion import CompletionItem
-
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
+        """Offer names behind the last comma, and the axes of one that has its colon."""
         done, comma, begun = incomplete.rpartition(",")
         names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
         spec = begun.partition(":")[0]
         if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
             names += [f"{spec}:{axes}" for axes in ("all", *AXES)]
-        return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
-
-
-TEXT = Text()
-UTF8 = Utf8()
-FILE = File()
-
-
-def _setting(*names: str, **rest: Any) -> Callable[[Any], Any]:
-    return click.option(*names, expose_value=False, callback=keep_setting, **rest)
-
-
-verbose_option = _setting("-v", "--verbose", is_flag=True, help="say what each input was taken for")
+        return dict.fromkeys((done + comma + name for name in names), "")
 
 
 class Form(Text):
@@ -190,112 +181,17 @@ class Form(Text):
         self.are = are
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Refuse what is none, with the nearest name; of a form that is known and not read, say what to do."""
+        """Refuse an unknown one with the nearest name; of a form that is known and not read, say what to do."""
         if value not in self.names:
-            self.fail(self._problem(value), param, ctx)
+            if value in FORMATS and (instead := FORMATS[value].instead):
+                self.fail(f"{value} ({FORMATS[value].summary}) is not read: {instead}", param, ctx)
+            near = did_you_mean(value, self.names)
+            self.fail(f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all", param, ctx)
         return value
 
-    def _problem(self, value: str) -> str:
-        if value in FORMATS and (instead := FORMATS[value].instead):
-            return f"{value} ({FORMATS[value].summary}) is not read: {instead}"
-        near = did_you_mean(value, self.names)
-        return f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all"
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the forms."""
-        from click.shell_completion import CompletionItem
-
-        return [CompletionItem(name, help=FORMATS[name].summary) for name in self.names if name.startswith(incomplete)]
-
-
-def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
-    """Return the forms that --in names for files of frames, in their order, and the form of the stream.
-
-    streams: there is a stream; its form is the last one that can be streamed, "" if there is none
-    """
-    told = list(settings().input_forms)
-    streamed = [form for form in told if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
-    if not streamed:
-        return told, ""
-    last = len(told) - 1 - told[::-1].index(streamed[-1])
-    return told[:last] + told[last + 1 :], streamed[-1]
-
-
-in_option = _setting(
-    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM",
-    help="form of the input (`frametool formats`), once a file",
-)  # fmt: skip
-
-
-def say_if_verbose(text: str) -> None:
-    """Write a line on stderr if the command was called with -v."""
-    if settings().verbose:
-        say(text)
-
-
-_PRECISION = click.option(
-    "--precision", type=Digits(), metavar="N|full",
-    help="digits after the point  [default: full; overviews 6]",
-)  # fmt: skip
-_PLACE = (
-    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
-    click.option("--force", is_flag=True, help="let --output replace a file"),
-)
-
-
-def result_options(*what: str) -> Callable[[Function], Function]:
-    """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
-    form = click.option(
-        "-f", "--format", "format_name", type=click.Choice(("text", *writers(*what))),
-        help="form of the result",
-    )  # fmt: skip
-    return lambda function: decorated(function, (form, _PRECISION, *_PLACE))
-
-
-def list_options(*more: str) -> Callable[[Function], Function]:
-    """Add to a command the options that shape and place a list for people, which is text wherever it goes.
-
-    more: forms beside text and those of reports
-    """
-    form = click.option(
-        "-f", "--format", "format_name", type=click.Choice(("text", *writers("report"), *more)),
-        help="form of the result  [default: text]",
-    )  # fmt: skip
-    return lambda function: decorated(function, (form, *_PLACE))
-
-
-def rotation_options(function: Function) -> Function:
-    """Add to a command the options that choose how rotations are written."""
-    return decorated(
-        function,
-        [
-            click.option(
-                "--to",
-                "notations",
-                type=Notations(),
-                metavar="REP[,REP..]",
-                help="representations of the result  [default: quaternion]",
-            ),
-            click.option("--deg", is_flag=True, help="angles in degrees"),
-            click.option(
-                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"
-            ),
-        ],
-    )
-
-
-def pose_options(function: Function) -> Function:
-    """Add to a command the options that say how poses are read; they come beside `rotation_options`."""
-    return click.option(
-        "--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation"
-    )(function)
-
-
-def decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
-    """Add several options to a command, in this order in its help."""
-    for option in reversed(options):
-        function = option(function)
-    return function
+        return {name: FORMATS[name].summary for name in self.names}
 
 
 class AxesName(Text):
@@ -303,14 +199,13 @@ class AxesName(Text):
 
     name = "axes"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the conventions; behind `_from_` those it may come from."""
         from frametool.geometry.conventions import AXES, MIRRORED
 
         begun, joint, _ = incomplete.partition("_from_")
         known = {name: about for name, (_, about) in AXES.items()} | dict.fromkeys(MIRRORED, "mirrored")
-        offered = {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
-        return _items(offered.items(), incomplete)
+        return {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
 
 
 class ColumnNames(Text):
@@ -318,24 +213,17 @@ class ColumnNames(Text):
 
     name = "name"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
         """Offer those of the file that -i names."""
-        done, comma, begun = incomplete.rpartition(",")
+        done, comma, _ = incomplete.rpartition(",")
         path = ctx.params.get("input_path")
         found = _names_in(str(path)) if path and path != "-" else []
-        return _items(((done + comma + name, "") for name in found), done + comma + begun)
-
-
-def _items(offered: Iterable[tuple[str, str]], begun: str) -> list[CompletionItem]:
-    from click.shell_completion import CompletionItem
-
-    return [CompletionItem(name, help=about or None) for name, about in offered if name.startswith(begun)]
+        return dict.fromkeys((done + comma + name for name in found), "")
 
 
 def _names_in(path: str) -> list[str]:
     """Return the names of a table's columns, or the outermost keys of records; none for what cannot be read."""
     from frametool.documents.source import HEAD
-    from frametool.errors import FrametoolError
     from frametool.formats.detect import Beginning, detect
     from frametool.stream.table import open_table
 
@@ -350,16 +238,34 @@ def _names_in(path: str) -> list[str]:
         return []  # nothing to offer, and a completion must not print
 
 
-def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
-    """Add to a command the options that say how files of frames are read; `opened` heeds them.
-
-    streams: the command has those of streams too, `--in` and `--quiet` among them
-    """
-    own = () if streams else (in_option, _quiet_option)
-    return lambda function: decorated(function, (*own, *_READING_OPTIONS))
+TEXT = Text()
+UTF8 = Utf8()
+FILE = File()
 
 
-_quiet_option = _setting("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+def together(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
+    """Return what adds several options to a command, in this order in its help."""
+
+    def add(function: Function) -> Function:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return add
+
+
+def _setting(*names: str, **rest: Any) -> Callable[[Any], Any]:
+    return click.option(*names, expose_value=False, callback=keep_setting, **rest)
+
+
+# --- inputs --------------------------------------------------------------------------------------------------------
+
+verbose_option = _setting("-v", "--verbose", is_flag=True, help="say what each input was taken for")
+in_option = _setting(
+    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM",
+    help="form of the input (`frametool formats`), once a file",
+)  # fmt: skip
+array_option = _setting("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
 _CAMERA_AXES = _setting(
     "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
     help="turn cameras to these axes  [default: those that the form of the file has]",
@@ -367,29 +273,106 @@ _CAMERA_AXES = _setting(
 _STAMPS = _setting(
     "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
 )
-array_option = _setting("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
 _EDGES = _setting("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
-_READING_OPTIONS = (
+# of streams about trajectories: the times of their poses, the axes of cameras
+pose_reading_options = together(_CAMERA_AXES, _STAMPS, _EDGES, array_option)
+_READING = (
     _setting("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
-            help="read only this topic; may be repeated"),
+             help="read only this topic; may be repeated"),
     _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
-            help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
+             help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
     _setting("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
-            help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
+             help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
     _setting("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
-            help="names of frames that a form does not name; may be repeated, in the order of the files"),
+             help="names of frames that a form does not name; may be repeated, in the order of the files"),
     _setting("--direction", "direction", type=click.Choice(DIRECTIONS),
-            help="of matrices whose key does not say which frame they are seen from"),
+             help="of matrices whose key does not say which frame they are seen from"),
     _CAMERA_AXES,
     _setting("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
     _STAMPS,
 )  # fmt: skip
 
 
-def pose_reading_options(function: Function) -> Function:
-    """Add to a command of streams the options about trajectories: the times of their poses, the axes of cameras."""
-    return decorated(function, [_CAMERA_AXES, _STAMPS, _EDGES, array_option])
+def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
+    """Add to a command the options that say how files of frames are read; `opened` heeds them.
 
+    streams: the command has those of streams too, `--in` and `--quiet` among them
+    """
+    if streams:
+        return together(*_READING)
+    quiet = _setting("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+    return together(in_option, quiet, *_READING)
+
+
+def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
+    """Return the forms that --in names for files of frames, in their order, and the form of the stream.
+
+    streams: there is a stream; its form is the last one that can be streamed, "" if there is none
+    """
+    told = list(settings().input_forms)
+    streamed = [at for at, form in enumerate(told) if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
+    form = told.pop(streamed[-1]) if streamed else ""
+    return told, form
+
+
+def say_if_verbose(text: str) -> None:
+    """Write a line on stderr if the command was called with -v."""
+    if settings().verbose:
+        say(text)
+
+
+def say_not_needed(forms: Collection[str], *asked: str) -> None:
+    """Say on stderr which options answer what none of these forms leaves open: they change nothing."""
+    if settings().quiet:
+        return
+    for ask in asked:
+        chosen = getattr(settings(), "named_frames" if ask == "frames" else ask)
+        if chosen and not any(ask in FORMATS[form].asks for form in forms):
+            option = f"--{ask.replace('_', '-')}"
+            say(f"note: {option} changes nothing: {' and '.join(dict.fromkeys(forms))} does not leave that open")
+
+
+# --- results -------------------------------------------------------------------------------------------------------
+
+_PRECISION = click.option(
+    "--precision", type=Digits(), metavar="N|full", help="digits after the point  [default: full; overviews 6]"
+)
+_PLACE = (
+    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
+    click.option("--force", is_flag=True, help="let --output replace a file"),
+)
+
+
+def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
+    return click.option("-f", "--format", "format_name", type=click.Choice(("text", *forms)), help=text)
+
+
+def result_options(*what: str) -> Callable[[Function], Function]:
+    """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
+    return together(_form_option(writers(*what), "form of the result"), _PRECISION, *_PLACE)
+
+
+def list_options(*more: str) -> Callable[[Function], Function]:
+    """Add to a command the options that shape and place a list for people, which is text wherever it goes.
+
+    more: forms beside text and those of reports
+    """
+    return together(_form_option((*writers("report"), *more), "form of the result  [default: text]"), *_PLACE)
+
+
+# how rotations are written
+rotation_options = together(
+    click.option(
+        "--to", "notations", type=Notations(), metavar="REP[,REP..]",
+        help="representations of the result  [default: quaternion]",
+    ),
+    click.option("--deg", is_flag=True, help="angles in degrees"),
+    click.option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
+)  # fmt: skip
+# how poses are read; it comes beside `rotation_options`
+pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation")
+
+# --- times ---------------------------------------------------------------------------------------------------------
 
 LATEST = "latest"
 POLICIES = ("ros1", "ros2")
@@ -472,17 +455,17 @@ def at_ns(chosen: int | str | None) -> int | None:
     return chosen if isinstance(chosen, int) else None
 
 
-def rules_options(function: Function) -> Function:
-    """Add to a command the options that say how moving frames are taken."""
-    options = [
-        click.option("--moving", is_flag=True,
-                     help="an edge with one stamp answers only that instant"),
-        click.option("--cache", type=Time(latest=False), metavar="SECONDS",
-                     help="forget what is older  [default: nothing]"),
-        click.option("--tf2", type=click.Choice(POLICIES),
-                     help="take, refuse and complain as tf2 does"),
-    ]  # fmt: skip
-    return decorated(function, options)
+# how moving frames are taken
+rules_options = together(
+    click.option("--moving", is_flag=True, help="an edge with one stamp answers only that instant"),
+    click.option(
+        "--cache", type=Time(latest=False), metavar="SECONDS", help="forget what is older  [default: nothing]"
+    ),
+    click.option("--tf2", type=click.Choice(POLICIES), help="take, refuse and complain as tf2 does"),
+)
+times_option = click.option(
+    "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or FILE, one a line"
+)
 
 
 def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:
@@ -544,8 +527,3 @@ def _range(text: str) -> range:
         raise click.UsageError(f"--times {text} has more than {MOST_TIMES} times")
     return range(start, stop + 1, step)
 
-
-times_option = click.option(
-    "--times", type=TEXT, metavar="TIMES",
-    help="many: T,T,.., START:STOP:STEP, or FILE, one a line",
-)  # fmt: skip

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import FULL, TEXT, Digits, Number, Text, decorated
+from frametool.cli.options import FULL, TEXT, Digits, Number, Text, together
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
@@ -125,7 +125,7 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
         click.option("--holonomic", is_flag=True, help="let linear.y count in ROS 2, as the node's parameter does"),
         SEED,
     ]  # fmt: skip
-    return lambda function: decorated(function, options)
+    return together(*options)
 
 
 def format_options(function: Any) -> Any:
@@ -140,7 +140,7 @@ def format_options(function: Any) -> Any:
         click.option("--plot", type=TEXT, metavar="FILE", help="draw the result into a .svg, .html or .png"),
         click.option("--force", is_flag=True, help="let --output and --plot replace existing files"),
     )  # fmt: skip
-    return decorated(function, options)
+    return together(*options)(function)
 
 
 def output_options(function: Any) -> Any:
@@ -154,7 +154,7 @@ def output_options(function: Any) -> Any:
         click.option("--view", type=TEXT, metavar="FILE.html", help="show their frames over time in a page, as `view`"),
         format_options,
     )  # fmt: skip
-    return decorated(function, options)
+    return together(*options)(function)
 
 
 class SimOutput:

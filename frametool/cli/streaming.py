@@ -17,16 +17,17 @@ from frametool.cli.options import (
     UTF8,
     ColumnNames,
     Notations,
-    decorated,
     forms_told,
     in_option,
     say_if_verbose,
+    say_not_needed,
+    together,
     verbose_option,
 )
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
-from frametool.formats.detect import by_sign, detect
+from frametool.formats.detect import by_sign, detect, refuse_robots, with_hint
 from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
@@ -83,7 +84,7 @@ OPTIONS = {
 
 def stream_options(function: Function) -> Function:
     """Add to a command the options of streams; `Stream` takes them."""
-    return decorated(function, [OPTIONS["input_path"], in_option, *list(OPTIONS.values())[1:], verbose_option])
+    return together(OPTIONS["input_path"], in_option, *list(OPTIONS.values())[1:], verbose_option)(function)
 
 
 class Stream:
@@ -143,14 +144,10 @@ class Stream:
         with self.opened() as given:
             head = given.peek()
             if head.lstrip()[:1] == b"<":
-                from frametool.cli.trees import refuse_robots
-
                 refuse_robots(head, name)
             try:
                 return self._run_opened(given, name, request, output, tables_only=tables_only)
             except FormatError as error:
-                from frametool.cli.trees import with_hint
-
                 raise with_hint(error, head, name) from None
 
     def _run_opened(
@@ -171,10 +168,7 @@ class Stream:
                 form, known_by = detect(begin, *STREAMED, name=self.path or "")
             if known_by:
                 say_if_verbose(f"{name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
-            if settings().stamps or settings().edges:
-                from frametool.cli.trees import say_not_needed
-
-                say_not_needed((form,), "stamps", "edges")
+            say_not_needed((form,), "stamps", "edges")
             if tables_only and form in RECORDS:
                 raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
             request = self._completed(request, output, form)

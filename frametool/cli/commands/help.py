@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 from shutil import get_terminal_size
 from textwrap import fill
-from typing import Any
 
 import click
 
 from frametool.cli import COMMANDS
 from frametool.cli.group import show_help
-from frametool.cli.options import TEXT, Command
+from frametool.cli.options import Command, Text
 from frametool.cli.sink import writing
 from frametool.errors import alternatives, shown
 
@@ -35,22 +34,14 @@ def _wrapped(line: str, indent: int) -> str:
     return fill(line, min(get_terminal_size().columns, 100), subsequent_indent=" " * indent) + "\n"
 
 
-class Topic(click.ParamType[str]):
+class Topic(Text):
     """A subject or a command."""
 
     name = "topic"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002
         """Offer the subjects and the commands."""
-        from click.shell_completion import CompletionItem
-
-        known = topics() | {name: row[1] for name, row in COMMANDS.items()}
-        return [CompletionItem(name, help=about) for name, about in known.items() if name.startswith(incomplete)]
-
-    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Take the word as it is."""
-        converted: str = TEXT.convert(value, param, ctx)
-        return converted
+        return topics() | {name: row[1] for name, row in COMMANDS.items()}
 
 
 @click.command(cls=Command, name="help")

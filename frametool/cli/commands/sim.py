@@ -30,6 +30,6 @@ class SimGroup(Group):
     table = SUBCOMMANDS
 
 
-@click.command(cls=SimGroup, name="sim", help=HELP, epilog=EXIT_CODES, no_args_is_help=True)
+@click.command(cls=SimGroup, name="sim", help=HELP, epilog=EXIT_CODES)
 def command() -> None:
     """Hold the subcommands."""

@@ -17,10 +17,10 @@ from frametool.cli.options import (
     Command,
     Text,
     at_ns,
-    decorated,
     reading_options,
     rules,
     rules_options,
+    together,
     verbose_option,
 )
 from frametool.cli.output import drawn
@@ -84,7 +84,7 @@ def scene_options(function: Any) -> Any:
         click.option("--from", "eye", type=Eye(), default="slanted", show_default=True, metavar="EYE",
                      help="slanted, front, side, top, or AZ,EL in degrees"),
     ]  # fmt: skip
-    return decorated(function, options)
+    return together(*options)(function)
 
 
 @click.command(cls=Command, name="view")
