@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from frametool import __version__
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.help import topic, topics
 from frametool.cli.group import option_groups, option_row
 from frametool.cli.options import EXIT_CODES

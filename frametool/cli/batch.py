@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli import TROUBLE, TROUBLES, words_of
+from frametool.cli.commands import TROUBLE
 from frametool.cli.group import answered, called, called_in, group
 from frametool.cli.shell_words import NAME, Words, split
-from frametool.cli.stderr import BatchLine, say_error, telling_of, wants_json
+from frametool.cli.stderr import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
 from frametool.cli.trees import TreeCache
 from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, alternatives

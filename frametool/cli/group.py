@@ -14,7 +14,7 @@ import click
 from click.core import iter_params_for_processing
 
 from frametool import __version__
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.cli.sink import writing
 from frametool.errors import SHOWN, alternatives, shown
 from frametool.stream.faults import Misused
@@ -311,16 +311,12 @@ def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
 class Prepared(NamedTuple):
     """What does not change from one call of a command to the next.
 
-    parser: click's, made for all parameters
-    direct: the same, in which short names are found at once
-    params: all of them
+    parser: click's, in which short names are found at once
     absent: what the parser says of arguments that are not there
     values, settings: what parameters that are not there leave in a context
     """
 
     parser: Any
-    direct: Any
-    params: list[click.Parameter]
     absent: Mapping[str, Any]
     values: Mapping[str, Any]
     settings: Settings
@@ -329,8 +325,9 @@ class Prepared(NamedTuple):
 class Reused(click.Command):
     """A command that is parsed by click at its first call, and with what that left at all others.
 
-    Its parameters must not change, and their callbacks must do no more for an absent value than keep it in the
-    settings.
+    There is no second list of options: a value that is in the arguments is processed by its parameter, and one that is
+    not is what click made of an empty line. So its parameters must not change, and their callbacks must do no more for
+    an absent value than keep it in the settings.
     """
 
     _calls = 0
@@ -346,19 +343,18 @@ class Reused(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse as click does; only parameters that stand in the arguments are processed anew."""
         self._calls += 1
-        if self._calls == 1 or ctx.resilient_parsing:  # most processes call one command once
+        is_first = self._calls == 1  # and the only one in most processes
+        if is_first or ctx.resilient_parsing or any(each[2:3] == "=" for each in args):  # -f=x is no -f x
             return super().parse_args(ctx, args)
-        if self._prepared is None:
-            self._prepared = self._prepare(ctx)
-        parser, direct, params, absent, values, absent_settings = self._prepared
-        if not any(each[2:3] == "=" for each in args):  # -f=x is no -f x
-            parser = direct
+        self._prepared = self._prepared or self._prepare(ctx)
+        parser, absent, values, unset = self._prepared
         parser.ctx = ctx
         given, rest, order = parser.parse_args(args=list(args))
         if rest or not args:
             return super().parse_args(ctx, args)  # has the words for what is wrong
-        ctx.meta[SETTINGS] = copy(absent_settings)
-        wanted = [each for each in params if each.required or _is_given(each.name or "", given, absent)]
+        ctx.meta[SETTINGS] = copy(unset)
+        names = {name for name, value in given.items() if name not in absent or value is not absent[name]}
+        wanted = [each for each in self.get_params(ctx) if each.required or each.name in names]
         for param in iter_params_for_processing(order, wanted):
             param.handle_parse_result(ctx, given, rest)
         ctx.params = {**values, **ctx.params}
@@ -367,15 +363,9 @@ class Reused(click.Command):
 
     def _prepare(self, ctx: click.Context) -> Prepared:
         """Parse no arguments, once, without what may not be missing."""
-        params = self.get_params(ctx)
-        optional: list[click.Parameter] = [each for each in params if not each.required]
+        optional: list[click.Parameter] = [each for each in self.get_params(ctx) if not each.required]
         empty = click.Command(None, params=optional, add_help_option=False).make_context("", [])
-        parser, direct = self.make_parser(ctx), self.make_parser(ctx)
+        parser = self.make_parser(ctx)
         # click looks for -f among the long names first, and fails with all that an error message needs
-        direct._long_opt.update(direct._short_opt)  # noqa: SLF001
-        return Prepared(parser, direct, params, parser.parse_args(args=[])[0], empty.params, settings(empty))
-
-
-def _is_given(name: str, given: Mapping[str, Any], absent: Mapping[str, Any]) -> bool:
-    """Tell whether the arguments say something of a parameter."""
-    return name in given and (name not in absent or given[name] is not absent[name])
+        parser._long_opt.update(parser._short_opt)  # noqa: SLF001
+        return Prepared(parser, parser.parse_args(args=[])[0], empty.params, settings(empty))

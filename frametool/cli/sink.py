@@ -132,7 +132,7 @@ def _take_over(part: str, place: str) -> None:
     """Put a part file in its place, with the mode and, where the system lets us, the owner of the file before."""
     with suppress(FileNotFoundError):
         before = os.stat(place)
-        with suppress(OSError):
+        with suppress(OSError, AttributeError):  # Windows has no chown
             os.chown(part, before.st_uid, before.st_gid)
         os.chmod(part, stat.S_IMODE(before.st_mode))
     os.replace(part, place)

@@ -96,6 +96,18 @@ def discard(stream: TextIO) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
+TROUBLES = (MemoryError, ImportError, OSError)
+
+
+def words_of(trouble: Exception) -> str:
+    """Say what Python or the system could not do."""
+    if isinstance(trouble, MemoryError):
+        return "out of memory"
+    if isinstance(trouble, ImportError):  # numpy's tells of missing memory and files in many lines, the cause last
+        return f"a library cannot be loaded: {str(trouble).strip().splitlines()[-1]}"
+    return (getattr(trouble, "strerror", None) or str(trouble)).lower()
+
+
 PLACE = ("source", "line", "column")
 
 

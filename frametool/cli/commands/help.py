@@ -8,7 +8,7 @@ from textwrap import fill
 
 import click
 
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.cli.group import show_help
 from frametool.cli.options import Command, Text
 from frametool.cli.sink import writing
