@@ -265,7 +265,9 @@ def called(arguments: list[str]) -> int:
         return _status(group.invoke(ctx))
 
 
-def called_in(parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None]) -> int:
+def called_in(
+    parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None] | None = None
+) -> int:
     """Call the command that words begin with and return its status, as `called` does without making a group's context.
 
     parent: context of the group
@@ -275,7 +277,8 @@ def called_in(parent: click.Context, words: Sequence[str], prepare: Callable[[cl
     if name is None or command is None:
         raise click.UsageError("no command", parent)
     with command.make_context(name, rest, parent=parent) as ctx:
-        prepare(ctx)
+        if prepare:
+            prepare(ctx)
         return _status(command.invoke(ctx))
 
 
