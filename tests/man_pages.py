@@ -41,7 +41,7 @@ def _of_command(name: str, about: str, command: click.Command) -> str:
         for each in options:
             left, text = option_row(each)
             lines += [".TP", f".B {escaped(left)}", escaped(text)]
-    return "\n".join([*lines, *_ending(getattr(command, "exit_codes", EXIT_CODES))]) + "\n"
+    return "\n".join([*lines, *_ending(command.epilog or EXIT_CODES)]) + "\n"
 
 
 def _overview() -> str:

@@ -187,22 +187,12 @@ class Group(WithHelp, click.Group):
         """Name the commands, in the table's order."""
         return list(self.table)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        """Import one command."""
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """Import one command, or say which ones there are."""
         if cmd_name not in self.table:
-            return None
+            raise click.UsageError(f"no command {shown(cmd_name)}{alternatives(cmd_name, self.table, 'commands')}", ctx)
         found: click.Command = import_module(self.table[cmd_name][0]).command
         return found
-
-    def resolve_command(
-        self,
-        ctx: click.Context,
-        args: list[str],
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command, or say which ones there are."""
-        if args and args[0] not in self.table:
-            raise click.UsageError(f"no command {shown(args[0])}{alternatives(args[0], self.table, 'commands')}", ctx)
-        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands from the table, without importing any."""
@@ -252,8 +242,8 @@ def group() -> None:
     """Hold the commands."""
 
 
-def called(arguments: list[str]) -> int:
-    """Call a command and return its status.
+def called(arguments: list[str]) -> object:
+    """Call a command and return its result.
 
     Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
     """
@@ -262,39 +252,33 @@ def called(arguments: list[str]) -> int:
 
         return shell_complete(group, {}, "frametool", COMPLETION, instruction)
     with group.make_context("frametool", arguments) as ctx:
-        return _status(group.invoke(ctx))
+        return group.invoke(ctx)
 
 
 def called_in(
     parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None] | None = None
-) -> int:
-    """Call the command that words begin with and return its status, as `called` does without making a group's context.
+) -> object:
+    """Call the command that words begin with, as `called` does, without making a context for the group.
 
     parent: context of the group
     prepare: is shown the command's context before it runs
     """
-    name, command, rest = group.resolve_command(parent, list(words))
-    if name is None or command is None:
-        raise click.UsageError("no command", parent)
-    with command.make_context(name, rest, parent=parent) as ctx:
+    name, *rest = words
+    with group.get_command(parent, name).make_context(name, rest, parent=parent) as ctx:
         if prepare:
             prepare(ctx)
-        return _status(command.invoke(ctx))
+        return ctx.command.invoke(ctx)
 
 
-def _status(result: object) -> int:
-    """Return the status that a command's result stands for."""
-    return result if isinstance(result, int) else 0
-
-
-def answered(call: Callable[[], int], arguments: Sequence[str]) -> int:
+def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
     """Return the status of a call of a command; raise FrametoolError for all that a user did wrong."""
     try:
-        return call()
+        result = call()
     except click.exceptions.Exit as end:
         return end.exit_code
     except click.ClickException as error:
         raise Misused(_usage(error, arguments)) from None
+    return result if isinstance(result, int) else 0
 
 
 def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:

@@ -45,8 +45,6 @@ class Command(WithHelp, Reused):
     own check of misspelled options; `Text` takes the blank off again.
     """
 
-    exit_codes = EXIT_CODES
-
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers (-j is an option where joints are), give a bare --explain its form, then parse."""
         if any(map(NEGATIVE.match, args)):
@@ -54,24 +52,21 @@ class Command(WithHelp, Reused):
             args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
         return super().parse_args(ctx, _with_form(args) if "--explain" in args else args)
 
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """End every help with the exit codes."""
-        super().format_epilog(ctx, formatter)
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """End every help with the exit codes, those of most commands unless its epilog says others."""
         formatter.write_paragraph()
-        formatter.write_text(self.exit_codes)
+        formatter.write_text(self.epilog or EXIT_CODES)
 
 
 def _with_form(args: list[str]) -> list[str]:
     """Join --explain with the form behind it, or with `text`: click would take any argument there for its value."""
-    joined: list[str] = []
-    for each in args:
-        if joined and joined[-1] == "--explain":
-            is_form = each in ("text", "markdown", "latex")
-            joined[-1] = f"--explain={each if is_form else 'text'}"
-            if is_form:
-                continue
-        joined.append(each)
-    return [f"{each}=text" if each == "--explain" else each for each in joined]
+    forms, joined = ("text", "markdown", "latex"), []
+    for before, each, behind in zip(["", *args], args, [*args[1:], ""], strict=False):
+        if each == "--explain":
+            joined.append(f"--explain={behind if behind in forms else 'text'}")
+        elif before != "--explain" or each not in forms:
+            joined.append(each)
+    return joined
 
 
 class Text(click.types.StringParamType):
@@ -148,7 +143,7 @@ class Notations(Text):
 
     name = "rep[,rep..]"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Notation, ...]:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Look each name up."""
         if not isinstance(value, str):
             return tuple(value)
@@ -441,10 +436,8 @@ class Time(Text):
             return text
         try:
             return whole_stamp(parse_stamp(text))
-        except NotATime as error:
-            self.fail(f"{error}{', or latest' if self.latest else ''}", param, ctx)
         except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
+            self.fail(f"{error}{', or latest' if self.latest and isinstance(error, NotATime) else ''}", param, ctx)
 
 
 TIME = Time()

@@ -109,12 +109,9 @@ def load_tree(
 
 
 def load_sides(
-    a: Sequence[str], b: Sequence[str], *, normalize: bool, places: Sequence[dict[str, Place]]
-) -> list[FrameTree | TransformBuffer]:
-    """Read two trees that will be compared, each of several files, as `load_tree` does.
-
-    places: are filled with where each frame of the one and the other was said to be
-    """
+    a: Sequence[str], b: Sequence[str], *, normalize: bool
+) -> list[tuple[FrameTree | TransformBuffer, dict[str, Place]]]:
+    """Read two trees that will be compared, each of several files, as `load_tree` does; with each frame's place."""
     from frametool.formats.load import Rules
 
     refuse_two_readers((*a, *b))
@@ -124,13 +121,10 @@ def load_sides(
         where: dict[str, Place] = {}
         return _loaded(opened(arguments, behind=behind, of=count), Rules(normalize=normalize), where), where
 
-    trees = []
-    for arguments, behind, found in zip((a, b), (0, len(a)), places, strict=True):
-        options = f"{normalize} {behind} of {count}"
-        tree, where = _read_once(arguments, options, partial(side, arguments, behind))
-        trees.append(tree)
-        found.update(where)
-    return trees
+    return [
+        _read_once(arguments, f"{normalize} {behind} of {count}", partial(side, arguments, behind))
+        for arguments, behind in ((a, 0), (b, len(a)))
+    ]
 
 
 def _loaded(

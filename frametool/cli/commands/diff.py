@@ -35,12 +35,7 @@ if TYPE_CHECKING:
     from frametool.lint.tree_diff import Comparison
 
 DIFFERENT, TROUBLE = 1, 2
-
-
-class DiffCommand(Command):
-    """A command with the exit codes of diff(1)."""
-
-    exit_codes = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
+EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
 
 
 class ToleranceOption(Text):
@@ -77,7 +72,7 @@ def _is_angle(text: str, *, bare: bool) -> bool:
     return re.search("deg|rad|°|pi|π", text) is not None or (bare and not text.endswith("m"))
 
 
-@click.command(cls=DiffCommand, name="diff")
+@click.command(cls=Command, name="diff", epilog=EXIT_CODES)
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
 @click.option("--with-a", multiple=True, type=FILE, metavar="FILE", help="merge this file into A; may be repeated")
@@ -113,13 +108,12 @@ def command(
     in the order of the files: A, those of --with-a, B, those of --with-b; given for A only they count for both.
     """
     output = Output("report", **options, otherwise="text")
-    places: list[dict[str, Place]] = [{}, {}]
-    one, other = load_sides((a, *with_a), (b, *with_b), normalize=normalize, places=places)
+    (one, of_one), (other, of_other) = load_sides((a, *with_a), (b, *with_b), normalize=normalize)
     start = seen_from and frame_name(seen_from, one)
     comparison = diff(one, other, at_ns=at_ns(at), seen_from=start, tolerance=tolerance)
     for note in () if settings().quiet else comparison.notes:
         say(note)
-    _write(output, comparison, places, everything=everything)
+    _write(output, comparison, (of_one, of_other), everything=everything)
     if comparison.uncompared:
         count = len(comparison.uncompared)
         say(f"{count} frame{'s' * (count != 1)} not compared: no data in A and B; --at chooses another time")

@@ -59,9 +59,7 @@ def command(ctx: click.Context, name: str | None) -> None:
     if name in COMMANDS and name not in known:  # calc and formats are subjects too
         from frametool.cli.group import group
 
-        found = group.get_command(ctx, name)
-        if found is not None and ctx.parent is not None:
-            show_help(click.Context(found, parent=ctx.parent, info_name=name))
+        show_help(click.Context(group.get_command(ctx, name), parent=ctx.parent, info_name=name))
         return
     if name is not None and name not in known:
         raise click.UsageError(f"no topic {shown(name)}{alternatives(name, tuple(known | COMMANDS), 'topics')}")
