@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from frametool.formats.load import Rules
-    from frametool.geometry.representations import Notation
     from frametool.grammar.result import Result
 
     Function = TypeVar("Function", bound=Callable[..., Any])
