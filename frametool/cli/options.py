@@ -15,7 +15,6 @@ from frametool.cli.group import Reused, WithHelp, keep_setting, settings
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, readers, writers
-from frametool.frames.stamps import NotATime, parse_stamp, whole_stamp
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 from frametool.text.numbers import parse_number
@@ -433,10 +432,19 @@ class Time(Text):
         text = super().convert(value, param, ctx)
         if not isinstance(text, str) or (self.latest and text == LATEST):
             return text
+        from frametool.frames.stamps import NotATime
+
         try:
-            return whole_stamp(parse_stamp(text))
+            return _stamp_ns(text)
         except ValueInvalid as error:
             self.fail(f"{error}{', or latest' if self.latest and isinstance(error, NotATime) else ''}", param, ctx)
+
+
+def _stamp_ns(text: str) -> int:
+    """Read a time in seconds, or in nanoseconds with `ns`."""
+    from frametool.frames.stamps import parse_stamp, whole_stamp  # few calls say a time
+
+    return whole_stamp(parse_stamp(text))
 
 
 TIME = Time()
@@ -489,7 +497,7 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
     for number, line in enumerate(source.text.splitlines(), 1):
         if (stripped := line.strip()) and not stripped.startswith("#"):
             try:
-                times.append(whole_stamp(parse_stamp(stripped)))
+                times.append(_stamp_ns(stripped))
             except ValueInvalid as error:
                 bad += 1
                 report(FormatError(str(error), source=source.name, line=number))
@@ -501,7 +509,7 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 def _listed(text: str) -> list[int]:
     """Read times between commas."""
     try:
-        return [whole_stamp(parse_stamp(part.strip())) for part in text.split(",")]
+        return [_stamp_ns(part.strip()) for part in text.split(",")]
     except ValueInvalid as error:
         hint = "times are T,T,.. in seconds, START:STOP:STEP, or a file"
         raise click.UsageError(f"--times {shown(text)}: {error}; {hint}") from None
@@ -510,7 +518,7 @@ def _listed(text: str) -> list[int]:
 def _range(text: str) -> range:
     """Read START:STOP:STEP."""
     try:
-        start, stop, step = (whole_stamp(parse_stamp(part)) for part in text.split(":"))
+        start, stop, step = map(_stamp_ns, text.split(":"))
     except ValueInvalid as error:
         raise click.UsageError(f"--times {text}: {error}; a range is START:STOP:STEP in seconds") from None
     if step <= 0 or stop < start:

@@ -14,6 +14,8 @@ import os
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
+from frametool.stream.faults import Misused
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -86,7 +88,7 @@ def split(line: str) -> Words:
             return Words(words, problem or f"the {text} in column {token.start() + 1} is not closed")
         try:
             parts = list(_parts(kind, token[kind], is_first=word is None))
-        except _Refused as refused:
+        except Misused as refused:
             problem = problem or str(refused)
             parts = []
         if word is None:
@@ -96,12 +98,8 @@ def split(line: str) -> Words:
     return Words(words, problem)
 
 
-class _Refused(Exception):
-    """Report what only a shell can do."""
-
-
 def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[WordPart]:
-    """Yield the pieces of a token."""
+    """Yield the pieces of a token; raise Misused for what only a shell can do."""
     if kind == "double":
         for token in _IN_QUOTES.finditer(text):
             inner = token.lastgroup or ""
@@ -109,7 +107,7 @@ def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[WordPart
     elif kind == "dollar":
         yield _named(text)
     elif kind == "odd":
-        raise _Refused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
+        raise Misused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
     elif kind == "quoted":  # a backslash in double quotes stays before what needs none
         yield WordPart(text if text in '$`"\\' else f"\\{text}")
     elif kind == "plain" and is_first and text.startswith("~/"):
@@ -127,10 +125,10 @@ def _named(text: str) -> WordPart:
     if behind == "$":
         return WordPart("$")
     if behind == "(":
-        raise _Refused(f"$( is for a shell: {_INSTEAD['$(']}; in single quotes it is text")
+        raise Misused(f"$( is for a shell: {_INSTEAD['$(']}; in single quotes it is text")
     if not behind:
         return WordPart(text)
-    raise _Refused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
+    raise Misused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
 
 
 def _ends_in_backslash(line: str) -> bool:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     Write = Callable[[str | bytes | memoryview], None]
 
 LONGEST_NAME = 255  # bytes, on nearly every file system
-_OWN_STREAM = re.compile(r"/dev/(?:(stdout)|(stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
 
 
 @contextmanager
@@ -58,11 +57,8 @@ def is_special(path: str) -> bool:
 
 def _own_stream(path: str) -> int | None:
     """Return the descriptor that a path such as /dev/stdout stands for."""
-    found = _OWN_STREAM.fullmatch(path)
-    if not found:
-        return None
-    out, err, *numbers = found.groups()
-    return 1 if out else 2 if err else int(next(filter(None, numbers)))
+    found = re.fullmatch(r"(?:/dev|/proc/self)/fd/(\d+)", path)
+    return int(found[1]) if found else {"/dev/stdout": 1, "/dev/stderr": 2}.get(path)
 
 
 def _writer(stream: BinaryIO, name: str) -> Write:

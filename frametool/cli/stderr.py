@@ -108,9 +108,6 @@ def words_of(trouble: Exception) -> str:
     return (getattr(trouble, "strerror", None) or str(trouble)).lower()
 
 
-PLACE = ("source", "line", "column")
-
-
 def wants_json(arguments: Sequence[str]) -> bool:
     """Tell whether the arguments of a command ask for JSON."""
     if "--format=json" in arguments or "-fjson" in arguments:
@@ -126,10 +123,9 @@ def as_json(error: FrametoolError, line: BatchLine | None = None, fate: str = ""
     """
     from frametool.documents.json import dump
 
-    message, details = str(error), error.details()
+    message, details = str(error), dict(error.details())
     if line is not None:
-        own = {key: value for key, value in details.items() if key in PLACE}
-        rest = {key: value for key, value in details.items() if key not in PLACE}
+        own = {key: details.pop(key) for key in ("source", "line", "column") if key in details}
         message = f"{line}{message}"
-        details = {**line._asdict(), **({"input": own} if own else {}), **rest}
+        details = {**line._asdict(), **({"input": own} if own else {}), **details}
     return dump({"error": error.kind, "message": f"{message} ({fate})" if fate else message, **details})
