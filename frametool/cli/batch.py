@@ -150,19 +150,6 @@ def print_as_json(name: str, context: click.Context) -> None:
     params["format_name"] = "json"
 
 
-@contextmanager
-def captured() -> Iterator[BytesIO]:
-    """Yield what takes everything that is printed in the block."""
-    held = _Limited()
-    stream = TextIOWrapper(held, "utf-8")
-    try:
-        with redirect_stdout(stream):
-            yield held
-            sys.stdout.flush()
-    finally:
-        stream.detach()
-
-
 class _Limited(BytesIO):
     """Bytes, no more of them than a document may have."""
 
@@ -251,10 +238,12 @@ class CommandBatch:
         if not name:
             is_own = words[0].startswith("-")  # an option of frametool itself
             return answered(lambda: called(words) if is_own else called_in(self.context, words), words)
-        with captured() as held:
+        held = _Limited()
+        with redirect_stdout(TextIOWrapper(held, "utf-8", write_through=True)) as stream:
             status = answered(lambda: called_in(self.context, words, partial(print_as_json, name)), words)
         if status in FINISHED:
             self.results.keep(name, held.getvalue().decode())
+        stream.detach()
         return status
 
 
