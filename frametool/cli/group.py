@@ -6,7 +6,6 @@ Each command is imported when it is called; help and completion come from the ta
 from __future__ import annotations
 
 import os
-from copy import copy
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -339,7 +338,7 @@ class Reused(click.Command):
         given, rest, order = parser.parse_args(args=list(args))
         if rest or not args:
             return super().parse_args(ctx, args)  # has the words for what is wrong
-        ctx.meta[SETTINGS] = copy(unset)
+        vars(settings(ctx)).update(vars(unset))
         names = {name for name, value in given.items() if name not in absent or value is not absent[name]}
         wanted = [each for each in self.get_params(ctx) if each.required or each.name in names]
         for param in iter_params_for_processing(order, wanted):
