@@ -55,7 +55,7 @@ def run(arguments: list[str]) -> int:
     except BrokenPipeError:
         status = die_of("SIGPIPE")  # as `cat` does when its reader is gone
     except TROUBLES as error:
-        if status != in_out or not isinstance(error, OSError):  # else it was told, and the buffer fails again
+        if status != in_out or not isinstance(error, OSError):  # else it was reported, and the buffer fails again
             say(words_of(error))
         if isinstance(error, OSError):
             discard(sys.stdout)

@@ -297,15 +297,15 @@ def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
     return together(in_option, quiet, *_READING)
 
 
-def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
+def input_forms(*, streams: bool = False) -> tuple[list[str], str]:
     """Return the forms that --in names for files of frames, in their order, and the form of the stream.
 
     streams: there is a stream; its form is the last one that can be streamed, "" if there is none
     """
-    told = list(settings().input_forms)
-    streamed = [at for at, form in enumerate(told) if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
-    form = told.pop(streamed[-1]) if streamed else ""
-    return told, form
+    forms = list(settings().input_forms)
+    streamed = [at for at, form in enumerate(forms) if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
+    of_stream = forms.pop(streamed[-1]) if streamed else ""
+    return forms, of_stream
 
 
 def say_if_verbose(text: str) -> None:
@@ -362,7 +362,7 @@ rotation_options = together(
     click.option("--deg", is_flag=True, help="angles in degrees"),
     click.option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
 )  # fmt: skip
-# how poses are read; it comes beside `rotation_options`
+# how poses are read; commands have it with `rotation_options`
 pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation")
 
 # --- times ---------------------------------------------------------------------------------------------------------
@@ -395,7 +395,7 @@ class Skipped:
         return len(self.errors) >= MOST_TOLD
 
     def add(self, error: FrametoolError | None, count: int = 1) -> None:
-        """Count one time, or several in a row; keep why they are left out, if that is told and will be reported."""
+        """Count one time, or several in a row; keep why they are left out if that will be reported."""
         self.count += count
         if error is not None and not self.is_full:
             self.errors.append(error)

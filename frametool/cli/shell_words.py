@@ -30,10 +30,10 @@ _TOKEN = re.compile(
     | "(?P<double> (?:[^"\\]|\\.)*)"
     | \\(?P<escaped> .)
     | (?P<dollar> \$['"] | {_DOLLAR})
-    | (?P<odd> .)
+    | (?P<special> .)
     """
 )
-_IN_QUOTES = re.compile(rf"(?s)\\(?P<escaped>.)|(?P<dollar>{_DOLLAR})|(?P<odd>`)|(?P<plain>[^\\$`]+)")
+_IN_QUOTES = re.compile(rf"(?s)\\(?P<escaped>.)|(?P<dollar>{_DOLLAR})|(?P<special>`)|(?P<plain>[^\\$`]+)")
 _INSTEAD = {
     "|": "keep a result by NAME = COMMAND and give $NAME",
     "<": "name the file as an argument, or with -i",
@@ -82,9 +82,9 @@ def split(line: str) -> Words:
             continue
         if text == "#" and word is None:
             break
-        if kind == "odd" and (text == "\\" or (text in "'\"" and _ends_in_backslash(line))):
+        if kind == "special" and (text == "\\" or (text in "'\"" and _ends_in_backslash(line))):
             return Words(words, problem, goes_on=True)
-        if kind == "odd" and text in "'\"":
+        if kind == "special" and text in "'\"":
             return Words(words, problem or f"the {text} in column {token.start() + 1} is not closed")
         try:
             parts = list(_parts(kind, token[kind], is_first=word is None))
@@ -106,7 +106,7 @@ def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[WordPart
             yield from _parts("quoted" if inner == "escaped" else inner, token[inner])
     elif kind == "dollar":
         yield _named(text)
-    elif kind == "odd":
+    elif kind == "special":
         raise Misused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
     elif kind == "quoted":  # a backslash in double quotes stays before what needs none
         yield WordPart(text if text in '$`"\\' else f"\\{text}")

@@ -81,7 +81,7 @@ def _encoded(text: str) -> bytes:
 
 @contextmanager
 def _problems_of(name: str) -> Iterator[None]:
-    """Name the place in what the system reports of it; a reader that is gone is no problem of ours."""
+    """Name the place in what the system reports of it; a reader that is gone is no problem."""
     try:
         yield
     except BrokenPipeError:

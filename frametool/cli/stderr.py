@@ -1,7 +1,4 @@
-"""Talk beside the data: the one way to stderr, which nobody has to read.
-
-An error as one JSON object on a line of stderr: the sentence and what it is made of.
-"""
+"""Messages about the work: the one way to stderr, which nobody has to read; errors as sentences or as JSON."""
 
 from __future__ import annotations
 
@@ -34,7 +31,7 @@ _lines: list[BatchLine] = []
 
 @contextmanager
 def telling_of(line: BatchLine) -> Iterator[None]:
-    """Name a line of a batch in all that is told while its command runs."""
+    """Name a line of a batch in all messages while its command runs."""
     _lines.append(line)
     try:
         yield
@@ -64,7 +61,7 @@ def say(text: str) -> None:
 def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
     """Write a warning; what tf2 would have logged stands there in its own words.
 
-    With --quiet nothing is said of names that lost their leading slash: their tree is as it was meant.
+    With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.
     """
     if rule == "slash":
         from frametool.cli.group import settings

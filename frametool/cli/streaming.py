@@ -17,8 +17,8 @@ from frametool.cli.options import (
     UTF8,
     ColumnNames,
     Notations,
-    forms_told,
     in_option,
+    input_forms,
     say_if_verbose,
     say_not_needed,
     together,
@@ -132,7 +132,7 @@ class Stream:
     @staticmethod
     def told_form() -> str:
         """Return the form that --in names for the stream, "" if it names none."""
-        others, form = forms_told(streams=True)
+        others, form = input_forms(streams=True)
         if others and not settings().reads_trees:
             both = f"--in {others[0]} and --in {form}: there is one stream"
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.group import settings
-from frametool.cli.options import Text, forms_told, say_not_needed
+from frametool.cli.options import Text, input_forms, say_not_needed
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import noting_files, states_of
@@ -62,13 +62,13 @@ class TreeCache:
 
     def __init__(self) -> None:
         """Create an empty cache."""
-        self._kept: dict[Hashable, Remembered] = {}
+        self._values: dict[Hashable, Remembered] = {}
 
     def read(self, arguments: Sequence[str], options: Hashable, read: Callable[[], Value]) -> Value:
         """Return what `read` makes of some arguments: as it did before, or anew where a file has changed."""
         key = (tuple(arguments), options)
-        kept = self._kept.pop(key, None)
-        if kept is None or not kept.is_current():
+        found = self._values.pop(key, None)
+        if found is None or not found.is_current():
             texts = [argument for argument in arguments if is_inline(argument)]
             with noting_files() as files:
                 for argument in arguments:
@@ -78,11 +78,11 @@ class TreeCache:
             if not _may_be_kept(files):
                 return value
             size = sum(map(len, texts)) + sum(state.size for states in files.values() for state in states)
-            kept = Remembered(value, files, size)
-        self._kept[key] = kept  # as the youngest
-        while len(self._kept) > MOST or sum(each.size for each in self._kept.values()) > MOST_BYTES:
-            del self._kept[next(iter(self._kept))]
-        return kept.value  # type: ignore[no-any-return]
+            found = Remembered(value, files, size)
+        self._values[key] = found  # as the youngest
+        while len(self._values) > MOST or sum(each.size for each in self._values.values()) > MOST_BYTES:
+            del self._values[next(iter(self._values))]
+        return found.value  # type: ignore[no-any-return]
 
 
 def _may_be_kept(files: dict[str, list[FileState]]) -> bool:
@@ -143,7 +143,7 @@ def _loaded(
 def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]) -> Value:
     """Return what is read from files; in a batch, what was read from them before as long as they have not changed.
 
-    options: what says how, beside the options that the context keeps
+    options: what says how, as well as the settings
     """
     context = click.get_current_context(silent=True)
     cache = None if context is None else context.find_object(TreeCache)
@@ -155,7 +155,7 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
 
 
 def state(files: Sequence[Recording]) -> None:
-    """Say on stderr what files that were read were taken for: those of other forms than ours, with -v all."""
+    """Say on stderr what files that were read were taken for: those of other forms than the own one, with -v all."""
     for file in files:
         if settings().verbose:
             say(file.known)
@@ -179,7 +179,7 @@ def opened(
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
     chosen = settings()
     chosen.reads_trees = True
-    forms, named = forms_told(streams=streams)[0], chosen.named_frames
+    forms, named = input_forms(streams=streams)[0], chosen.named_frames
     if other := [form for form in forms if "tree" not in FORMATS[form].reads]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
     files = of or len(arguments)
