@@ -62,7 +62,7 @@ OPTIONS = {
         "--prefix", type=UTF8, default="", metavar="TEXT", help="begin the names of the result's columns so"
     ),
     "header": click.option(
-        "--no-header", "header", is_flag=True, flag_value=False, default=True,
+        "--no-header", "header", is_flag=True, callback=lambda _context, _option, chosen: not chosen,
         help="a table without names; columns are numbered",
     ),
     "on_error": click.option(
