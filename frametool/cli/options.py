@@ -526,4 +526,3 @@ def _range(text: str) -> range:
     if (stop - start) // step >= MOST_TIMES:
         raise click.UsageError(f"--times {text} has more than {MOST_TIMES} times")
     return range(start, stop + 1, step)
-

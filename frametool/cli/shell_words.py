@@ -134,4 +134,3 @@ def _named(text: str) -> WordPart:
 def _ends_in_backslash(line: str) -> bool:
     """Tell whether the last character is a backslash that no other one takes."""
     return (len(line) - len(line.rstrip("\\"))) % 2 == 1
-

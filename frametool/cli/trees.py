@@ -103,9 +103,7 @@ def load_tree(
     streams: `--in` is about what is streamed wherever that can be
     """
     arguments = (argument, *more)
-    return _read_once(
-        arguments, f"{rules!r} {streams}", lambda: _loaded(opened(arguments, streams=streams), rules)
-    )
+    return _read_once(arguments, f"{rules!r} {streams}", lambda: _loaded(opened(arguments, streams=streams), rules))
 
 
 def load_sides(
