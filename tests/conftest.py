@@ -39,7 +39,8 @@ def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Outcom
         monkeypatch.chdir(tmp_path)
         for name, content in (files or {}).items():
             (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
-        streams = {"out": io.TextIOWrapper(io.BytesIO(), "utf-8"), "err": io.TextIOWrapper(io.BytesIO(), "utf-8")}
+        errors = {"out": "strict", "err": "backslashreplace"}  # as Python opens them
+        streams = {name: io.TextIOWrapper(io.BytesIO(), "utf-8", errors=each) for name, each in errors.items()}
         data = stdin.encode() if isinstance(stdin, str) else stdin
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BufferedReader(io.BytesIO(data)), "utf-8"))
         monkeypatch.setattr(sys, "stdout", streams["out"])

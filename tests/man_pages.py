@@ -9,9 +9,9 @@ from pathlib import Path
 import click
 
 from frametool import __version__
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.help import topic, topics
-from frametool.cli.group import GROUPS, option_row
+from frametool.cli.group import option_groups, option_row
 from frametool.cli.options import EXIT_CODES
 
 FOLDER = Path(__file__).resolve().parent.parent / "frametool" / "data" / "share" / "man" / "man1"
@@ -36,15 +36,12 @@ def _of_command(name: str, about: str, command: click.Command) -> str:
         for inner in command.list_commands(context):
             found = command.get_command(context, inner)
             lines += [".TP", f".B {escaped(inner)}", escaped((found.help or "").split("\n")[0] if found else "")]
-    placed = {each: title for title, names in GROUPS.items() for each in names}
-    options = [each for each in command.get_params(context) if isinstance(each, click.Option)]
-    for title in ("Options", *GROUPS):
-        ours = [each for each in options if placed.get(each.name or "", "Options") == title]
-        lines += [f".SH {title.partition(' (')[0].upper()}"] if ours else []
-        for each in ours:
-            left, text = option_row(each, context)
+    for title, options in option_groups(command, context).items():
+        lines.append(f".SH {title.partition(' (')[0].upper()}")
+        for each in options:
+            left, text = option_row(each)
             lines += [".TP", f".B {escaped(left)}", escaped(text)]
-    return "\n".join([*lines, *_ending(getattr(command, "exit_codes", EXIT_CODES))]) + "\n"
+    return "\n".join([*lines, *_ending(command.epilog or EXIT_CODES)]) + "\n"
 
 
 def _overview() -> str:

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from frametool import Transform
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

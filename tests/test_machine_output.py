@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from machine_output import COMMANDS, GOLDEN, ROOT, STREAMS
 
-from frametool.cli import COMMANDS as NAMES
+from frametool.cli.commands import COMMANDS as NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable

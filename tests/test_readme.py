@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import console
 import pytest
 
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.formats.table import FORMATS
 from frametool.geometry.representations import REPRESENTATIONS
 

@@ -1,27 +1,25 @@
 """A batch: commands one after the other in one process, each as it would run alone in a pipe.
 
-The lines of a batch as they come: each with its number, its words, and the name under which its result is kept.
-
-Results that a batch keeps under names instead of printing them, as the text that then stands for them.
+NAME = COMMAND keeps the result, as JSON text, instead of printing it; $NAME then stands for it.
 """
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
 import sys
 from contextlib import contextmanager, redirect_stdout
-from io import BytesIO, TextIOWrapper
+from functools import partial
+from io import BytesIO, TextIOBase, TextIOWrapper
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli import TROUBLE, TROUBLES, words_of
+from frametool.cli.commands import TROUBLE
 from frametool.cli.group import answered, called, called_in, group
 from frametool.cli.shell_words import NAME, Words, split
-from frametool.cli.stderr import BatchLine, say_error, telling_of, wants_json
+from frametool.cli.stderr import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
 from frametool.cli.trees import TreeCache
 from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, alternatives
@@ -56,24 +54,17 @@ def command_lines(stream: BinaryIO, source: str) -> Iterator[CommandLine]:
     Raises FormatError for what is no text of lines at all.
     """
     lines = _lines(stream, source)
-    for number, text, problem in lines:
-        yield _command_line(number, text, problem, lines, source)
-
-
-def _command_line(
-    number: int, text: str, problem: str, lines: Iterator[tuple[int, str, str]], source: str
-) -> CommandLine:
-    """Return the command that begins in a line, with the lines that a backslash joins to it."""
-    name, words = _taken_apart(text)
-    joined = 1
-    while words.goes_on and not problem:
-        _, more, problem = next(lines, (0, "", ""))
-        text = text[:-1] + more
-        joined += 1
-        if joined > MOST_JOINED:
-            raise FormatError(f"a command of more than {MOST_JOINED} lines", source=source, line=number)
+    for number, begin, wrong in lines:
+        text, problem, joined = begin, wrong, 1
         name, words = _taken_apart(text)
-    return CommandLine(number, name, Words([], problem) if problem else words)
+        while words.goes_on and not problem:  # a backslash joins the next line to this one
+            _, more, problem = next(lines, (0, "", ""))
+            text = text[:-1] + more
+            joined += 1
+            if joined > MOST_JOINED:
+                raise FormatError(f"a command of more than {MOST_JOINED} lines", source=source, line=number)
+            name, words = _taken_apart(text)
+        yield CommandLine(number, name, Words([], problem) if problem else words)
 
 
 def _taken_apart(text: str) -> tuple[str, Words]:
@@ -89,9 +80,7 @@ def _taken_apart(text: str) -> tuple[str, Words]:
 
 def _lines(stream: BinaryIO, source: str) -> Iterator[tuple[int, str, str]]:
     """Yield the number of each line, its text without its end, and what is wrong with its bytes."""
-    number = 0
-    while data := stream.readline(MOST_CHARACTERS + 1):
-        number += 1
+    for number, data in enumerate(iter(lambda: stream.readline(MOST_CHARACTERS + 1), b""), 1):
         if number == 1 and data.startswith(UTF16):
             raise FormatError("UTF-16; lines are read as UTF-8: iconv -f UTF-16 -t UTF-8", source=source)
         if len(data) > MOST_CHARACTERS:
@@ -114,42 +103,37 @@ class KeptResults:
     def __init__(self) -> None:
         """Create it without any."""
         self._texts: dict[str, str] = {}
-        self._lost: dict[str, int] = {}
+        self._failed: dict[str, int] = {}  # name -> the line that sets it
 
     def value_of(self, name: str) -> str:
         """Return what stands for a name; raise Misused for one that has no value."""
         if name in self._texts:
             return self._texts[name]
-        if name in self._lost:
-            raise Misused(f"${name} has no value: line {self._lost[name]}, which sets it, has failed")
+        if name in self._failed:
+            raise Misused(f"${name} has no value: line {self._failed[name]}, which sets it, has failed")
         known = alternatives(name, self._texts, "names") if self._texts else "; no line before has kept a result"
         shells = "variables of the shell are not known here" if name in os.environ else "a dollar sign is $$"
         raise Misused(f"unknown name ${name}{known}; {shells}")
 
     def keep(self, name: str, text: str) -> None:
-        """Keep a result that was printed as JSON."""
-        _refuse_other_results(name, text)
+        """Keep a result that was printed as JSON; raise ValueInvalid for what no name can keep."""
+        lines = text.count("\n")
+        if lines != 1:
+            raise ValueInvalid(f"{name}: the command has {lines or 'no'} result{'s' * (lines != 1)}; {KEPT_ARE}")
+        try:
+            value = json.loads(text)
+        except ValueError:
+            raise ValueInvalid(f"{name}: the result is text; {KEPT_ARE}") from None
+        keys = set(value) if isinstance(value, dict) else set()
+        if not (isinstance(value, float | int) or keys & OF_TREES or keys & OF_RECORDS):
+            raise ValueInvalid(f"{name}: the result is a report; {KEPT_ARE}")
         self._texts[name] = text.strip()
-        self._lost.pop(name, None)
+        self._failed.pop(name, None)
 
     def lose(self, name: str, line: int) -> None:
         """Forget what a name stood for: the line that sets it has failed."""
         self._texts.pop(name, None)
-        self._lost[name] = line
-
-
-def _refuse_other_results(name: str, text: str) -> None:
-    """Raise ValueInvalid for what is not one pose, point, number or tree."""
-    lines = text.count("\n")
-    if lines != 1:
-        raise ValueInvalid(f"{name}: the command has {lines or 'no'} result{'s' * (lines != 1)}; {KEPT_ARE}")
-    try:
-        value = json.loads(text)
-    except ValueError:
-        raise ValueInvalid(f"{name}: the result is text; {KEPT_ARE}") from None
-    keys = set(value) if isinstance(value, dict) else set()
-    if not (isinstance(value, float | int) or keys & OF_TREES or keys & OF_RECORDS):
-        raise ValueInvalid(f"{name}: the result is a report; {KEPT_ARE}")
+        self._failed[name] = line
 
 
 def print_as_json(name: str, context: click.Context) -> None:
@@ -164,19 +148,6 @@ def print_as_json(name: str, context: click.Context) -> None:
     if params["format_name"] not in (None, *READABLE):
         raise Misused(f"{name}: -f {params['format_name']} is for printing, and {name} is kept; leave it out")
     params["format_name"] = "json"
-
-
-@contextmanager
-def captured() -> Iterator[BytesIO]:
-    """Yield what takes everything that is printed in the block."""
-    held = _Limited()
-    stream = TextIOWrapper(held, "utf-8")
-    try:
-        with redirect_stdout(stream):
-            yield held
-            sys.stdout.flush()
-    finally:
-        stream.detach()
 
 
 class _Limited(BytesIO):
@@ -216,7 +187,7 @@ class CommandBatch:
 
     def run(self, stream: BinaryIO) -> int:
         """Run the commands of a stream as they come and return the exit status of all."""
-        with _without_input(), _as_in_a_pipe():
+        with _as_in_a_pipe():
             for line in command_lines(stream, self.source):
                 if not (line.words.words or line.words.problem):
                     continue
@@ -244,7 +215,7 @@ class CommandBatch:
                 if line.words.problem:
                     raise Misused(line.words.problem)
                 words = line.words.with_values(self.results.value_of)
-                status = self._printed(words) if not line.name else self._kept(line.name, words)
+                status = self._called(words, line.name)
                 if status in FINISHED:
                     return status
                 problem = LineFailed(f"{words[0]} ended with status {status}", status=status)
@@ -260,25 +231,19 @@ class CommandBatch:
             say_error(problem, in_json=in_json, fate="line skipped" if self.skips else "")
         return status or TROUBLE.get(words[0] if words else "", problem.exit_code)
 
-    def _printed(self, words: Sequence[str], name: str = "") -> int:
-        """Call a command; with a name for its result in a form that can be kept."""
+    def _called(self, words: list[str], name: str) -> int:
+        """Call a command; with a name keep what it prints."""
         _refuse(words)
-
-        def prepare(context: click.Context) -> None:
-            if name:
-                print_as_json(name, context)
-
         self.context.meta.clear()
-        if words[0].startswith("-") and not name:  # options of frametool itself
-            return answered(lambda: called(list(words)), words)
-        return answered(lambda: called_in(self.context, words, prepare), words)
-
-    def _kept(self, name: str, words: Sequence[str]) -> int:
-        """Call a command and keep what it prints."""
-        with captured() as held:
-            status = self._printed(words, name)
+        if not name:
+            is_own = words[0].startswith("-")  # an option of frametool itself
+            return answered(lambda: called(words) if is_own else called_in(self.context, words), words)
+        held = _Limited()
+        with redirect_stdout(TextIOWrapper(held, "utf-8", write_through=True)) as stream:
+            status = answered(lambda: called_in(self.context, words, partial(print_as_json, name)), words)
         if status in FINISHED:
             self.results.keep(name, held.getvalue().decode())
+        stream.detach()
         return status
 
 
@@ -294,42 +259,32 @@ def _refuse(words: Sequence[str]) -> None:
 
 
 @contextmanager
-def _without_input() -> Iterator[None]:
-    """Keep commands from standard input, which holds their own lines or belongs to none of them."""
-    before = sys.stdin
+def _as_in_a_pipe() -> Iterator[None]:
+    """Keep commands from standard input, whose lines are the batch's, and let them print as they print into a pipe."""
+    before = sys.stdin, sys.stdout
     sys.stdin = _NoInput()
+    piped = _Pipe(sys.stdout.buffer, "utf-8") if sys.stdout.isatty() else None
+    sys.stdout = piped or sys.stdout
     try:
         yield
     finally:
-        sys.stdin = before
+        sys.stdin, sys.stdout = before
+        if piped:
+            piped.detach()
 
 
-class _NoInput(io.TextIOBase):
+class _Pipe(TextIOWrapper):
+    """A standard output that is never taken for a terminal."""
+
+    def isatty(self) -> bool:
+        """Return False."""
+        return False
+
+
+class _NoInput(TextIOBase):
     """A standard input that refuses whoever reads from it."""
 
     @property
     def buffer(self) -> BinaryIO:
         """Raise Misused."""
         raise Misused(NO_INPUT)
-
-
-@contextmanager
-def _as_in_a_pipe() -> Iterator[None]:
-    """Let commands print into a terminal as they print into a pipe."""
-    if not sys.stdout.isatty():
-        yield
-        return
-    stream = _Pipe(sys.stdout.buffer, "utf-8")
-    try:
-        with redirect_stdout(stream):
-            yield
-    finally:
-        stream.detach()
-
-
-class _Pipe(io.TextIOWrapper):
-    """A standard output that is taken for no terminal."""
-
-    def isatty(self) -> bool:
-        """Return that it is none."""
-        return False

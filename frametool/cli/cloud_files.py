@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import READING
+from frametool.cli.group import settings
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
@@ -62,14 +62,13 @@ class BagOfClouds:
                 known = ", ".join(f"{{{each}}}" for each in PLACES)
                 raise click.UsageError(f"-o {self.pattern}: {{{place}}} has no meaning; there are {known}")
         self.tally = Tally()
-        reading = click.get_current_context().meta.setdefault(READING, {})
-        chosen = reading.get("topics", ())
+        chosen = settings().topics
         with ExitStack() as opened:
             self.reader = opened.enter_context(opened_bag(path, self.tally))
             self.topics = cloud_topics(self.reader, chosen, path)
             self.opened = opened.pop_all()
         clouds = {topic.strip("/") for topic in self.topics}
-        reading["topics"] = tuple(topic for topic in chosen if topic.strip("/") not in clouds)
+        settings().topics = tuple(topic for topic in chosen if topic.strip("/") not in clouds)
         self.names: dict[str, int] = {}
 
     def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None) -> int:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import FULL, decorated
+from frametool.cli.options import FULL, together
 from frametool.errors import FormatError, heard_by
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ EXPLAIN = click.option(
 def explain_options(function: Function) -> Function:
     """Add to a command the options of derivations; `Explaining` takes them."""
     every = click.option("--explain-full", is_flag=True, help="that with all products of long chains")
-    return decorated(function, [EXPLAIN, every])
+    return together(EXPLAIN, every)(function)
 
 
 class Explaining:

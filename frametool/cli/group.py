@@ -1,13 +1,6 @@
-"""The group of all commands: each is imported when it is called; help and completion come from the table.
+"""How click is used: the group of all commands, what their options keep, their help, their calls and their misuse.
 
-The help option of all commands, made without click's translations: those load `locale`, 2 ms of every start.
-
-What click says of arguments, as errors and lines of ours.
-
-Commands that are called many times in one process: parser and values of options that are not given, made once.
-
-Both come from click itself, so there is no second list of options: the parser is click's own, a value that was given
-is processed by its parameter, and one that was not is what click made of an empty line.
+Each command is imported when it is called; help and completion come from the table.
 """
 
 from __future__ import annotations
@@ -20,7 +13,7 @@ import click
 from click.core import iter_params_for_processing
 
 from frametool import __version__
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.cli.sink import writing
 from frametool.errors import SHOWN, alternatives, shown
 from frametool.stream.faults import Misused
@@ -29,6 +22,52 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from click.shell_completion import CompletionItem
+
+
+SETTINGS = "frametool.settings"  # the key in a context's `meta`
+
+
+class Settings:
+    """What the options of the running command say about its inputs, each under its parameter's name.
+
+    These options are no parameters of the command's function: `keep_setting` is their callback, and `settings` is
+    where the rest of the command line asks. Like click's `meta`, a command shares them with its group.
+
+    reads_trees: no option, but set when files of frames are opened: --in is then about these too
+    """
+
+    all_versions = False
+    verbose = False
+    quiet = False
+    input_forms: Sequence[str] = ()
+    topics: Sequence[str] = ()
+    joints: Sequence[str] = ()
+    joint_files: Sequence[str] = ()
+    named_frames: Sequence[str] = ()
+    direction: str | None = None
+    camera_axes: str | None = None
+    dh: str | None = None
+    stamps: str | None = None
+    edges = False
+    array: str | None = None
+    reads_trees = False
+
+
+def settings(context: click.Context | None = None) -> Settings:
+    """Return the settings of a context, or of the running command; where none runs, nothing is set but --quiet."""
+    context = context or click.get_current_context(silent=True)
+    if context is not None:
+        found: Settings = context.meta.setdefault(SETTINGS, Settings())
+        return found
+    silent = Settings()
+    silent.quiet = True
+    return silent
+
+
+def keep_setting(context: click.Context, option: click.Parameter, chosen: Any) -> Any:
+    """Keep the value of an option in the settings of its context (a callback of click)."""
+    setattr(settings(context), option.name or "", chosen)
+    return chosen
 
 
 def show_help(ctx: click.Context) -> None:
@@ -43,32 +82,22 @@ def _help(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # clic
         ctx.exit()
 
 
-def _has_many_choices(option: click.Option, ctx: click.Context) -> bool:
-    """Tell whether the choices of an option are too long to stand beside it."""
-    has_choices = isinstance(option.type, click.Choice) and not option.metavar
-    return has_choices and len(option.make_metavar(ctx)) > LONGEST_CHOICE
-
-
-def _spelled(option: click.Option, ctx: click.Context) -> str:
-    """Return the names of an option and what it takes."""
-    names = ", ".join((*option.opts, *option.secondary_opts))
-    if option.is_flag or option.count:
-        return names
-    taken = option.make_metavar(ctx)
-    return f"{names} {option.opts[-1].strip('-').upper() if _has_many_choices(option, ctx) else taken}"
-
-
-def option_row(option: click.Option, ctx: click.Context) -> tuple[str, str]:
-    """Return an option and its meaning, with the choices that its name does not list."""
-    text = option.help or ""
-    if _has_many_choices(option, ctx):
-        what, bracket, default = text.partition("  [")
-        text = f"{what}: {', '.join(getattr(option.type, 'choices', ()))}{bracket}{default}"
+def option_row(option: click.Option) -> tuple[str, str]:
+    """Return the names of an option with what it takes, and its meaning; long lists of choices stand in the latter."""
+    names, text = ", ".join((*option.opts, *option.secondary_opts)), option.help or ""
+    taken = option.metavar or option.type.name.upper()
+    if isinstance(option.type, click.Choice) and not option.metavar:
+        taken = f"[{'|'.join(option.type.choices)}]"
+        if len(taken) > LONGEST_CHOICE:
+            taken = option.opts[-1].strip("-").upper()
+            what, bracket, default = text.partition("  [")
+            text = f"{what}: {', '.join(option.type.choices)}{bracket}{default}"
     if option.show_default and option.default is not None:
         text += f"  [default: {option.default}]"
-    return _spelled(option, ctx), text
+    return names if option.is_flag or option.count else f"{names} {taken}", text
 
 
+# made without click's translations: those load `locale`, 2 ms of every start
 HELP_OPTION = click.Option(
     ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_help, help="Show this message."
 )
@@ -93,32 +122,35 @@ WIDEST = 24  # of the left column
 LONGEST_CHOICE = 14  # of choices beside their option
 
 
+def option_groups(command: click.Command, ctx: click.Context) -> dict[str, list[click.Option]]:
+    """Return the options of a command under the headings of GROUPS, those of its own first; no heading is empty."""
+    placed = {name: title for title, names in GROUPS.items() for name in names}
+    groups: dict[str, list[click.Option]] = {title: [] for title in ("Options", *GROUPS)}
+    for each in command.get_params(ctx):
+        if isinstance(each, click.Option) and not each.hidden:
+            groups[placed.get(each.name or "", "Options")].append(each)
+    return {title: options for title, options in groups.items() if options}
+
+
 class WithHelp(click.Command):
     """A command with -h and --help, its options in groups."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options group by group, those of this command first; then the commands of a group."""
-        self._format_groups(ctx, formatter)
-        if isinstance(self, click.Group):
-            self.format_commands(ctx, formatter)
-
-    def _format_groups(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        options = [each for each in self.get_params(ctx) if isinstance(each, click.Option) and not each.hidden]
-        placed = {name: title for title, names in GROUPS.items() for name in names}
-        shown = [each for each in options if placed.get(each.name or "") != NAMES_ONLY]
-        width = max((size for each in shown if (size := len(_spelled(each, ctx))) <= WIDEST), default=0)
+        groups = option_groups(self, ctx)
+        rows = [option_row(each) for title, options in groups.items() if title != NAMES_ONLY for each in options]
+        width = max((len(left) for left, _ in rows if len(left) <= WIDEST), default=0)
         formatter.write_paragraph()
-        for title in ("Options", *GROUPS):
-            ours = [each for each in options if placed.get(each.name or "", "Options") == title]
-            if not ours:
-                continue
+        for title, options in groups.items():
             formatter.write(f"{title}:\n")
             with formatter.indentation():
                 if title == NAMES_ONLY:
-                    formatter.write_text("  ".join(each.opts[-1] for each in ours))
+                    formatter.write_text("  ".join(each.opts[-1] for each in options))
                 else:
-                    rows = [option_row(each, ctx) for each in ours]
-                    formatter.write_dl([(left.ljust(width), text) for left, text in rows], WIDEST, col_spacing=1)
+                    padded = [(left.ljust(width), text) for left, text in map(option_row, options)]
+                    formatter.write_dl(padded, WIDEST, col_spacing=1)
+        if isinstance(self, click.Group):
+            self.format_commands(ctx, formatter)
 
     def get_help_option(self, ctx: click.Context) -> click.Option | None:  # noqa: ARG002 - click's signature
         """Return the one help option."""
@@ -143,26 +175,23 @@ class Group(WithHelp, click.Group):
 
     table = COMMANDS
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Answer a call without arguments with help; click's own way to it has changed with its versions."""
+        if not args and not ctx.resilient_parsing:
+            show_help(ctx)
+            ctx.exit()
+        return super().parse_args(ctx, args)
+
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Name the commands, in the table's order."""
         return list(self.table)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        """Import one command."""
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """Import one command, or say which ones there are."""
         if cmd_name not in self.table:
-            return None
+            raise click.UsageError(f"no command {shown(cmd_name)}{alternatives(cmd_name, self.table, 'commands')}", ctx)
         found: click.Command = import_module(self.table[cmd_name][0]).command
         return found
-
-    def resolve_command(
-        self,
-        ctx: click.Context,
-        args: list[str],
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command, or say which ones there are."""
-        if args and args[0] not in self.table:
-            raise click.UsageError(f"no command {shown(args[0])}{alternatives(args[0], self.table, 'commands')}", ctx)
-        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands from the table, without importing any."""
@@ -177,18 +206,11 @@ class Group(WithHelp, click.Group):
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
-ALL_VERSIONS = "frametool.all_versions"  # where the context keeps that --version is to tell more
-
-
-def _keep_all_versions(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
-    ctx.meta[ALL_VERSIONS] = chosen
-
-
 def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
     """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
     if chosen:
         with writing(None) as write:
-            write(f"frametool {__version__}\n{_surroundings() if ctx.meta.get(ALL_VERSIONS) else ''}")
+            write(f"frametool {__version__}\n{_surroundings() if settings(ctx).all_versions else ''}")
         ctx.exit()
 
 
@@ -210,8 +232,8 @@ def _surroundings() -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-@click.command(cls=Group, help=HELP, no_args_is_help=True)
-@click.option("-v", "all_versions", is_flag=True, is_eager=True, expose_value=False, callback=_keep_all_versions,
+@click.command(cls=Group, help=HELP)
+@click.option("-v", "all_versions", is_flag=True, is_eager=True, expose_value=False, callback=keep_setting,
               help="with --version: of Python and of its packages too")  # fmt: skip
 @click.option("--version", is_flag=True, expose_value=False, callback=_show_version,
               help="Show the version and exit.")  # fmt: skip
@@ -219,8 +241,8 @@ def group() -> None:
     """Hold the commands."""
 
 
-def called(arguments: list[str]) -> int:
-    """Call a command and return its status.
+def called(arguments: list[str]) -> object:
+    """Call a command and return its result.
 
     Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
     """
@@ -229,42 +251,33 @@ def called(arguments: list[str]) -> int:
 
         return shell_complete(group, {}, "frametool", COMPLETION, instruction)
     with group.make_context("frametool", arguments) as ctx:
-        return _status(group.invoke(ctx))
+        return group.invoke(ctx)
 
 
-def called_in(parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None]) -> int:
-    """Call the command that words begin with and return its status, as `called` does without making a group's context.
+def called_in(
+    parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None] | None = None
+) -> object:
+    """Call the command that words begin with, as `called` does, without making a context for the group.
 
     parent: context of the group
     prepare: is shown the command's context before it runs
     """
-    name, command, rest = group.resolve_command(parent, list(words))
-    if name is None or command is None:
-        raise click.UsageError("no command", parent)
-    with command.make_context(name, rest, parent=parent) as ctx:
-        prepare(ctx)
-        return _status(command.invoke(ctx))
+    name, *rest = words
+    with group.get_command(parent, name).make_context(name, rest, parent=parent) as ctx:
+        if prepare:
+            prepare(ctx)
+        return ctx.command.invoke(ctx)
 
 
-def _status(result: object) -> int:
-    """Return the status that a command's result stands for."""
-    return result if isinstance(result, int) else 0
-
-
-def answered(call: Callable[[], int], arguments: Sequence[str]) -> int:
-    """Return the status of a call of a command; a call without arguments may have help for an answer.
-
-    Raises FrametoolError for all that a user did wrong.
-    """
+def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
+    """Return the status of a call of a command; raise FrametoolError for all that a user did wrong."""
     try:
-        return call()
+        result = call()
     except click.exceptions.Exit as end:
         return end.exit_code
-    except click.exceptions.NoArgsIsHelpError as error:
-        show_help(error.ctx)
-        return 0
     except click.ClickException as error:
         raise Misused(_usage(error, arguments)) from None
+    return result if isinstance(result, int) else 0
 
 
 def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
@@ -284,26 +297,23 @@ def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
 class Prepared(NamedTuple):
     """What does not change from one call of a command to the next.
 
-    parser: click's, made for all parameters
-    direct: the same, in which short names are found at once
-    params: all of them
+    parser: click's, in which short names are found at once
     absent: what the parser says of arguments that are not there
-    values, meta: what parameters that are not there leave in a context
+    values, settings: what parameters that are not there leave in a context
     """
 
     parser: Any
-    direct: Any
-    params: list[click.Parameter]
     absent: Mapping[str, Any]
     values: Mapping[str, Any]
-    meta: Mapping[str, Any]
+    settings: Settings
 
 
 class Reused(click.Command):
     """A command that is parsed by click at its first call, and with what that left at all others.
 
-    Its parameters must not change, and their callbacks must do no more for an absent value than keep it in the
-    context's `meta`, in mappings at most one level deep.
+    There is no second list of options: a value that is in the arguments is processed by its parameter, and one that is
+    not is what click made of an empty line. So its parameters must not change, and their callbacks must do no more for
+    an absent value than keep it in the settings.
     """
 
     _calls = 0
@@ -319,19 +329,18 @@ class Reused(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse as click does; only parameters that stand in the arguments are processed anew."""
         self._calls += 1
-        if self._calls == 1 or ctx.resilient_parsing:  # most processes call one command once
+        is_first = self._calls == 1  # and the only one in most processes
+        if is_first or ctx.resilient_parsing or any(each[2:3] == "=" for each in args):  # -f=x is no -f x
             return super().parse_args(ctx, args)
-        if self._prepared is None:
-            self._prepared = self._prepare(ctx)
-        parser, direct, params, absent, values, meta = self._prepared
-        if not any(each[2:3] == "=" for each in args):  # -f=x is no -f x
-            parser = direct
+        self._prepared = self._prepared or self._prepare(ctx)
+        parser, absent, values, unset = self._prepared
         parser.ctx = ctx
         given, rest, order = parser.parse_args(args=list(args))
         if rest or not args:
             return super().parse_args(ctx, args)  # has the words for what is wrong
-        ctx.meta.update({key: dict(kept) if isinstance(kept, dict) else kept for key, kept in meta.items()})
-        wanted = [each for each in params if each.required or _is_given(each.name or "", given, absent)]
+        vars(settings(ctx)).update(vars(unset))
+        names = {name for name, value in given.items() if name not in absent or value is not absent[name]}
+        wanted = [each for each in self.get_params(ctx) if each.required or each.name in names]
         for param in iter_params_for_processing(order, wanted):
             param.handle_parse_result(ctx, given, rest)
         ctx.params = {**values, **ctx.params}
@@ -340,15 +349,9 @@ class Reused(click.Command):
 
     def _prepare(self, ctx: click.Context) -> Prepared:
         """Parse no arguments, once, without what may not be missing."""
-        params = self.get_params(ctx)
-        optional: list[click.Parameter] = [each for each in params if not each.required]
+        optional: list[click.Parameter] = [each for each in self.get_params(ctx) if not each.required]
         empty = click.Command(None, params=optional, add_help_option=False).make_context("", [])
-        parser, direct = self.make_parser(ctx), self.make_parser(ctx)
+        parser = self.make_parser(ctx)
         # click looks for -f among the long names first, and fails with all that an error message needs
-        direct._long_opt.update(direct._short_opt)  # noqa: SLF001
-        return Prepared(parser, direct, params, parser.parse_args(args=[])[0], empty.params, empty.meta)
-
-
-def _is_given(name: str, given: Mapping[str, Any], absent: Mapping[str, Any]) -> bool:
-    """Tell whether the arguments say something of a parameter."""
-    return name in given and (name not in absent or given[name] is not absent[name])
+        parser._long_opt.update(parser._short_opt)  # noqa: SLF001
+        return Prepared(parser, parser.parse_args(args=[])[0], empty.params, settings(empty))

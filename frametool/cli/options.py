@@ -1,10 +1,6 @@
-"""What all commands share: negative numbers as arguments, the options of every result, where it is written.
+"""What commands share: the types of arguments, the options of inputs, results and times; adding them reads nothing.
 
-What the shell offers in the place of names that are in no list of choices: axes, and columns of the input.
-
-The options about files of frames, which `frametool.cli.trees` heeds; adding them to a command reads nothing yet.
-
-Times on the command line: decimal seconds or nanoseconds, `latest`, ranges and files; never through a float.
+Times are decimal seconds or nanoseconds, `latest`, ranges and files; they never pass through a float.
 """
 
 from __future__ import annotations
@@ -15,22 +11,18 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.group import Reused, WithHelp
+from frametool.cli.group import Reused, WithHelp, keep_setting, settings
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, readers, writers
-from frametool.frames.stamps import NotATime, parse_stamp, whole_stamp
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-
-    from click.shell_completion import CompletionItem
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from frametool.formats.load import Rules
-    from frametool.geometry.representations import Notation
     from frametool.grammar.result import Result
 
     Function = TypeVar("Function", bound=Callable[..., Any])
@@ -51,8 +43,6 @@ class Command(WithHelp, Reused):
     own check of misspelled options; `Text` takes the blank off again.
     """
 
-    exit_codes = EXIT_CODES
-
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers (-j is an option where joints are), give a bare --explain its form, then parse."""
         if any(map(NEGATIVE.match, args)):
@@ -60,27 +50,24 @@ class Command(WithHelp, Reused):
             args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
         return super().parse_args(ctx, _with_form(args) if "--explain" in args else args)
 
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """End every help with the exit codes."""
-        super().format_epilog(ctx, formatter)
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """End every help with the exit codes, those of most commands unless its epilog says others."""
         formatter.write_paragraph()
-        formatter.write_text(self.exit_codes)
+        formatter.write_text(self.epilog or EXIT_CODES)
 
 
 def _with_form(args: list[str]) -> list[str]:
     """Join --explain with the form behind it, or with `text`: click would take any argument there for its value."""
-    joined: list[str] = []
-    for each in args:
-        if joined and joined[-1] == "--explain":
-            is_form = each in ("text", "markdown", "latex")
-            joined[-1] = f"--explain={each if is_form else 'text'}"
-            if is_form:
-                continue
-        joined.append(each)
-    return [f"{each}=text" if each == "--explain" else each for each in joined]
+    forms, joined = ("text", "markdown", "latex"), []
+    for before, each, behind in zip(["", *args], args, [*args[1:], ""], strict=False):
+        if each == "--explain":
+            joined.append(f"--explain={behind if behind in forms else 'text'}")
+        elif before != "--explain" or each not in forms:
+            joined.append(each)
+    return joined
 
 
-class Text(click.ParamType[str]):
+class Text(click.types.StringParamType):
     """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes."""
 
     name = "text"
@@ -88,6 +75,19 @@ class Text(click.ParamType[str]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
         """Remove the blank."""
         return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
+        """Return what the shell may complete, and what it means; None for names of files, which the shell knows."""
+        return {}
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Offer what begins as the incomplete word does."""
+        from click.shell_completion import CompletionItem
+
+        offered = self.offers(ctx, incomplete)
+        if offered is None:
+            return [CompletionItem(incomplete, type="file")]
+        return [CompletionItem(word, help=about) for word, about in offered.items() if word.startswith(incomplete)]
 
 
 class Utf8(Text):
@@ -101,15 +101,13 @@ class Utf8(Text):
 
 
 class File(Text):
-    """A file's name, which the shell completes."""
+    """A file's name."""
 
     name = "file"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> None:  # noqa: ARG002
         """Leave it to the shell."""
-        from click.shell_completion import CompletionItem
-
-        return [CompletionItem(incomplete, type="file")]
+        return
 
 
 class Parsed(Text):
@@ -154,12 +152,12 @@ class Digits(Text):
         return FULL if value in ("full", FULL) else click.IntRange(0, 30).convert(value, param, ctx)
 
 
-class Notations(click.ParamType["tuple[Notation, ...]"]):
+class Notations(Text):
     """Names of representations, separated by commas."""
 
     name = "rep[,rep..]"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Notation, ...]:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Look each name up."""
         if not isinstance(value, str):
             return tuple(value)
@@ -171,37 +169,14 @@ class Notations(click.ParamType["tuple[Notation, ...]"]):
             self.fail(str(error), param, ctx)
         return chosen
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
-        """Complete the last name of the list."""
-        from click.shell_completion import CompletionItem
-
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
+        """Offer names behind the last comma, and the axes of one that has its colon."""
         done, comma, begun = incomplete.rpartition(",")
         names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
         spec = begun.partition(":")[0]
         if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
             names += [f"{spec}:{axes}" for axes in ("all", *AXES)]
-        return [CompletionItem(done + comma + name) for name in names if name.startswith(begun)]
-
-
-TEXT = Text()
-UTF8 = Utf8()
-FILE = File()
-VERBOSE = "frametool.verbose"  # where a command's context keeps that -v was given
-
-
-def _be_verbose(context: click.Context, _: click.Parameter, chosen: bool) -> None:
-    context.meta[VERBOSE] = chosen
-
-
-verbose_option = click.option(
-    "-v", "--verbose", is_flag=True, expose_value=False, callback=_be_verbose,
-    help="say what each input was taken for",
-)  # fmt: skip
-
-
-READING = "frametool.reading"  # where a command's context keeps the options about files of frames
-TREES_OPENED = "frametool.trees_opened"  # set in a command's context once it reads files of frames
-FORMS = "frametool.forms"  # where a command's context keeps those of --in
+        return dict.fromkeys((done + comma + name for name in names), "")
 
 
 class Form(Text):
@@ -215,140 +190,17 @@ class Form(Text):
         self.are = are
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Refuse what is none, with the nearest name; of a form that is known and not read, say what to do."""
+        """Refuse an unknown one with the nearest name; of a form that is known and not read, say what to do."""
         if value not in self.names:
-            self.fail(self._problem(value), param, ctx)
+            if value in FORMATS and (instead := FORMATS[value].instead):
+                self.fail(f"{value} ({FORMATS[value].summary}) is not read: {instead}", param, ctx)
+            near = did_you_mean(value, self.names)
+            self.fail(f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all", param, ctx)
         return value
 
-    def _problem(self, value: str) -> str:
-        if value in FORMATS and (instead := FORMATS[value].instead):
-            return f"{value} ({FORMATS[value].summary}) is not read: {instead}"
-        near = did_you_mean(value, self.names)
-        return f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all"
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the forms."""
-        from click.shell_completion import CompletionItem
-
-        return [CompletionItem(name, help=FORMATS[name].summary) for name in self.names if name.startswith(incomplete)]
-
-
-def _keep_forms(context: click.Context, _: click.Parameter, chosen: Sequence[str]) -> None:
-    context.meta[FORMS] = chosen
-
-
-def forms_told(*, streams: bool = False) -> tuple[list[str], str]:
-    """Return the forms that --in names for files of frames, in their order, and the form of the stream.
-
-    streams: there is a stream; its form is the last one that can be streamed, "" if there is none
-    """
-    context = click.get_current_context(silent=True)
-    told = [] if context is None else list(context.meta.get(FORMS, ()))
-    streamed = [form for form in told if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
-    if not streamed:
-        return told, ""
-    last = len(told) - 1 - told[::-1].index(streamed[-1])
-    return told[:last] + told[last + 1 :], streamed[-1]
-
-
-in_option = click.option(
-    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM", expose_value=False,
-    callback=_keep_forms,
-    help="form of the input (`frametool formats`), once a file",
-)  # fmt: skip
-
-
-def say_if_verbose(text: str) -> None:
-    """Write a line on stderr if the command was called with -v."""
-    context = click.get_current_context(silent=True)
-    if context is not None and context.meta.get(VERBOSE):
-        say(text)
-
-
-_PRECISION = click.option(
-    "--precision", type=Digits(), metavar="N|full",
-    help="digits after the point  [default: full; overviews 6]",
-)  # fmt: skip
-_PLACE = (
-    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
-    click.option("--force", is_flag=True, help="let --output replace a file"),
-)
-
-
-def result_options(*what: str) -> Callable[[Function], Function]:
-    """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
-    form = click.option(
-        "-f", "--format", "format_name", type=click.Choice(("text", *writers(*what))),
-        help="form of the result",
-    )  # fmt: skip
-    return lambda function: decorated(function, (form, _PRECISION, *_PLACE))
-
-
-def list_options(*more: str) -> Callable[[Function], Function]:
-    """Add to a command the options that shape and place a list for people, which is text wherever it goes.
-
-    more: forms beside text and those of reports
-    """
-    form = click.option(
-        "-f", "--format", "format_name", type=click.Choice(("text", *writers("report"), *more)),
-        help="form of the result  [default: text]",
-    )  # fmt: skip
-    return lambda function: decorated(function, (form, *_PLACE))
-
-
-def rotation_options(function: Function) -> Function:
-    """Add to a command the options that choose how rotations are written."""
-    return decorated(
-        function,
-        [
-            click.option(
-                "--to",
-                "notations",
-                type=Notations(),
-                metavar="REP[,REP..]",
-                help="representations of the result  [default: quaternion]",
-            ),
-            click.option("--deg", is_flag=True, help="angles in degrees"),
-            click.option(
-                "--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"
-            ),
-        ],
-    )
-
-
-def pose_options(function: Function) -> Function:
-    """Add to a command the options that say how poses are read; they come beside `rotation_options`."""
-    return click.option(
-        "--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation"
-    )(function)
-
-
-def file_options(function: Function) -> Function:
-    """Add to a command of files of frames the options about reading them and their poses, and -v."""
-    return decorated(function, (reading_options(), verbose_option, pose_options))
-
-
-def moving_options(function: Function) -> Function:
-    """Add to a command of one tree the options about moving frames and about reading files, and -v."""
-    return decorated(function, (rules_options, reading_options(), verbose_option))
-
-
-def tree_options(function: Function) -> Function:
-    """Add to a command that writes poses of a tree those of `moving_options` and those about poses and rotations."""
-    return decorated(function, (moving_options, pose_options, rotation_options))
-
-
-color_option = click.option(
-    "--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
-    help="colour of the text; auto is on a terminal, and NO_COLOR is heeded",
-)  # fmt: skip
-
-
-def decorated(function: Function, options: Sequence[Callable[[Any], Any]]) -> Function:
-    """Add several options to a command, in this order in its help."""
-    for option in reversed(options):
-        function = option(function)
-    return function
+        return {name: FORMATS[name].summary for name in self.names}
 
 
 class AxesName(Text):
@@ -356,14 +208,13 @@ class AxesName(Text):
 
     name = "axes"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the conventions; behind `_from_` those it may come from."""
         from frametool.geometry.conventions import AXES, MIRRORED
 
         begun, joint, _ = incomplete.partition("_from_")
         known = {name: about for name, (_, about) in AXES.items()} | dict.fromkeys(MIRRORED, "mirrored")
-        offered = {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
-        return _items(offered.items(), incomplete)
+        return {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
 
 
 class ColumnNames(Text):
@@ -371,24 +222,17 @@ class ColumnNames(Text):
 
     name = "name"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
         """Offer those of the file that -i names."""
-        done, comma, begun = incomplete.rpartition(",")
+        done, comma, _ = incomplete.rpartition(",")
         path = ctx.params.get("input_path")
         found = _names_in(str(path)) if path and path != "-" else []
-        return _items(((done + comma + name, "") for name in found), done + comma + begun)
-
-
-def _items(offered: Iterable[tuple[str, str]], begun: str) -> list[CompletionItem]:
-    from click.shell_completion import CompletionItem
-
-    return [CompletionItem(name, help=about or None) for name, about in offered if name.startswith(begun)]
+        return dict.fromkeys((done + comma + name for name in found), "")
 
 
 def _names_in(path: str) -> list[str]:
     """Return the names of a table's columns, or the outermost keys of records; none for what cannot be read."""
     from frametool.documents.source import HEAD
-    from frametool.errors import FrametoolError
     from frametool.formats.detect import Beginning, detect
     from frametool.stream.table import open_table
 
@@ -403,8 +247,59 @@ def _names_in(path: str) -> list[str]:
         return []  # nothing to offer, and a completion must not print
 
 
-def _keep(context: click.Context, option: click.Parameter, chosen: Any) -> None:
-    context.meta.setdefault(READING, {})[option.name] = chosen
+TEXT = Text()
+UTF8 = Utf8()
+FILE = File()
+
+
+def together(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
+    """Return what adds several options to a command, in this order in its help."""
+
+    def add(function: Function) -> Function:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return add
+
+
+def _setting(*names: str, **rest: Any) -> Callable[[Any], Any]:
+    return click.option(*names, expose_value=False, callback=keep_setting, **rest)
+
+
+# --- inputs --------------------------------------------------------------------------------------------------------
+
+verbose_option = _setting("-v", "--verbose", is_flag=True, help="say what each input was taken for")
+in_option = _setting(
+    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM",
+    help="form of the input (`frametool formats`), once a file",
+)  # fmt: skip
+array_option = _setting("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
+_CAMERA_AXES = _setting(
+    "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
+    help="turn cameras to these axes  [default: those that the form of the file has]",
+)  # fmt: skip
+_STAMPS = _setting(
+    "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
+)
+_EDGES = _setting("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
+# of streams about trajectories: the times of their poses, the axes of cameras
+pose_reading_options = together(_CAMERA_AXES, _STAMPS, _EDGES, array_option)
+_READING = (
+    _setting("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
+             help="read only this topic; may be repeated"),
+    _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
+             help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
+    _setting("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
+             help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
+    _setting("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
+             help="names of frames that a form does not name; may be repeated, in the order of the files"),
+    _setting("--direction", "direction", type=click.Choice(DIRECTIONS),
+             help="of matrices whose key does not say which frame they are seen from"),
+    _CAMERA_AXES,
+    _setting("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
+    _STAMPS,
+)  # fmt: skip
 
 
 def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
@@ -412,45 +307,81 @@ def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
 
     streams: the command has those of streams too, `--in` and `--quiet` among them
     """
-    own = () if streams else (in_option, _quiet_option)
-    return lambda function: decorated(function, (*own, *_READING_OPTIONS))
+    if streams:
+        return together(*_READING)
+    quiet = _setting("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+    return together(in_option, quiet, *_READING)
 
 
-def _option(*names: str, **rest: Any) -> Callable[[Any], Any]:
-    return click.option(*names, expose_value=False, callback=_keep, **rest)
+def input_forms(*, streams: bool = False) -> tuple[list[str], str]:
+    """Return the forms that --in names for files of frames, in their order, and the form of the stream.
+
+    streams: there is a stream; its form is the last one that can be streamed, "" if there is none
+    """
+    forms = list(settings().input_forms)
+    streamed = [at for at, form in enumerate(forms) if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
+    of_stream = forms.pop(streamed[-1]) if streamed else ""
+    return forms, of_stream
 
 
-_quiet_option = _option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
-_CAMERA_AXES = _option(
-    "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
-    help="turn cameras to these axes  [default: those that the form of the file has]",
-)  # fmt: skip
-_STAMPS = _option(
-    "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
+def say_if_verbose(text: str) -> None:
+    """Write a line on stderr if the command was called with -v."""
+    if settings().verbose:
+        say(text)
+
+
+def say_not_needed(forms: Collection[str], *asked: str) -> None:
+    """Say on stderr which options answer what none of these forms leaves open: they change nothing."""
+    if settings().quiet:
+        return
+    for ask in asked:
+        chosen = getattr(settings(), "named_frames" if ask == "frames" else ask)
+        if chosen and not any(ask in FORMATS[form].asks for form in forms):
+            option = f"--{ask.replace('_', '-')}"
+            say(f"note: {option} changes nothing: {' and '.join(dict.fromkeys(forms))} does not leave that open")
+
+
+# --- results -------------------------------------------------------------------------------------------------------
+
+_PRECISION = click.option(
+    "--precision", type=Digits(), metavar="N|full", help="digits after the point  [default: full; overviews 6]"
 )
-array_option = _option("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
-_EDGES = _option("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
-_READING_OPTIONS = (
-    _option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
-            help="read only this topic; may be repeated"),
-    _option("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
-            help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
-    _option("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
-            help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
-    _option("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
-            help="names of frames that a form does not name; may be repeated, in the order of the files"),
-    _option("--direction", "direction", type=click.Choice(DIRECTIONS),
-            help="of matrices whose key does not say which frame they are seen from"),
-    _CAMERA_AXES,
-    _option("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
-    _STAMPS,
+_PLACE = (
+    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
+    click.option("--force", is_flag=True, help="let --output replace a file"),
+)
+
+
+def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
+    return click.option("-f", "--format", "format_name", type=click.Choice(("text", *forms)), help=text)
+
+
+def result_options(*what: str) -> Callable[[Function], Function]:
+    """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
+    return together(_form_option(writers(*what), "form of the result"), _PRECISION, *_PLACE)
+
+
+def list_options(*more: str) -> Callable[[Function], Function]:
+    """Add to a command the options that shape and place a list for people, which is text wherever it goes.
+
+    more: forms beside text and those of reports
+    """
+    return together(_form_option((*writers("report"), *more), "form of the result  [default: text]"), *_PLACE)
+
+
+# how rotations are written
+rotation_options = together(
+    click.option(
+        "--to", "notations", type=Notations(), metavar="REP[,REP..]",
+        help="representations of the result  [default: quaternion]",
+    ),
+    click.option("--deg", is_flag=True, help="angles in degrees"),
+    click.option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
 )  # fmt: skip
+# how poses are read; commands have it with `rotation_options`
+pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation")
 
-
-def pose_reading_options(function: Function) -> Function:
-    """Add to a command of streams the options about trajectories: the times of their poses, the axes of cameras."""
-    return decorated(function, [_CAMERA_AXES, _STAMPS, _EDGES, array_option])
-
+# --- times ---------------------------------------------------------------------------------------------------------
 
 LATEST = "latest"
 POLICIES = ("ros1", "ros2")
@@ -480,7 +411,7 @@ class Skipped:
         return len(self.errors) >= MOST_TOLD
 
     def add(self, error: FrametoolError | None, count: int = 1) -> None:
-        """Count one time, or several in a row; keep why they are left out, if that is told and will be reported."""
+        """Count one time, or several in a row; keep why they are left out if that will be reported."""
         self.count += count
         if error is not None and not self.is_full:
             self.errors.append(error)
@@ -517,12 +448,19 @@ class Time(Text):
         text = super().convert(value, param, ctx)
         if not isinstance(text, str) or (self.latest and text == LATEST):
             return text
+        from frametool.frames.stamps import NotATime
+
         try:
-            return whole_stamp(parse_stamp(text))
-        except NotATime as error:
-            self.fail(f"{error}{', or latest' if self.latest else ''}", param, ctx)
+            return _stamp_ns(text)
         except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
+            self.fail(f"{error}{', or latest' if self.latest and isinstance(error, NotATime) else ''}", param, ctx)
+
+
+def _stamp_ns(text: str) -> int:
+    """Read a time in seconds, or in nanoseconds with `ns`."""
+    from frametool.frames.stamps import parse_stamp, whole_stamp  # few calls say a time
+
+    return whole_stamp(parse_stamp(text))
 
 
 TIME = Time()
@@ -533,17 +471,25 @@ def at_ns(chosen: int | str | None) -> int | None:
     return chosen if isinstance(chosen, int) else None
 
 
-def rules_options(function: Function) -> Function:
-    """Add to a command the options that say how moving frames are taken."""
-    options = [
-        click.option("--moving", is_flag=True,
-                     help="an edge with one stamp answers only that instant"),
-        click.option("--cache", type=Time(latest=False), metavar="SECONDS",
-                     help="forget what is older  [default: nothing]"),
-        click.option("--tf2", type=click.Choice(POLICIES),
-                     help="take, refuse and complain as tf2 does"),
-    ]  # fmt: skip
-    return decorated(function, options)
+# how moving frames are taken
+rules_options = together(
+    click.option("--moving", is_flag=True, help="an edge with one stamp answers only that instant"),
+    click.option(
+        "--cache", type=Time(latest=False), metavar="SECONDS", help="forget what is older  [default: nothing]"
+    ),
+    click.option("--tf2", type=click.Choice(POLICIES), help="take, refuse and complain as tf2 does"),
+)
+times_option = click.option(
+    "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or FILE, one a line"
+)
+# a command of files of frames; of one tree whose frames may move; and one that writes poses of it
+file_options = together(reading_options(), verbose_option, pose_options)
+moving_options = together(rules_options, reading_options(), verbose_option)
+tree_options = together(moving_options, pose_options, rotation_options)
+color_option = click.option(
+    "--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
+    help="colour of the text; auto is on a terminal, and NO_COLOR is heeded",
+)  # fmt: skip
 
 
 def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:
@@ -580,7 +526,7 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
     for number, line in enumerate(source.text.splitlines(), 1):
         if (stripped := line.strip()) and not stripped.startswith("#"):
             try:
-                times.append(whole_stamp(parse_stamp(stripped)))
+                times.append(_stamp_ns(stripped))
             except ValueInvalid as error:
                 bad += 1
                 report(FormatError(str(error), source=source.name, line=number))
@@ -592,7 +538,7 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 def _listed(text: str) -> list[int]:
     """Read times between commas."""
     try:
-        return [whole_stamp(parse_stamp(part.strip())) for part in text.split(",")]
+        return [_stamp_ns(part.strip()) for part in text.split(",")]
     except ValueInvalid as error:
         hint = "times are T,T,.. in seconds, START:STOP:STEP, or a file"
         raise click.UsageError(f"--times {shown(text)}: {error}; {hint}") from None
@@ -601,7 +547,7 @@ def _listed(text: str) -> list[int]:
 def _range(text: str) -> range:
     """Read START:STOP:STEP."""
     try:
-        start, stop, step = (whole_stamp(parse_stamp(part)) for part in text.split(":"))
+        start, stop, step = map(_stamp_ns, text.split(":"))
     except ValueInvalid as error:
         raise click.UsageError(f"--times {text}: {error}; a range is START:STOP:STEP in seconds") from None
     if step <= 0 or stop < start:
@@ -609,9 +555,3 @@ def _range(text: str) -> range:
     if (stop - start) // step >= MOST_TIMES:
         raise click.UsageError(f"--times {text} has more than {MOST_TIMES} times")
     return range(start, stop + 1, step)
-
-
-times_option = click.option(
-    "--times", type=TEXT, metavar="TIMES",
-    help="many: T,T,.., START:STOP:STEP, or FILE, one a line",
-)  # fmt: skip

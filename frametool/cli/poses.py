@@ -196,7 +196,7 @@ def pose_source(
         argument = Source(INLINE, argument)
     source = source_of(argument)
     if source.name != INLINE and source.text.lstrip().startswith("<"):
-        from frametool.cli.trees import refuse_robots
+        from frametool.formats.detect import refuse_robots
 
         refuse_robots(source.text.encode(), source.name)
     return rewritten(source, given, normalize=normalize, points=points) or source
@@ -246,7 +246,7 @@ def _hinting(error: FormatError, source: Source | None) -> FormatError:
     """Return the error to raise for a source; that for a file of frames points to lookup."""
     if source is None or source.name == INLINE:
         return error
-    from frametool.cli.trees import with_hint
+    from frametool.formats.detect import with_hint
 
     return with_hint(error, source.text.encode(), source.name)
 

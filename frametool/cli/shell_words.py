@@ -14,6 +14,8 @@ import os
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
+from frametool.stream.faults import Misused
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -28,10 +30,10 @@ _TOKEN = re.compile(
     | "(?P<double> (?:[^"\\]|\\.)*)"
     | \\(?P<escaped> .)
     | (?P<dollar> \$['"] | {_DOLLAR})
-    | (?P<odd> .)
+    | (?P<special> .)
     """
 )
-_IN_QUOTES = re.compile(rf"(?s)\\(?P<escaped>.)|(?P<dollar>{_DOLLAR})|(?P<odd>`)|(?P<plain>[^\\$`]+)")
+_IN_QUOTES = re.compile(rf"(?s)\\(?P<escaped>.)|(?P<dollar>{_DOLLAR})|(?P<special>`)|(?P<plain>[^\\$`]+)")
 _INSTEAD = {
     "|": "keep a result by NAME = COMMAND and give $NAME",
     "<": "name the file as an argument, or with -i",
@@ -80,13 +82,13 @@ def split(line: str) -> Words:
             continue
         if text == "#" and word is None:
             break
-        if kind == "odd" and (text == "\\" or (text in "'\"" and _ends_in_backslash(line))):
+        if kind == "special" and (text == "\\" or (text in "'\"" and _ends_in_backslash(line))):
             return Words(words, problem, goes_on=True)
-        if kind == "odd" and text in "'\"":
+        if kind == "special" and text in "'\"":
             return Words(words, problem or f"the {text} in column {token.start() + 1} is not closed")
         try:
             parts = list(_parts(kind, token[kind], is_first=word is None))
-        except _Refused as refused:
+        except Misused as refused:
             problem = problem or str(refused)
             parts = []
         if word is None:
@@ -96,20 +98,16 @@ def split(line: str) -> Words:
     return Words(words, problem)
 
 
-class _Refused(Exception):
-    """Report what only a shell can do."""
-
-
 def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[WordPart]:
-    """Yield the pieces of a token."""
+    """Yield the pieces of a token; raise Misused for what only a shell can do."""
     if kind == "double":
         for token in _IN_QUOTES.finditer(text):
             inner = token.lastgroup or ""
             yield from _parts("quoted" if inner == "escaped" else inner, token[inner])
     elif kind == "dollar":
         yield _named(text)
-    elif kind == "odd":
-        raise _Refused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
+    elif kind == "special":
+        raise Misused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
     elif kind == "quoted":  # a backslash in double quotes stays before what needs none
         yield WordPart(text if text in '$`"\\' else f"\\{text}")
     elif kind == "plain" and is_first and text.startswith("~/"):
@@ -127,13 +125,12 @@ def _named(text: str) -> WordPart:
     if behind == "$":
         return WordPart("$")
     if behind == "(":
-        raise _Refused(f"$( is for a shell: {_INSTEAD['$(']}; in single quotes it is text")
+        raise Misused(f"$( is for a shell: {_INSTEAD['$(']}; in single quotes it is text")
     if not behind:
         return WordPart(text)
-    raise _Refused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
+    raise Misused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
 
 
 def _ends_in_backslash(line: str) -> bool:
     """Tell whether the last character is a backslash that no other one takes."""
     return (len(line) - len(line.rstrip("\\"))) % 2 == 1
-

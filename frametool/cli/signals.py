@@ -11,16 +11,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# those that the system has: Windows knows no SIGHUP
+ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 class Terminated(BaseException):
-    """Report the signal that asks the process to end."""
-
-    def __init__(self, number: int) -> None:
-        """Keep the signal's number."""
-        super().__init__(number)
-        self.number = number
+    """Report the signal that asks the process to end; its name is the message."""
 
 
 class _Signals:
@@ -34,7 +30,7 @@ class _Signals:
         if number != signal.SIGINT:
             for each in ENDING:
                 signal.signal(each, signal.SIG_IGN)  # `timeout` sends it twice: nothing cuts the cleaning short
-            raise Terminated(number)
+            raise Terminated(signal.Signals(number).name)
         if self.interrupted or not self.writing:
             raise KeyboardInterrupt
         self.interrupted = True
@@ -51,7 +47,7 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
             signal.signal(number, _signals.end)
         return run(arguments)
     except Terminated as error:
-        return die_of(error.number)
+        return die_of(str(error))
     finally:
         for number in caught:
             signal.signal(number, signal.SIG_DFL)
@@ -70,8 +66,11 @@ def whole_lines() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-def die_of(number: int) -> int:
+def die_of(name: str) -> int:
     """End as a program that does not catch the signal, so that the caller sees what happened."""
+    number = getattr(signal, name, None)
+    if number is None:  # SIGPIPE on Windows
+        return 1
     signal.signal(number, signal.SIG_DFL)
     os.kill(os.getpid(), number)
-    return 128 + number  # where the signal is blocked: what a shell would say
+    return 128 + int(number)  # where the signal is blocked: what a shell would say

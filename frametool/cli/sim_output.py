@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.options import FULL, TEXT, Digits, Number, Parsed, decorated
+from frametool.cli.options import FULL, TEXT, Digits, Number, Parsed, together
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
@@ -80,7 +80,7 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
         click.option("--holonomic", is_flag=True, help="let linear.y count in ROS 2, as the node's parameter does"),
         SEED,
     ]  # fmt: skip
-    return lambda function: decorated(function, options)
+    return together(*options)
 
 
 def sweep_options(function: Any) -> Any:
@@ -89,7 +89,7 @@ def sweep_options(function: Any) -> Any:
         "--duration", type=DURATION, default="20", show_default=True, metavar="S", help="simulated seconds"
     )
     options = (LEADER, LAW, RATE, MAX_LINEAR, MAX_ANGULAR, SPAWN, duration, REACH, SEED, format_options)
-    return decorated(function, options)
+    return together(*options)(function)
 
 
 def format_options(function: Any) -> Any:
@@ -104,7 +104,7 @@ def format_options(function: Any) -> Any:
         click.option("--plot", type=TEXT, metavar="FILE", help="draw the result into a .svg, .html or .png"),
         click.option("--force", is_flag=True, help="let --output and --plot replace existing files"),
     )  # fmt: skip
-    return decorated(function, options)
+    return together(*options)(function)
 
 
 def output_options(function: Any) -> Any:
@@ -118,7 +118,7 @@ def output_options(function: Any) -> Any:
         click.option("--view", type=TEXT, metavar="FILE.html", help="show their frames over time in a page, as `view`"),
         format_options,
     )  # fmt: skip
-    return decorated(function, options)
+    return together(*options)(function)
 
 
 class SimOutput(NamedTuple):

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     Write = Callable[[str | bytes | memoryview], None]
 
 LONGEST_NAME = 255  # bytes, on nearly every file system
-_OWN_STREAM = re.compile(r"/dev/(?:(stdout)|(stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
 
 
 @contextmanager
@@ -58,11 +57,8 @@ def is_special(path: str) -> bool:
 
 def _own_stream(path: str) -> int | None:
     """Return the descriptor that a path such as /dev/stdout stands for."""
-    found = _OWN_STREAM.fullmatch(path)
-    if not found:
-        return None
-    out, err, *numbers = found.groups()
-    return 1 if out else 2 if err else int(next(filter(None, numbers)))
+    found = re.fullmatch(r"(?:/dev|/proc/self)/fd/(\d+)", path)
+    return int(found[1]) if found else {"/dev/stdout": 1, "/dev/stderr": 2}.get(path)
 
 
 def _writer(stream: BinaryIO, name: str) -> Write:
@@ -85,7 +81,7 @@ def _encoded(text: str) -> bytes:
 
 @contextmanager
 def _problems_of(name: str) -> Iterator[None]:
-    """Name the place in what the system reports of it; a reader that is gone is no problem of ours."""
+    """Name the place in what the system reports of it; a reader that is gone is no problem."""
     try:
         yield
     except BrokenPipeError:
@@ -132,7 +128,7 @@ def _take_over(part: str, place: str) -> None:
     """Put a part file in its place, with the mode and, where the system lets us, the owner of the file before."""
     with suppress(FileNotFoundError):
         before = os.stat(place)
-        with suppress(OSError):
+        with suppress(OSError, AttributeError):  # Windows has no chown
             os.chown(part, before.st_uid, before.st_gid)
         os.chmod(part, stat.S_IMODE(before.st_mode))
     os.replace(part, place)

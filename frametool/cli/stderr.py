@@ -1,7 +1,4 @@
-"""Talk beside the data: the one way to stderr, which nobody has to read.
-
-An error as one JSON object on a line of stderr: the sentence and what it is made of.
-"""
+"""Messages about the work: the one way to stderr, which nobody has to read; errors as sentences or as JSON."""
 
 from __future__ import annotations
 
@@ -34,7 +31,7 @@ _lines: list[BatchLine] = []
 
 @contextmanager
 def telling_of(line: BatchLine) -> Iterator[None]:
-    """Name a line of a batch in all that is told while its command runs."""
+    """Name a line of a batch in all messages while its command runs."""
     _lines.append(line)
     try:
         yield
@@ -64,12 +61,12 @@ def say(text: str) -> None:
 def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
     """Write a warning; what tf2 would have logged stands there in its own words.
 
-    With --quiet nothing is said of names that lost their leading slash: their tree is as it was meant.
+    With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.
     """
     if rule == "slash":
-        from frametool.cli.trees import is_quiet
+        from frametool.cli.group import settings
 
-        if is_quiet():
+        if settings().quiet:
             return
     tell(printable(message if kind is Tf2Warning else f"frametool: {_place()}warning: {message}"))
 
@@ -96,7 +93,16 @@ def discard(stream: TextIO) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-PLACE = ("source", "line", "column")
+TROUBLES = (MemoryError, ImportError, OSError)
+
+
+def words_of(trouble: Exception) -> str:
+    """Say what Python or the system could not do."""
+    if isinstance(trouble, MemoryError):
+        return "out of memory"
+    if isinstance(trouble, ImportError):  # numpy's tells of missing memory and files in many lines, the cause last
+        return f"a library cannot be loaded: {str(trouble).strip().splitlines()[-1]}"
+    return (getattr(trouble, "strerror", None) or str(trouble)).lower()
 
 
 def wants_json(arguments: Sequence[str]) -> bool:
@@ -114,10 +120,9 @@ def as_json(error: FrametoolError, line: BatchLine | None = None, fate: str = ""
     """
     from frametool.documents.json import dump
 
-    message, details = str(error), error.details()
+    message, details = str(error), dict(error.details())
     if line is not None:
-        own = {key: value for key, value in details.items() if key in PLACE}
-        rest = {key: value for key, value in details.items() if key not in PLACE}
+        own = {key: details.pop(key) for key in ("source", "line", "column") if key in details}
         message = f"{line}{message}"
-        details = {**line._asdict(), **({"input": own} if own else {}), **rest}
+        details = {**line._asdict(), **({"input": own} if own else {}), **details}
     return dump({"error": error.kind, "message": f"{message} ({fate})" if fate else message, **details})

@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import keep_setting, settings
 from frametool.cli.options import (
     FILE,
-    READING,
     STREAMED,
-    TREES_OPENED,
     UTF8,
     ColumnNames,
     Notations,
-    decorated,
-    forms_told,
     in_option,
+    input_forms,
     say_if_verbose,
+    say_not_needed,
+    together,
     verbose_option,
 )
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
-from frametool.formats.detect import by_sign, detect
+from frametool.formats.detect import by_sign, detect, refuse_robots, with_hint
 from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
@@ -63,7 +63,7 @@ OPTIONS = {
         "--prefix", type=UTF8, default="", metavar="TEXT", help="begin the names of the result's columns so"
     ),
     "header": click.option(
-        "--no-header", "header", is_flag=True, flag_value=False, default=True,
+        "--no-header", "header", is_flag=True, callback=lambda _context, _option, chosen: not chosen,
         help="a table without names; columns are numbered",
     ),
     "on_error": click.option(
@@ -77,13 +77,15 @@ OPTIONS = {
         "--jobs", type=click.IntRange(0, MOST_JOBS), default=1, show_default=True, metavar="N",
         help="processes for a stream; 0 is all cores",
     ),
-    "quiet": click.option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
+    "quiet": click.option(
+        "--quiet", is_flag=True, callback=keep_setting, help="no progress and no word on forms on stderr"
+    ),
 }  # fmt: skip
 
 
 def stream_options(function: Function) -> Function:
     """Add to a command the options of streams; `Stream` takes them."""
-    return decorated(function, [OPTIONS["input_path"], in_option, *list(OPTIONS.values())[1:], verbose_option])
+    return together(OPTIONS["input_path"], in_option, *list(OPTIONS.values())[1:], verbose_option)(function)
 
 
 class Stream:
@@ -131,10 +133,8 @@ class Stream:
     @staticmethod
     def told_form() -> str:
         """Return the form that --in names for the stream, "" if it names none."""
-        others, form = forms_told(streams=True)
-        context = click.get_current_context(silent=True)
-        reads_trees = context is not None and TREES_OPENED in context.meta
-        if others and not reads_trees:
+        others, form = input_forms(streams=True)
+        if others and not settings().reads_trees:
             both = f"--in {others[0]} and --in {form}: there is one stream"
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
         return form
@@ -149,14 +149,10 @@ class Stream:
         with self.opened() as given:
             head = given.peek()
             if head.lstrip()[:1] == b"<":
-                from frametool.cli.trees import refuse_robots
-
                 refuse_robots(head, self.name)
             try:
                 return self._run_opened(given, request, output, tables_only=tables_only)
             except FormatError as error:
-                from frametool.cli.trees import with_hint
-
                 raise with_hint(error, head, self.name) from None
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
@@ -169,10 +165,7 @@ class Stream:
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
         form = form or self._detected(stream.peek())
-        if any(click.get_current_context().meta.get(READING, {}).values()):
-            from frametool.cli.trees import say_not_needed
-
-            say_not_needed((form,), "stamps", "edges")
+        say_not_needed((form,), "stamps", "edges")
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)

@@ -1,14 +1,11 @@
-"""Trees and frame names from the command line.
+"""Trees and frame names from the command line: files, inline texts, standard input, read as the options say.
 
-Where one pose is wanted and a file of frames is given: the error that says what the file is and points to lookup.
-
-What several lines of a batch read from the same files, read once for as long as these stay as they are.
+What several lines of a batch read from the same files is read once for as long as these stay as they are.
 """
 
 from __future__ import annotations
 
 import os
-import re
 import sys
 import time
 from functools import partial
@@ -16,19 +13,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.options import FORMS, READING, TREES_OPENED, VERBOSE, Text, forms_told
+from frametool.cli.group import settings
+from frametool.cli.options import Text, input_forms, say_not_needed
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
-from frametool.documents.source import HEAD, noting_files, states_of
-from frametool.errors import FormatError, shown, warn
+from frametool.documents.source import noting_files, states_of
+from frametool.errors import FrametoolError, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Hashable, Sequence
+    from collections.abc import Callable, Hashable, Mapping, Sequence
     from typing import TypeVar
-
-    from click.shell_completion import CompletionItem
 
     from frametool.documents.source import FileState
     from frametool.formats.load import Place, Recording, Rules
@@ -37,40 +33,6 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import FrameTree
 
     Value = TypeVar("Value")
-
-_XML = rb"\s*(?:<\?xml\b|<!--|<(?:robot|sdf|mujoco|launch|opencv_storage)\b)"
-_TREE = rb"(?m)^\s*(?:---\s*)?\{?\s*[\"']?frames[\"']?\s*:"  # our own
-_MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # are read as poses too
-
-
-def refuse_robots(text: bytes, name: str) -> None:
-    """Raise FormatError for XML of a robot or a launch file, in which no reader of poses finds anything."""
-    if re.match(_XML, text) and (error := _pointing(text, name)):
-        raise error
-
-
-def with_hint(error: FormatError, text: bytes, name: str) -> FormatError:
-    """Return the error to raise where no pose was found in a text: for a file of frames, one that says so."""
-    return _pointing(text, name) or error
-
-
-def _pointing(text: bytes, name: str) -> FormatError | None:
-    from frametool.formats.detect import by_sign
-    from frametool.formats.table import FORMATS
-
-    try:
-        form = by_sign(text[:HEAD], "tree", name=name)
-    except FormatError as error:
-        return error
-    if form is None or form in ("yaml", "json"):
-        form = "yaml" if re.search(_TREE, text[:HEAD]) else None
-    if form is None or form in _MESSAGES or "rows" in FORMATS[form].reads:
-        return None
-    what = "a tree of frames" if form == "yaml" else f"{FORMATS[form].summary}: frames"
-    file = "FILE" if name in ("", "stdin") else name
-    hint = f"look one up: frametool lookup {file} TARGET SOURCE"
-    return FormatError(f"{what}, not a pose; {hint}", source=name or "stdin")
-
 
 MOST = 32  # values
 MOST_BYTES = 1 << 28  # of the files and texts they were read from
@@ -93,34 +55,34 @@ class Remembered(NamedTuple):
 
 
 class TreeCache:
-    """What was read last, mostly trees, by the arguments and by all that says how they are read."""
+    """What the lines of a batch have read last, mostly trees; its context keeps one.
+
+    The key of a value is all that says how it was read.
+    """
 
     def __init__(self) -> None:
         """Create an empty cache."""
-        self._kept: dict[Hashable, Remembered] = {}
+        self._values: dict[Hashable, Remembered] = {}
 
     def read(self, arguments: Sequence[str], options: Hashable, read: Callable[[], Value]) -> Value:
-        """Return what `read` makes of some arguments: as it did before, or anew."""
+        """Return what `read` makes of some arguments: as it did before, or anew where a file has changed."""
         key = (tuple(arguments), options)
-        if (kept := self._kept.pop(key, None)) is not None and kept.is_current():
-            self._kept[key] = kept  # as the youngest
-            return kept.value  # type: ignore[no-any-return]
-        texts = [argument for argument in arguments if is_inline(argument)]
-        with noting_files() as files:
-            for argument in arguments:
-                if argument not in texts and os.path.exists(argument):
-                    files[argument] = states_of(argument)
-            value = read()
-        if _may_be_kept(files):
+        found = self._values.pop(key, None)
+        if found is None or not found.is_current():
+            texts = [argument for argument in arguments if is_inline(argument)]
+            with noting_files() as files:
+                for argument in arguments:
+                    if argument not in texts and os.path.exists(argument):
+                        files[argument] = states_of(argument)
+                value = read()
+            if not _may_be_kept(files):
+                return value
             size = sum(map(len, texts)) + sum(state.size for states in files.values() for state in states)
-            self._kept[key] = Remembered(value, files, size)
-            self._forget()
-        return value
-
-    def _forget(self) -> None:
-        """Forget the oldest values where there are too many, or too large ones."""
-        while len(self._kept) > MOST or sum(kept.size for kept in self._kept.values()) > MOST_BYTES:
-            del self._kept[next(iter(self._kept))]
+            found = Remembered(value, files, size)
+        self._values[key] = found  # as the youngest
+        while len(self._values) > MOST or sum(each.size for each in self._values.values()) > MOST_BYTES:
+            del self._values[next(iter(self._values))]
+        return found.value  # type: ignore[no-any-return]
 
 
 def _may_be_kept(files: dict[str, list[FileState]]) -> bool:
@@ -140,36 +102,27 @@ def load_tree(
 
     streams: `--in` is about what is streamed wherever that can be
     """
-
-    def read() -> FrameTree | TransformBuffer:
-        return _loaded(opened((argument, *more), streams=streams), rules)
-
-    return _read_once((argument, *more), f"{rules!r} {streams}", read)
+    arguments = (argument, *more)
+    return _read_once(arguments, f"{rules!r} {streams}", lambda: _loaded(opened(arguments, streams=streams), rules))
 
 
 def load_sides(
-    a: Sequence[str], b: Sequence[str], *, normalize: bool, places: Sequence[dict[str, Place]]
-) -> list[FrameTree | TransformBuffer]:
-    """Read two trees that will be compared, each of several files, as `load_tree` does.
+    a: Sequence[str], b: Sequence[str], *, normalize: bool
+) -> list[tuple[FrameTree | TransformBuffer, dict[str, Place]]]:
+    """Read two trees that will be compared, each of several files, as `load_tree` does; with each frame's place."""
+    from frametool.formats.load import Rules
 
-    places: are filled with where each frame of the one and the other was said to be
-    """
     refuse_two_readers((*a, *b))
     count = len(a) + len(b)
 
     def side(arguments: Sequence[str], behind: int) -> tuple[FrameTree | TransformBuffer, dict[str, Place]]:
-        from frametool.formats.load import Rules
-
         where: dict[str, Place] = {}
         return _loaded(opened(arguments, behind=behind, of=count), Rules(normalize=normalize), where), where
 
-    trees = []
-    for arguments, behind, found in zip((a, b), (0, len(a)), places, strict=True):
-        options = f"{normalize} {behind} of {count}"
-        tree, where = _read_once(arguments, options, partial(side, arguments, behind))
-        trees.append(tree)
-        found.update(where)
-    return trees
+    return [
+        _read_once(arguments, f"{normalize} {behind} of {count}", partial(side, arguments, behind))
+        for arguments, behind in ((a, 0), (b, len(a)))
+    ]
 
 
 def _loaded(
@@ -188,44 +141,24 @@ def _loaded(
 def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]) -> Value:
     """Return what is read from files; in a batch, what was read from them before as long as they have not changed.
 
-    options: what says how, beside the options that the context keeps
+    options: what says how, as well as the settings
     """
     context = click.get_current_context(silent=True)
     cache = None if context is None else context.find_object(TreeCache)
     if context is None or cache is None:
         return read()
-    context.meta[TREES_OPENED] = True
+    settings(context).reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    return cache.read(named, f"{options} {context.meta.get(FORMS)} {context.meta.get(READING)}", read)
+    return cache.read(named, f"{options} {vars(settings(context))}", read)
 
 
 def state(files: Sequence[Recording]) -> None:
-    """Say on stderr what files that were read were taken for: those of other forms than ours, with -v all."""
-    context = click.get_current_context(silent=True)
-    if context is None:
-        return
+    """Say on stderr what files that were read were taken for: those of other forms than the own one, with -v all."""
     for file in files:
-        if context.meta.get(VERBOSE):
+        if settings().verbose:
             say(file.known)
-        if file.stated and not is_quiet():
+        if file.stated and not settings().quiet:
             say(file.stated)
-
-
-def say_not_needed(forms: Collection[str], *asked: str) -> None:
-    """Say on stderr which options answer what none of these forms leaves open: they change nothing."""
-    if is_quiet():
-        return
-    for ask in asked:
-        told = _reading("named_frames" if ask == "frames" else ask)
-        if told and not any(ask in FORMATS[form].asks for form in forms):
-            option = f"--{ask.replace('_', '-')}"
-            say(f"note: {option} changes nothing: {' and '.join(dict.fromkeys(forms))} does not leave that open")
-
-
-def is_quiet() -> bool:
-    """Return whether the command was called with --quiet, or is only completed."""
-    context = click.get_current_context(silent=True)
-    return context is None or bool(context.params.get("quiet") or context.meta.get(READING, {}).get("quiet"))
 
 
 def opened(
@@ -242,28 +175,26 @@ def opened(
     refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
-    forms = forms_told(streams=streams)[0]
-    _check_forms(forms)
-    if not streams:
-        _refuse_more("--in", forms, of or len(arguments))
-    told = iter(forms[behind:] or forms)
-    context = click.get_current_context(silent=True)
-    if context is not None:
-        context.meta[TREES_OPENED] = True
-    topics = _reading("topics")
-    named = _reading("named_frames")
-    if not streams:
-        _refuse_more("--frames", named, of or len(arguments))
-    frames = iter(named[behind:] or named)
+    chosen = settings()
+    chosen.reads_trees = True
+    forms, named = input_forms(streams=streams)[0], chosen.named_frames
+    if other := [form for form in forms if "tree" not in FORMATS[form].reads]:
+        raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
+    files = of or len(arguments)
+    for option, values in (("--in", forms), ("--frames", named)):
+        if not streams and len(values) > files:
+            times = f"{len(values)} times for {files} file{'s' * (files != 1)}"
+            raise click.UsageError(f"{option} is given {times}")
+    form_of_next, frames_of_next = iter(forms[behind:] or forms), iter(named[behind:] or named)
     general = answers()
     return opened_together(
         Recording.inline(source_of(each))
         if is_inline(each)
         else Recording(
             tree_file(each),
-            form=next(told, None),
-            topics=topics,
-            answers=general._replace(frames=_frame_names(next(frames, ""))),
+            form=next(form_of_next, None),
+            topics=chosen.topics,
+            answers=general._replace(frames=_frame_names(next(frames_of_next, ""))),
         )
         for each in arguments
     )
@@ -275,47 +206,24 @@ def refuse_two_readers(arguments: Sequence[str]) -> None:
         raise click.UsageError("standard input can be read once; only one argument may be -")
 
 
-def _check_forms(forms: Sequence[str]) -> None:
-    """Refuse a form from which no frames are read."""
-    if other := [form for form in forms if "tree" not in FORMATS[form].reads]:
-        raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
-
-
-def _refuse_more(option: str, values: Sequence[str], files: int) -> None:
-    """Refuse an option that is given more often than there are files."""
-    if len(values) > files:
-        raise click.UsageError(f"{option} is given {len(values)} times for {files} file{'s' * (files != 1)}")
-
-
-def _reading(name: str) -> Any:
-    """Return what an option about files of frames says."""
-    context = click.get_current_context(silent=True)
-    return (context.meta.get(READING, {}) if context is not None else {}).get(name, ())
-
-
 def answers() -> Answers:
     """Return what the options say about all files whose form leaves it open."""
-    named = {name: _reading(name) for name in Answers._fields if name not in ("joints", "frames")}
-    given = {name: value for name, value in named.items() if value}
-    return Answers(joints=_joints(_reading("joints")), **given)
+    chosen = settings()
+    named = {name: getattr(chosen, name) for name in Answers._fields if name not in ("joints", "frames")}
+    return Answers(joints=_joints(chosen.joints), **{name: value for name, value in named.items() if value})
 
 
 def _joints(texts: Sequence[str]) -> dict[str, str]:
-    """Return the values of joints by name; raise a usage error for a joint that has two."""
+    """Take each NAME=VALUE apart; raise a usage error for a joint that has two values."""
     values: dict[str, str] = {}
-    for name, value in map(_joint, texts):
+    for text in texts:
+        name, _, value = text.partition("=")
+        if not (name and value):
+            raise click.UsageError(f"--joint takes NAME=VALUE, found {shown(text)}")
         if name in values:
             raise click.UsageError(f"--joint {shown(name)} is given twice, {values[name]} and {value}; leave one out")
         values[name] = value
     return values
-
-
-def _joint(text: str) -> tuple[str, str]:
-    """Take NAME=VALUE apart."""
-    name, equals, value = text.partition("=")
-    if not (name and equals and value):
-        raise click.UsageError(f"--joint takes NAME=VALUE, found {shown(text)}")
-    return name, value
 
 
 def _frame_names(text: str) -> tuple[str, ...]:
@@ -340,21 +248,16 @@ class Frame(Text):
 
     name = "frame"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
-        """Offer the frames of the tree."""
-        from click.shell_completion import CompletionItem
-
-        from frametool.errors import FrametoolError
-
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
+        """Offer the frames of the tree, or files where none is named yet."""
         # behind an option that wants a frame click has not come to the arguments
         named = ctx.params.get("tree") or next(iter(ctx.params.get("arguments") or ctx.args), None)
         if named is None and "arguments" in ctx.params:
-            return [CompletionItem(incomplete, type="file")]
+            return None
         try:
-            tree = load_tree(named or ".", ctx.params.get("more") or ())
+            return dict.fromkeys(load_tree(named or ".", ctx.params.get("more") or ()).frames, "")
         except (FrametoolError, click.UsageError):
-            return []  # nothing to offer, and a completion must not print
-        return [CompletionItem(frame) for frame in tree.frames if frame.startswith(incomplete)]
+            return {}  # a completion must not print
 
 
 FRAME = Frame()

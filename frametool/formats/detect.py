@@ -30,7 +30,7 @@ import re
 from contextlib import suppress
 from functools import cached_property
 
-from frametool.documents.source import LOOKED_AT, UTF16, not_text
+from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, bare, shown
 from frametool.formats.table import FORMATS, by_suffix, readers, unread
 
@@ -290,3 +290,35 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
         source=name or "stdin",
         line=1,
     )
+
+
+_ROBOT = rb"\s*(?:<\?xml\b|<!--|<(?:robot|sdf|mujoco|launch|opencv_storage)\b)"
+_FRAMES_KEY = r"""(?m)^\s*(?:---\s*)?\{?\s*["']?frames["']?\s*:"""  # of the tool's own trees
+_MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # are read as poses too
+
+
+def refuse_robots(text: bytes, name: str) -> None:
+    """Raise FormatError for XML of a robot or a launch file where one pose is wanted."""
+    if re.match(_ROBOT, text) and (error := _points_to_lookup(text, name)):
+        raise error
+
+
+def with_hint(error: FormatError, text: bytes, name: str) -> FormatError:
+    """Return the error for a text without a pose: of a file of frames, one that points to `frametool lookup`."""
+    return _points_to_lookup(text, name) or error
+
+
+def _points_to_lookup(text: bytes, name: str) -> FormatError | None:
+    begin = Beginning(text[:HEAD])
+    try:
+        form, _ = _by_sign(begin, "tree", name=name)
+    except FormatError as error:
+        return error
+    if form in (None, "yaml", "json"):
+        form = "yaml" if re.search(_FRAMES_KEY, begin.text) else None
+    if form is None or form in _MESSAGES or "rows" in FORMATS[form].reads:
+        return None
+    what = "a tree of frames" if form == "yaml" else f"{FORMATS[form].summary}: frames"
+    file = "FILE" if name in ("", "stdin") else name
+    hint = f"look one up: frametool lookup {file} TARGET SOURCE"
+    return FormatError(f"{what}, not a pose; {hint}", source=name or "stdin")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.help import topic, topics
 from frametool.cli.options import EXIT_CODES
 from frametool.geometry.conventions import AXES

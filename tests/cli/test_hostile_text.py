@@ -5,12 +5,17 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
-from shell import ENVIRONMENT, TOOL, run
+import shell
+from shell import ENVIRONMENT, TOOL
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Outcome
 
 ESC = "a\x1b[31mX\n\x9b\x7f\0"
 TREE = json.dumps({"frames": [{"name": ESC, "parent": "p\x1b]0;q", "xyz": [1, 2, 3]}]})
@@ -28,38 +33,33 @@ COMMANDS = [
 ]  # fmt: skip
 
 
-def _called(folder: Path, name: str, command: str) -> subprocess.CompletedProcess[bytes]:
-    arguments = [word.replace("FILE", name) for word in command.split(" ")]
-    return subprocess.run([*TOOL, *arguments], cwd=folder, env=ENVIRONMENT, capture_output=True, check=False)
-
-
-def test_no_control_character_reaches_a_terminal(tmp_path: Path) -> None:
-    for name in NAMES:
+def test_no_control_character_reaches_a_terminal(run: Callable[..., Outcome], tmp_path: Path) -> None:
+    """In this process: the command line that a process runs, with stderr as Python makes it."""
+    for name in map(os.fsdecode, NAMES):
         for content in (TREE, MOVING):
-            Path(os.fsdecode(bytes(tmp_path) + b"/" + name)).write_text(content)
+            (tmp_path / name).write_text(content)
             # what names no file is the same each time
-            chosen = [command for command in COMMANDS if "FILE" in command or (name, content) == (NAMES[0], TREE)]
-            with ThreadPoolExecutor(2) as pool:
-                results = list(pool.map(partial(_called, tmp_path, os.fsdecode(name)), chosen))
-            for command, done in zip(chosen, results, strict=True):
-                shown = (done.stdout + done.stderr).decode().replace("\n", "").replace("\ufffd", "")
+            chosen = [command for command in COMMANDS if "FILE" in command or (name, content) == (os.fsdecode(NAMES[0]), TREE)]
+            for command in chosen:
+                done = run(*(word.replace("FILE", name) for word in command.split(" ")))
+                shown = (done.out + done.err).replace("\n", "").replace("\ufffd", "")
                 assert shown.isprintable(), command
-                assert b"Traceback" not in done.stderr, command
-                assert done.returncode in (0, 1, 2, 4, 5), command
+                assert "Traceback" not in done.err, command
+                assert done.status in (0, 1, 2, 4, 5), command
 
 
 def test_files_may_be_called_as_the_system_allows(tmp_path: Path) -> None:
     for name in NAMES:
         path = bytes(tmp_path) + b"/" + name
-        assert run("convert", "--from", "rpy", "0", "0", "1", "-o", path) == (0, b"", b"")
-        assert run("invert", path)[::2] == (0, b"")
-        assert run("sim", "follow", "--duration", "0.1", "-o", path, "--force")[0] == 0
-        status, _, err = run("convert", "--from", "rpy", "0", "0", "1", "-o", path)
+        assert shell.run("convert", "--from", "rpy", "0", "0", "1", "-o", path) == (0, b"", b"")
+        assert shell.run("invert", path)[::2] == (0, b"")
+        assert shell.run("sim", "follow", "--duration", "0.1", "-o", path, "--force")[0] == 0
+        status, _, err = shell.run("convert", "--from", "rpy", "0", "0", "1", "-o", path)
         assert (status, err.count(b"\n"), b"exists" in err) == (5, 1, True)
 
 
 def test_what_becomes_part_of_a_result_is_text() -> None:
-    status, out, err = run("invert", "--prefix", b"\xff", text=b"x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n")
+    status, out, err = shell.run("invert", "--prefix", b"\xff", text=b"x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n")
     assert (status, out) == (2, b"")
     assert b"is not UTF-8 text" in err
 
@@ -68,11 +68,11 @@ def test_a_nul_ends_no_name(tmp_path: Path) -> None:
     tree = tmp_path / "tree.yaml"
     tree.write_text("frames: [{name: map, parent: world, xyz: [1, 0, 0]}]")
     for options, cell in ((["world", "--source-column", "f"], b"1,map\0junk"), (["map", "--target-column", "f"], b"1,world\0")):
-        status, out, err = run("lookup", str(tree), *options, "--in", "csv", "--on-error", "skip", text=b"i,f\n" + cell + b"\n")
+        status, out, err = shell.run("lookup", str(tree), *options, "--in", "csv", "--on-error", "skip", text=b"i,f\n" + cell + b"\n")
         assert (status, out.count(b"\n")) == (3, 1), err
         assert b"unknown frame" in err
     both = ["--target-column", "f", "--source-column", "g", "--in", "csv", "--on-error", "skip"]
-    assert run("lookup", str(tree), *both, text=b"f,g\nworld\0map,map\nworld,map\n")[0] == 3
+    assert shell.run("lookup", str(tree), *both, text=b"f,g\nworld\0map,map\nworld,map\n")[0] == 3
 
 
 @pytest.mark.parametrize("arguments", [["lookup", "TREE", "map", "lidar"], ["invert"], ["invert", "--jobs", "2"]])

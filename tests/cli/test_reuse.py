@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 import pytest
 
-from frametool.cli import COMMANDS
-from frametool.cli.group import Reused
+from frametool.cli.commands import COMMANDS
+from frametool.cli.group import Reused, settings
 from frametool.geometry.representations import Notation
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def parsed(command: click.Command, words: list[str]) -> tuple[Any, ...]:
         context = command.make_context("x", list(words))
     except (click.ClickException, click.exceptions.Exit) as error:
         return type(error), str(error)
-    return {name: plain(value) for name, value in context.params.items()}, context.meta, context.args
+    return {name: plain(value) for name, value in context.params.items()}, vars(settings(context)), context.args
 
 
 def plain(value: Any) -> Any:

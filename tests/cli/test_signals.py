@@ -6,6 +6,7 @@ import os
 import pty
 import signal
 import subprocess
+import sys
 import termios
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -110,3 +111,12 @@ def drain(terminal: int) -> None:
     """Read what a program still draws, so that it can end."""
     while os.read(terminal, 1 << 16):
         pass
+
+
+def test_a_system_without_some_signals_does_the_same(tmp_path: Path) -> None:
+    code = "import os, signal; del signal.SIGHUP, signal.SIGPIPE, os.chown; from frametool.cli import main; main()"
+    (tmp_path / "b.yaml").write_text("before")
+    call = [sys.executable, "-c", code, "convert", "--from", "rpy", "0", "0", "0", "-o", "b.yaml", "--force"]
+    done = subprocess.run(call, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert "w: 1.0" in (tmp_path / "b.yaml").read_text()

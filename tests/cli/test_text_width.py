@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from machine_output import COMMANDS, ROOT, STREAMS
 
-from frametool.cli import COMMANDS as NAMES
+from frametool.cli.commands import COMMANDS as NAMES
 from frametool.cli.commands.help import topics
 
 if TYPE_CHECKING:

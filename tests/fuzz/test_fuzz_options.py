@@ -10,7 +10,7 @@ import click
 import pytest
 from oracles_of_use import HOSTILE, TooMuch, cases, some
 
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.sim import SUBCOMMANDS
 
 if TYPE_CHECKING:

@@ -9,14 +9,10 @@ from frametool.cli.stderr import say
 from frametool.documents.source import opened
 from frametool.stream.faults import SKIP, STOP
 
-
-class BatchCommand(Command):
-    """A command that ends as its lines do."""
-
-    exit_codes = "Exit codes: 0 done, 3 lines or rows skipped, else that of the line that failed."
+EXIT_CODES = "Exit codes: 0 done, 3 lines or rows skipped, else that of the line that failed."
 
 
-@click.command(cls=BatchCommand, name="batch")
+@click.command(cls=Command, name="batch", epilog=EXIT_CODES)
 @click.argument("file", default="-", type=FILE, metavar="[FILE]")
 @click.option("--on-error", "on_failure", type=click.Choice((STOP, SKIP)), default=STOP, show_default=True,
               help="end at a line that fails, or report it and go on")

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import settings
 from frametool.cli.options import FILE, TIME, Command, Parsed, at_ns, file_options, list_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
-from frametool.cli.trees import FRAME, frame_name, is_quiet, load_sides
+from frametool.cli.trees import FRAME, frame_name, load_sides
 from frametool.formats.load import lines_of
 from frametool.lint.findings import github_command
 from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
@@ -21,15 +22,10 @@ if TYPE_CHECKING:
     from frametool.lint.tree_diff import Comparison
 
 DIFFERENT, TROUBLE = 1, 2
+EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
 
 
-class DiffCommand(Command):
-    """A command with the exit codes of diff(1)."""
-
-    exit_codes = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
-
-
-@click.command(cls=DiffCommand, name="diff")
+@click.command(cls=Command, name="diff", epilog=EXIT_CODES)
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
 @click.option("--with-a", multiple=True, type=FILE, metavar="FILE", help="merge this file into A; may be repeated")
@@ -63,15 +59,14 @@ def command(
     in the order of the files: A, those of --with-a, B, those of --with-b; given for A only they count for both.
     """
     output = Output("report", **options, otherwise="text")
-    places: list[dict[str, Place]] = [{}, {}]
-    one, other = load_sides((a, *with_a), (b, *with_b), normalize=normalize, places=places)
+    (one, of_one), (other, of_other) = load_sides((a, *with_a), (b, *with_b), normalize=normalize)
     start = seen_from and frame_name(seen_from, one)
     comparison = diff(one, other, at_ns=at_ns(at), seen_from=start, tolerance=tolerance)
-    for note in () if is_quiet() else comparison.notes:
+    for note in () if settings().quiet else comparison.notes:
         say(note)
     differences = [*comparison.differences, *(comparison.unmoved if everything else ())]
     if output.style.form == "github":
-        output.text(_annotations(comparison, places))
+        output.text(_annotations(comparison, (of_one, of_other)))
     elif output.style.form == "text":
         from frametool.view.report_text import write_diff
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 from shutil import get_terminal_size
 from textwrap import fill
-from typing import Any
 
 import click
 
-from frametool.cli import COMMANDS
+from frametool.cli.commands import COMMANDS
 from frametool.cli.group import show_help
 from frametool.cli.options import Command, Text
 from frametool.cli.sink import writing
@@ -40,12 +39,9 @@ class Topic(Text):
 
     name = "topic"
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+    def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002
         """Offer the subjects and the commands."""
-        from click.shell_completion import CompletionItem
-
-        known = topics() | {name: row[1] for name, row in COMMANDS.items()}
-        return [CompletionItem(name, help=about) for name, about in known.items() if name.startswith(incomplete)]
+        return topics() | {name: row[1] for name, row in COMMANDS.items()}
 
 
 @click.command(cls=Command, name="help")
@@ -63,9 +59,7 @@ def command(ctx: click.Context, name: str | None) -> None:
     if name in COMMANDS and name not in known:  # calc and formats are subjects too
         from frametool.cli.group import group
 
-        found = group.get_command(ctx, name)
-        if found is not None and ctx.parent is not None:
-            show_help(click.Context(found, parent=ctx.parent, info_name=name))
+        show_help(click.Context(group.get_command(ctx, name), parent=ctx.parent, info_name=name))
         return
     if name is not None and name not in known:
         raise click.UsageError(f"no topic {shown(name)}{alternatives(name, tuple(known | COMMANDS), 'topics')}")

@@ -65,10 +65,13 @@ class SimGroup(Group):
     """The subcommands of the turtles, which stand below."""
 
     table = {name: (__name__, about) for name, about in SUBCOMMANDS.items()}  # noqa: RUF012 - as the group's own
-    get_command = click.Group.get_command
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """Return one of them, or say which there are."""
+        return self.commands.get(cmd_name) or super().get_command(ctx, cmd_name)
 
 
-@click.command(cls=SimGroup, name="sim", help=HELP, epilog=EXIT_CODES, no_args_is_help=True)
+@click.command(cls=SimGroup, name="sim", help=HELP, epilog=EXIT_CODES)
 def command() -> None:
     """Hold the subcommands."""
 
