@@ -16,7 +16,7 @@ from frametool.errors import ValueInvalid, printable, shown
 from frametool.frames.lookups import Frames
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.geometry.trig import RADIAN as DEGREES
+from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.text.numbers import parse_number

@@ -23,7 +23,7 @@ from frametool.calc.values import (
     arithmetic,
     made,
 )
-from frametool.geometry import euler, quaternion, rigid, trig
+from frametool.geometry import euler, quaternion, rigid, floats
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -43,7 +43,7 @@ def trigonometric(pick: Callable[[Number, Number], Number]) -> Rule:
 
     def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
         angle = rules.scalar(rules.wanted(terms[0]), f"{name}()", angle=True)
-        halved = trig.half_sincos_deg if angle.type.degrees else trig.half_sincos
+        halved = floats.half_sincos_deg if angle.type.degrees else floats.half_sincos
         return made(PLAIN_NUMBER, lambda value, xp: (pick(*halved(2.0 * value, xp)),), angle)
 
     return rule
@@ -64,12 +64,12 @@ def arc(kernel: Callable[..., Number], bound: float | None) -> Rule:
 
 def arcsine(value: Number, xp: Namespace) -> Number:
     """Return the angle of a sine."""
-    return trig.bearing(value, xp.sqrt((1.0 - value) * (1.0 + value)), 1.0, xp)
+    return floats.bearing(value, xp.sqrt((1.0 - value) * (1.0 + value)), 1.0, xp)
 
 
 def arccosine(value: Number, xp: Namespace) -> Number:
     """Return the angle of a cosine."""
-    return trig.bearing(xp.sqrt((1.0 - value) * (1.0 + value)), value, 1.0, xp)
+    return floats.bearing(xp.sqrt((1.0 - value) * (1.0 + value)), value, 1.0, xp)
 
 
 def arctangent(value: Number, xp: Namespace) -> Number:
@@ -77,7 +77,7 @@ def arctangent(value: Number, xp: Namespace) -> Number:
     steep = abs(value) > 1.0
     small = xp.where(steep, 1.0 / xp.where(steep, value, 1.0), value)
     angle = xp.doubled_arctan(small / (1.0 + xp.sqrt(1.0 + small * small)))
-    return xp.where(steep, xp.copysign(trig.RIGHT_ANGLE, value) - angle, angle)
+    return xp.where(steep, xp.copysign(floats.RIGHT_ANGLE, value) - angle, angle)
 
 
 def sqrt(name: str, terms: Sequence[Term], _: Trees) -> Term:
@@ -227,7 +227,7 @@ def _between_vectors(
     bx, by, bz = quaternion.unit_vector(bx, by, bz, xp)
     apart = quaternion.length(0.5 * (bx - ax), 0.5 * (by - ay), 0.5 * (bz - az), xp)
     along = quaternion.length(0.5 * (bx + ax), 0.5 * (by + ay), 0.5 * (bz + az), xp)
-    return (2.0 * trig.incline(apart, along, xp),)
+    return (2.0 * floats.incline(apart, along, xp),)
 
 
 def _cross(name: str, terms: Sequence[Term], trees: Trees) -> Term:

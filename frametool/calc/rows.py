@@ -17,7 +17,7 @@ from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTO
 from frametool.documents.source import opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid
 from frametool.geometry.representations import notation
-from frametool.geometry.trig import RADIAN as DEGREES
+from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.stream.faults import BadRow
 from frametool.stream.gathering import Gathered
 from frametool.stream.request import Request

@@ -381,7 +381,8 @@ def _pose_of_rows(texts: Sequence[str], form: Notation, *, told: bool, normalize
 
 def source_from_numbers(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Source:
     """Write bare numbers, read by `pose_from_numbers` before, as the mapping that says the same."""
-    from frametool.documents.json import Verbatim, dump
+    from frametool.documents.json import dump
+    from frametool.documents.source import Verbatim
 
     form = _form_of(texts, given)
     size = len(form.representation.columns)

@@ -27,7 +27,6 @@ from frametool.cli.options import (
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
-from frametool.formats.detect import by_sign, detect, refuse_robots, with_hint
 from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, readers
 from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
@@ -146,6 +145,8 @@ class Stream:
 
     def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int:
         """Run the stream and return its exit status."""
+        from frametool.formats.detect import refuse_robots, with_hint
+
         with self.opened() as given:
             head = given.peek()
             if head.lstrip()[:1] == b"<":
@@ -181,6 +182,8 @@ class Stream:
 
     def _detected(self, begin: bytes) -> str:
         """Find the form of the stream by what it begins with, and by its name."""
+        from frametool.formats.detect import detect
+
         form, known_by = detect(begin, *STREAMED, name=self.path or "")
         if known_by:
             say_if_verbose(f"{self.name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
@@ -340,6 +343,8 @@ class Stream:
 
 def _signed(begin: bytes, name: str) -> str:
     """Return the form that a stream shows, if it is no single row of a pose, which may have been pasted."""
+    from frametool.formats.detect import by_sign
+
     form = by_sign(begin, *STREAMED, name=name) or ""
     return "" if form == "kitti" else form
 
@@ -361,6 +366,8 @@ def _opened(path: str | None) -> BufferedReader:
 
 def _form_of(path: str) -> str:
     """Return the form of a file by what is in it; "" where nothing tells, or it cannot be read."""
+    from frametool.formats.detect import detect
+
     try:
         with open(path, "rb") as file:
             return detect(file.read(HEAD), *STREAMED, name=path)[0]

@@ -19,6 +19,7 @@ from frametool.documents.source import (
     MAP,
     MOST_CONTAINERS,
     Source,
+    Verbatim,
     error_at,
     repeated_key,
     too_much,
@@ -189,12 +190,6 @@ def _too_deep(source: Source) -> FormatError:
     """Find the bracket that is one too many."""
     at = next((start for depth, start in _depths(source.text) if depth > DEEPEST), 0)
     return error_at(source, at, too_much(DEEPEST))
-
-
-class Verbatim(str):
-    """A number or truth value as it was written; it is written so again, without quotes."""
-
-    __slots__ = ()
 
 
 def dump(value: Any, number: Callable[[float], str] = repr) -> str:

@@ -100,6 +100,12 @@ class Source(NamedTuple):
     first_line: int = 1
 
 
+class Verbatim(str):
+    """A number or truth value as it was written; it is written so again, without quotes."""
+
+    __slots__ = ()
+
+
 class FileState(NamedTuple):
     """What changes when a file does: of a folder, of one of the files in it."""
 

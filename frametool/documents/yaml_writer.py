@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 
-from frametool.documents.json import Verbatim
+from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
 
 TYPE_CHECKING = False

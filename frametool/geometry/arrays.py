@@ -12,7 +12,7 @@ import numpy as np
 from numpy import fmod, frexp, ldexp, maximum, minimum, sqrt
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import trig
+from frametool.geometry import floats
 
 __all__ = [
     "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
@@ -115,7 +115,7 @@ def doubled_sincos(y: Array) -> Two[Array]:
     The rounding of sin y is added to its square, so that the cosine of a right angle vanishes to half an eps.
     """
     squared = y * y
-    bend = trig.polynomial(squared, trig.SINE)
+    bend = floats.polynomial(squared, floats.SINE)
     bend *= squared
     bend *= y
     sine = y + bend
@@ -130,17 +130,17 @@ def doubled_sincos(y: Array) -> Two[Array]:
     root *= sine
     squared *= -2.0
     squared += 1.0
-    level = squared < trig.LEVEL
+    level = squared < floats.LEVEL
     if some(level):
-        squared = where(level, trig.RIGHT_ANGLE - abs(y + y) + trig.RIGHT_ANGLE_REST, squared)
+        squared = where(level, floats.RIGHT_ANGLE - abs(y + y) + floats.RIGHT_ANGLE_REST, squared)
     return root, squared
 
 
 def doubled_arctan(tangent: Array) -> Array:
     """Return 2 atan(t), |t| <= 1, at most 1 eps off; of 1 it is pi/2 to the bit."""
     squared = tangent * tangent
-    rest = trig.polynomial(squared, trig.ARC_ABOVE)
-    rest /= trig.monic_polynomial(squared, trig.ARC_BELOW)
+    rest = floats.polynomial(squared, floats.ARC_ABOVE)
+    rest /= floats.monic_polynomial(squared, floats.ARC_BELOW)
     rest *= squared
     rest *= tangent
     rest = tangent - rest
@@ -151,12 +151,12 @@ def doubled_arctan(tangent: Array) -> Array:
 def reduced_exactly(x: Array) -> Two[Array]:
     """Return what is left of angles less the nearest whole numbers of quarter turns, and those numbers modulo 2.
 
-    Rows near enough for `trig.reduced` have what they have among their like.
+    Rows near enough for `floats.reduced` have what they have among their like.
     """
     x = np.atleast_1d(x)
-    rest, turns = trig.reduced(x)
-    for row in np.argwhere(~(abs(x) < trig.FAR)).tolist():
-        rest[*row], turns[*row] = trig.reduced_exactly(float(x[*row]))
+    rest, turns = floats.reduced(x)
+    for row in np.argwhere(~(abs(x) < floats.FAR)).tolist():
+        rest[*row], turns[*row] = floats.reduced_exactly(float(x[*row]))
     return rest, turns
 
 

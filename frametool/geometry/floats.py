@@ -1,10 +1,16 @@
-"""The functions kernels find in `xp` when their components are Python floats; loads no numpy."""
+"""The functions kernels find in `xp` when their components are Python floats, and how sines are computed; no numpy.
+
+Sine, cosine and arc tangent of floats and arrays by the same steps: + - * / and roots, which IEEE 754 rounds right.
+
+So one number and a million give the same bits, on every machine; no C library is asked, and no function of numpy's.
+The polynomials stand twice, in `floats` as one expression and in `arrays` step by step in place: the fastest way each.
+The coefficients come from interpolation at Chebyshev nodes with 60 digits; the tests hold the results to theirs.
+"""
 
 from __future__ import annotations
 
-from math import copysign, fmod, frexp, ldexp, sqrt
-
-from frametool.geometry import trig
+from functools import cache
+from math import copysign, fmod, frexp, isfinite, ldexp, nan, pi, sqrt
 
 __all__ = [
     "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
@@ -12,17 +18,167 @@ __all__ = [
 ]  # fmt: skip
 
 TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from frametool.geometry.types import Condition
 
-S1, S2, S3, S4, S5, S6 = trig.SINE
-A1, A2, A3, A4, A5, A6 = trig.ARC_ABOVE
-B1, B2, B3, B4, B5, B6 = trig.ARC_BELOW
-LEVEL, RIGHT_ANGLE, RIGHT_ANGLE_REST = trig.LEVEL, trig.RIGHT_ANGLE, trig.RIGHT_ANGLE_REST
+if TYPE_CHECKING:
+    from frametool.geometry.types import Condition, Functions, N, Two
+
+DEGREE, RADIAN = pi / 180.0, 180.0 / pi  # a degree in radians and a radian in degrees
+SQRT_HALF = sqrt(0.5)
+# (sin(y)/y - 1)/y^2 in y^2, |y| <= pi/4: relative error of the sine 2^-56
+SINE = (
+    -0.16666666666666666, 0.008333333333330948, -0.0001984126983675857,
+    2.755731610255057e-06, -2.5051131844614108e-08, 1.5918129266803394e-10,
+)  # fmt: skip
+# (1 - atan(t)/t)/t^2 as a quotient in t^2, 0 <= t <= 1, the divisor led by 1, which no product needs: relative error of
+# the angle 2^-55
+ARC_ABOVE = (
+    404.44958201411697, 905.3726290655958, 709.2810809323058, 230.9790943899718, 28.6344514670043, 0.9024525862982413,
+)  # fmt: skip
+ARC_BELOW = (
+    1213.3487460423516, 3444.127134821938, 3674.312918256491, 1825.9201295139483, 423.8789826719409, 39.96465648522898,
+)  # fmt: skip
+# pi/2 in two parts, the first of 33 bits (fdlibm): its products with whole numbers below 2^20 are exact
+QUARTER_TURN, QUARTER_TURN_REST = 1.57079632673412561417, 6.07710050650619224932e-11
+FAR = 2.0**20
+RIGHT_ANGLE, RIGHT_ANGLE_REST = 0.5 * pi, 6.123233995736766e-17  # pi/2 in two doubles
+LEVEL = 2.0**-27  # the cosine below which it is the angle left to a right one, to the last bit
+WHOLE = 1.5 * 2.0**52  # added and taken off again, it rounds to the nearest whole number, ties to even
+
+
+def half_sincos(angle: N, xp: Functions[N]) -> Two[N]:
+    """Return sine and cosine of half an angle in radians, at most 1.5 eps off.
+
+    Source: sin 2y = 2 sin y cos y and cos 2y = 1 - 2 sin^2 y of the quarter y, which |sin y| <= sqrt(1/2) makes
+    well-conditioned; near a right angle the cosine is the angle left to that.  Quarters beyond pi/4 are reduced as
+    Cody & Waite 1980 do, and exactly beyond 2^20.
+    """
+    quarter = 0.25 * angle
+    bound = xp.furthest(quarter)
+    if bound <= 0.25 * pi:
+        return xp.doubled_sincos(quarter)
+    quarter, turns = reduced(quarter) if bound < FAR else xp.reduced_exactly(quarter)
+    sine, cosine = xp.doubled_sincos(quarter)
+    turns -= 2.0 * nearest(0.5 * turns)
+    sign = 1.0 - 2.0 * abs(turns)
+    return sine * sign, cosine * sign
+
+
+def half_sincos_deg(angle: N, xp: Functions[N]) -> Two[N]:
+    """Return sine and cosine of half an angle in degrees.
+
+    Exact at multiples of 180; at odd multiples of 90 both have the same double sqrt(1/2) as magnitude, so that
+    products cancel exactly.  The reduction to at most 45 degrees is exact.
+    """
+    half = 0.5 * xp.fmod(angle, 720.0)
+    turns = nearest(half / 90.0)
+    rest = half - 90.0 * turns
+    sine, cosine = xp.doubled_sincos(0.5 * (rest * DEGREE))
+    diagonal = abs(rest) == 45.0
+    if xp.some(diagonal):
+        sine = xp.where(diagonal, xp.copysign(SQRT_HALF, rest), sine)
+        cosine = xp.where(diagonal, SQRT_HALF, cosine)
+    if not xp.some(turns != 0.0):
+        return sine, cosine
+    turns -= 4.0 * nearest(0.25 * turns)
+    odd, back = abs(turns) == 1.0, (turns == -1.0) | (abs(turns) == 2.0)
+    sine, cosine = xp.where(odd, cosine, sine), xp.where(odd, 0.0 - sine, cosine)
+    return xp.where(back, 0.0 - sine, sine), xp.where(back, 0.0 - cosine, cosine)
+
+
+def nearest(x: N) -> N:
+    """Return the nearest whole number, |x| < 2^51; zero is +0."""
+    whole = x + WHOLE
+    whole -= WHOLE
+    return whole
+
+
+def reduced(x: N) -> Two[N]:
+    """Return what is left of an angle below 2^20 less the nearest whole number of quarter turns, and that number."""
+    turns = nearest(x * (2.0 / pi))
+    x = x - turns * QUARTER_TURN
+    x -= turns * QUARTER_TURN_REST
+    return x, turns
+
+
+def incline(rise: N, run: N, xp: Functions[N]) -> N:
+    """Return the angle of a direction of length 1 to 1e-8, run >= 0.
+
+    Twice that whose tangent is rise / (length + run), which is at most 1; even parts are exactly pi/4.
+    """
+    length = 0.5 + 0.5 * (rise * rise + run * run)
+    angle = xp.doubled_arctan(rise / (length + run))
+    even = rise == run
+    return xp.where(even, 0.25 * pi, angle) if xp.some(even) else angle
+
+
+def bearing(y: N, x: N, radius: N, xp: Functions[N]) -> N:
+    """Return the angle of a direction of this length in [-pi, pi], NaN for none."""
+    angle = xp.doubled_arctan(y / (radius + abs(x)))
+    side = xp.copysign(1.0, x)
+    angle *= side
+    angle += (0.5 - 0.5 * side) * xp.copysign(pi, y)
+    return angle
+
+
+def polynomial(x: N, coefficients: tuple[float, ...]) -> N:
+    """Evaluate a polynomial by Horner's rule, arrays in one of their own; lowest coefficient first."""
+    return horner(x * coefficients[-1], x, coefficients[:-1])
+
+
+def monic_polynomial(x: N, coefficients: tuple[float, ...]) -> N:
+    """Evaluate a polynomial led by a coefficient of 1, which is left out."""
+    value = x + coefficients[-1]
+    value *= x
+    return horner(value, x, coefficients[:-1])
+
+
+def horner(value: N, x: N, coefficients: tuple[float, ...]) -> N:
+    """Add the lower coefficients to the highest term, one power of x after the other, in place."""
+    for coefficient in coefficients[:0:-1]:
+        value += coefficient
+        value *= x
+    value += coefficients[0]
+    return value
+
+
+SPARE = 128  # bits behind the point: 64 for the result, 64 for what a double may lie close to a quarter turn
+
+
+def reduced_exactly(x: float) -> tuple[float, float]:
+    """Return what is left of an angle less the nearest whole number of quarter turns, rounded once, and its parity."""
+    if not isfinite(x):
+        return nan, 0.0
+    above, below = x.as_integer_ratio()
+    bits = SPARE + -(-above.bit_length() // 64) * 64
+    quarter_turn = _pi(bits) >> 1
+    turns, rest = divmod((above << bits) // below + quarter_turn // 2, quarter_turn)
+    return (rest - quarter_turn // 2) / (1 << bits), float(turns & 1)
+
+
+@cache
+def _pi(bits: int) -> int:
+    """Return pi times 2^bits, by Machin's 16 arccot 5 - 4 arccot 239 (1706)."""
+    one = 1 << (bits + 32)
+    return (16 * _arccot(5, one) - 4 * _arccot(239, one)) >> 32
+
+
+def _arccot(x: int, one: int) -> int:
+    """Return arccot x times one, by the series of the arc tangent of 1/x."""
+    power = total = one // x
+    divisor = 1
+    while power:
+        power //= -x * x
+        divisor += 2
+        total += power // divisor
+    return total
+
+
+S1, S2, S3, S4, S5, S6 = SINE
+A1, A2, A3, A4, A5, A6 = ARC_ABOVE
+B1, B2, B3, B4, B5, B6 = ARC_BELOW
 maximum, minimum = max, min
 some = mask = bool
 least = float
-reduced_exactly = trig.reduced_exactly
 
 
 def where(condition: Condition, yes: float, no: float) -> float:

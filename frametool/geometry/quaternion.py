@@ -9,7 +9,7 @@ from math import inf
 
 from frametool.errors import ValueInvalid, warn
 from frametool.geometry import floats
-from frametool.geometry.trig import half_sincos, incline
+from frametool.geometry.floats import half_sincos, incline
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

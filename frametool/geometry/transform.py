@@ -6,7 +6,7 @@ Knows no names and no time. `a_from_b` takes points seen in b to the same points
 from __future__ import annotations
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import rigid, spatial, validation
+from frametool.geometry import rigid, validation
 from frametool.geometry.rotation import NEAR, Batched, Rotation, require
 
 TYPE_CHECKING = False
@@ -166,12 +166,12 @@ class Transform(Batched):
     def apply_twist(self, twists: Numbers, *, out: Array | None = None) -> Array:
         """Move velocities (vx, vy, vz, wx, wy, wz), shape (..., 6): that of the same body at this side's origin."""
         given = validation.columns(twists, 6, "twists")
-        return validation.moved(spatial.move_twist, self._components, given, "twists", out=out)
+        return validation.moved(rigid.move_twist, self._components, given, "twists", out=out)
 
     def apply_wrench(self, wrenches: Numbers, *, out: Array | None = None) -> Array:
         """Move wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to this side's origin."""
         given = validation.columns(wrenches, 6, "wrenches")
-        return validation.moved(spatial.move_wrench, self._components, given, "wrenches", out=out)
+        return validation.moved(rigid.move_wrench, self._components, given, "wrenches", out=out)
 
     def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
         """Interpolate: translation along the line, rotation by slerp; fractions 0 and 1 give the ends to the bit.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid, shown, warn
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
@@ -89,6 +89,34 @@ class Reading:
             return name
         self.note(slash_note(name), *path, rule="slash")
         return name[1:]
+
+
+def tell(source: Source, notes: list[Note], most: int = 10) -> None:
+    """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
+    if not notes:
+        return
+    from collections import Counter
+
+    from frametool.documents.document import locate_many
+    from frametool.documents.source import Pasted
+
+    firsts: dict[str, Note] = {}
+    for note in notes:
+        firsts.setdefault(_alike(note), note)
+    counts = Counter(map(_alike, notes))
+    told = list(firsts.values())[:most]
+    places = locate_many(source.text, [note.path for note in told])
+    for (line, column), note in zip(places, told, strict=True):
+        place = source.name if isinstance(source, Pasted) else f"{source.name}:{source.first_line + line - 1}:{column}"
+        again = counts.pop(_alike(note)) - 1
+        warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}", rule=note.rule)
+    if counts:
+        warn(f"{source.name}: {counts.total()} more like these")
+
+
+def _alike(note: Note) -> str:
+    """Return what notes have in common that are told once; names with a slash are, whatever they are."""
+    return note.rule if note.rule == "slash" else note.message
 
 
 def slash_note(name: str) -> str:

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.json import Verbatim
 from frametool.documents.json import dump as json_dump
+from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import dump, quoted
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION, format_stamp

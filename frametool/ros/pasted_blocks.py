@@ -18,8 +18,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.json import Verbatim, dump, looks_like_json, parse_json
-from frametool.documents.source import Pasted, Source
+from frametool.documents.json import dump, looks_like_json, parse_json
+from frametool.documents.source import Pasted, Source, Verbatim
 from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.pasted import DECIMAL, NUMBER, pasted_poses

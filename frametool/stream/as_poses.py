@@ -21,11 +21,11 @@ from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, Fault, Misused
+from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, chosen_poses, kept, spans_of
 from frametool.stream.rows import Block
-from frametool.stream.run import Outcome, RowNote, notes_of
+from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_samples import TABLE
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps

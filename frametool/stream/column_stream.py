@@ -25,14 +25,14 @@ from frametool.formats.rows.column_file import (
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused
+from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused, RowNote
 from frametool.stream.header import XYZ
 from frametool.stream.layout import NAME, PARENT, Kept, New, quoted
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
 from frametool.stream.row_poses import RowPoses, spans_of, texts_of
 from frametool.stream.rows import Block
-from frametool.stream.run import Outcome, RowNote, notes_of
+from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import Naming, Table, rename_of
 from frametool.stream.table_plan import plan_table
 from frametool.stream.table_stream import moves_in_time, settle_stamps

@@ -10,11 +10,10 @@ import numpy as np
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, floats
 from frametool.geometry.batch_validation import read_rotations
-from frametool.stream.faults import NULL, STOP, Fault
+from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.request import PAIR, START, thing_pose
 from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, TURN, checked_rotation, doubt, wrong_tail
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
-from frametool.stream.run import DEGREES, RowNote
 from frametool.stream.stamp_columns import (
     NOWHERE,
     by_frame,

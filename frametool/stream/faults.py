@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, FrametoolError, UnknownFrame
+from frametool.errors import FormatError, FrametoolError, UnknownFrame, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -40,6 +40,32 @@ class Fault(NamedTuple):
             return cls(line, column, reason)
         short = reason.short if isinstance(reason, UnknownFrame) else ""
         return cls(line, column, str(reason), kind=reason.kind, short=short)
+
+
+DEGREES = "degrees"
+
+
+class RowNote(NamedTuple):
+    """Something worth telling about a row: its line from 0, what it is about, the sentence, and the column."""
+
+    line: int
+    about: str
+    sentence: str
+    column: str = ""
+
+    @classmethod
+    def of_lost_name(cls, line: int, name: str) -> RowNote:
+        """Tell that a frame is not named any more."""
+        return cls(line, "unnamed", f"frame {shown(name)} is left out: the frames of the result are not known")
+
+    @classmethod
+    def of_latest(cls, line: int, column: str) -> RowNote:
+        """Tell that a column of stamps is not looked at."""
+        from shlex import quote
+
+        remedy = f"give --time-column {quote(column)}, or --at TIME"
+        return cls(line, "latest", f"column {column!r} is not looked at, rows move at the latest time; {remedy}")
+
 
 
 class BadRow(FormatError):

@@ -18,7 +18,6 @@ from frametool.grammar.names import NAME_KEYS, PARENT_KEYS
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position, unknown_keys
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
-from frametool.ros.messages import read_stamp, whole_list
 from frametool.stream.row_layout import (
     COVARIANCE,
     POINT,
@@ -551,6 +550,8 @@ def _with_covariance(record: Record, document: Any, path: Path, above: Path, req
         return record
     if not request.operation.moves or request.operation.formula is not None:
         raise Misfit("the covariance would be wrong afterwards; leave it out, or move the message with apply", beside)
+    from frametool.ros.messages import whole_list
+
     values = within(beside, whole_list, around["covariance"], "36 numbers")
     names = [f"c{row}{column}" for row in range(6) for column in range(6)]
     numbers = within(beside, read_numbers, values, names)
@@ -599,6 +600,8 @@ def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path)
     """Add the stamp of a header, and where its seconds and nanoseconds stand, unless one further in said it."""
     if record.stamp or "stamp" not in header:
         return record
+    from frametool.ros.messages import read_stamp
+
     stamp_ns = within(path, read_stamp, header["stamp"])
     parts = [next(key for key in header["stamp"] if key.startswith(letter)) for letter in "sn"]
     return record._replace(stamp=tuple((*above, *path, part) for part in parts), stamp_ns=stamp_ns)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, SKIP, STOP, Fault
+from frametool.stream.faults import NULL, SKIP, STOP, Fault, RowNote
 from frametool.stream.record import KEYS_REMEDY
 from frametool.stream.record_stream import Rendered, attempt, null_of, rendered
 from frametool.stream.rows import Block, texts_as_rows, written
-from frametool.stream.run import Outcome, RowNote
+from frametool.stream.run import Outcome
 from frametool.stream.splitter import ARRAY, DOCUMENTS, LINES
 from frametool.stream.template import Template
 from frametool.stream.text_parts import In

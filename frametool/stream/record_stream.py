@@ -10,8 +10,8 @@ from frametool.documents.document import locate_many
 from frametool.errors import FormatError, FrametoolError
 from frametool.ros.message_stream import NOISE
 from frametool.stream.answers import number_writer, written
-from frametool.stream.faults import SKIP, STOP, Fault
-from frametool.stream.run import Outcome, RowNote, mapped
+from frametool.stream.faults import SKIP, STOP, Fault, RowNote
+from frametool.stream.run import Outcome, mapped
 from frametool.stream.splitter import ARRAY, Splitter
 from frametool.stream.template import learn, nulled
 from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks

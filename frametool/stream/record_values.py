@@ -12,14 +12,13 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import NOTHING, Node, parse_documents, parse_nodes, refuse_alias
-from frametool.documents.json import JSON_NUMBER, Verbatim
-from frametool.documents.source import Source, decode
+from frametool.documents.json import JSON_NUMBER
+from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import holds_arrays
-from frametool.formats.trees.tree_reader import tell
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.pose import Pose, inverted
-from frametool.grammar.readers import Misfit
+from frametool.grammar.readers import Misfit, tell
 from frametool.grammar.result import Result
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import PARTS, STALE, placed, value_at

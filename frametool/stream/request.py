@@ -10,10 +10,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
-from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import quaternion, rigid, spatial, vectors
+from frametool.geometry import quaternion, rigid, vectors
 from frametool.geometry.representations import notation
-from frametool.geometry.trig import RADIAN
+from frametool.geometry.floats import RADIAN
 from frametool.grammar.pose import VELOCITY
 from frametool.stream.faults import STOP
 from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, VECTOR, WRENCH, Shape, Target, pose_of
@@ -38,8 +37,8 @@ def _turn(_x: Number, _y: Number, _z: Number, *numbers: Number) -> Components:
 MOVERS: dict[str, Callable[..., Components]] = {
     POINT: rigid.apply,
     VECTOR: _turn,
-    TWIST: spatial.move_twist,
-    WRENCH: spatial.move_wrench,
+    TWIST: rigid.move_twist,
+    WRENCH: rigid.move_wrench,
 }  # a pose is composed: `Operation.pose`
 
 
@@ -167,8 +166,8 @@ class Operation(NamedTuple):
         if not shape.covariance or mover is None:
             return numbers
         if shape.kind == POSE:
-            return tuple(spatial.rotate_covariance(*mover[3:], numbers))
-        return tuple(spatial.move_twist_covariance(*mover, numbers))
+            return tuple(rigid.rotate_covariance(*mover[3:], numbers))
+        return tuple(rigid.move_twist_covariance(*mover, numbers))
 
     def result(
         self,
@@ -387,10 +386,12 @@ class Memory:
             return None
         if stamp_ns <= before:
             raise ValueInvalid(no_step(before, stamp_ns))
-        return (stamp_ns - before) / BILLION
+        return (stamp_ns - before) / 1_000_000_000
 
 
 def no_step(before: int, stamp_ns: int) -> str:
     """Say why there is no velocity between two stamps."""
+    from frametool.frames.stamps import format_stamp
+
     what = "is that of the row before" if stamp_ns == before else f"is before {format_stamp(before)}, of the row before"
     return f"stamp {format_stamp(stamp_ns)} {what}: there is no velocity"

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from frametool.documents.json import JSON_NUMBER, Verbatim
+from frametool.documents.json import JSON_NUMBER
+from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
 from frametool.formats.rows.pose_rows import IMAGE
 from frametool.grammar.names import in_nanoseconds, stamp_column
@@ -35,9 +36,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from frametool.stream.faults import RowNote
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
-    from frametool.stream.run import RowNote
     from frametool.stream.table_stream import Begun
     from frametool.text.spans import Floats, Ints
     Cells: TypeAlias = Spans | NDArray[Any]
@@ -281,6 +282,9 @@ def spans_of(texts: list[bytes]) -> Spans:
 
 def texts_of(cells: Cells) -> list[str]:
     """Return the text of each cell, without its quotes; of numbers the shortest that reads back."""
+    if not isinstance(cells, Spans) and cells.ndim > 1:  # several values a row
+        flat, width = texts_of(cells.reshape(-1)), cells[0].size if len(cells) else 1
+        return [f"[{', '.join(flat[at : at + width])}]" for at in range(0, len(flat), width)]
     if not isinstance(cells, Spans) and cells.dtype.kind != "f":
         texts: list[str] = cells.astype(np.str_).tolist()
         return [text.lower() for text in texts] if cells.dtype.kind == "b" else texts

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import shown, warn
+from frametool.errors import warn
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
+from frametool.stream.faults import RowNote
 from frametool.text.lines import ByteRange, content
 
 if TYPE_CHECKING:
@@ -15,32 +16,6 @@ if TYPE_CHECKING:
     from frametool.stream.evaluate import Run
     from frametool.stream.faults import BadRows, Fault
     from frametool.stream.rows import Block
-
-
-DEGREES = "degrees"
-
-
-class RowNote(NamedTuple):
-    """Something worth telling about a row: its line from 0, what it is about, the sentence, and the column."""
-
-    line: int
-    about: str
-    sentence: str
-    column: str = ""
-
-    @classmethod
-    def of_lost_name(cls, line: int, name: str) -> RowNote:
-        """Tell that a frame is not named any more."""
-        return cls(line, "unnamed", f"frame {shown(name)} is left out: the frames of the result are not known")
-
-    @classmethod
-    def of_latest(cls, line: int, column: str) -> RowNote:
-        """Tell that a column of stamps is not looked at."""
-        from shlex import quote
-
-        remedy = f"give --time-column {quote(column)}, or --at TIME"
-        return cls(line, "latest", f"column {column!r} is not looked at, rows move at the latest time; {remedy}")
-
 
 
 def notes_of(run: Run, block: Block) -> list[RowNote]:

@@ -11,9 +11,9 @@ from frametool.errors import FormatError, FrametoolError, listing
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import stamp_column
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, Fault, Misused
+from frametool.stream.faults import NULL, Fault, Misused, RowNote
 from frametool.stream.rows import written
-from frametool.stream.run import Outcome, RowNote, mapped, notes_of
+from frametool.stream.run import Outcome, mapped, notes_of
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
     COMMENT,

@@ -19,9 +19,9 @@ from frametool.grammar.names import NAME_KEYS, PARENT_KEYS
 from frametool.grammar.pose import POSE_KEYS
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
+from frametool.stream.faults import RowNote
 from frametool.stream.record import POINT_KEYS
 from frametool.stream.row_layout import COVARIANCE
-from frametool.stream.run import RowNote
 from frametool.stream.splice import OURS, Splicer
 from frametool.stream.text_parts import Const, IfLocked, In, Out
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.documents.json import Verbatim, dump
+from frametool.documents.json import dump
+from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows.column_file import STAMP_NS, Made, OutColumn, not_finite
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, Lost, Numbers, RowForm, field, image_name, is_turned, turned

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import samples
 
-from frametool.geometry import arrays, euler, floats, matrix, quaternion, rigid, trig
+from frametool.geometry import arrays, euler, floats, matrix, quaternion, rigid, floats
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -81,15 +81,15 @@ def poses(rotations: Sequence[Row]) -> list[list[float]]:
     return joined(DRAWN.normal(size=(len(rotations), 3)).tolist(), rotations)
 
 
-@pytest.mark.parametrize("half_sincos", [trig.half_sincos, trig.half_sincos_deg])
+@pytest.mark.parametrize("half_sincos", [floats.half_sincos, floats.half_sincos_deg])
 def test_sines_and_cosines(half_sincos: Callable[..., Any]) -> None:
-    assert_same(half_sincos, [[angle] for angle in (ANGLES if half_sincos is trig.half_sincos else DEGREES)])
+    assert_same(half_sincos, [[angle] for angle in (ANGLES if half_sincos is floats.half_sincos else DEGREES)])
 
 
 def test_arc_tangents() -> None:
     turned = [(math.sin(angle), math.cos(angle)) for angle in ANGLES]
-    assert_same(trig.incline, [(rise, abs(run)) for rise, run in turned])
-    assert_same(trig.bearing, [(rise + 0.0, run, math.sqrt(rise * rise + run * run)) for rise, run in turned])
+    assert_same(floats.incline, [(rise, abs(run)) for rise, run in turned])
+    assert_same(floats.bearing, [(rise + 0.0, run, math.sqrt(rise * rise + run * run)) for rise, run in turned])
 
 
 @pytest.mark.parametrize("axes", sorted(euler.AXES))
@@ -216,10 +216,10 @@ def test_signs_and_guards_by_bits_are_those_of_floats() -> None:
 
 
 def test_neighbours_that_are_no_angles_or_far_ones_change_nothing() -> None:
-    alone = bits([trig.half_sincos(angle, floats) for angle in (0.3, -0.0)])
+    alone = bits([floats.half_sincos(angle, floats) for angle in (0.3, -0.0)])
     for odd in (math.nan, math.inf, 1e30):
         with np.errstate(invalid="ignore"):
-            among = np.array(trig.half_sincos(np.array([0.3, odd, -0.0]), arrays)).T
+            among = np.array(floats.half_sincos(np.array([0.3, odd, -0.0]), arrays)).T
         assert bits(among)[::2] == alone
 
 
@@ -228,7 +228,7 @@ def test_angles_of_millions_of_turns_are_reduced_to_the_last_bit() -> None:
 
     with mp.workdps(400):
         for angle in (1e8, 1e15, -1e22, 2.0**1000, 1e308, 6381956970095103.0 * 2.0**797):
-            rest, odd = trig.reduced_exactly(angle)
+            rest, odd = floats.reduced_exactly(angle)
             turns = mp.nint(mpf(angle) / (mp.pi / 2))
             assert rest == float(mpf(angle) - turns * mp.pi / 2)
             assert odd == int(turns) % 2

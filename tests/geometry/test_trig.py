@@ -11,7 +11,7 @@ import oracles
 import pytest
 from mpmath import mpf
 
-from frametool.geometry import arrays, trig
+from frametool.geometry import arrays, floats
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,13 +33,13 @@ def eps_off(found: float, exact: mpf, scale: mpf) -> float:
 
 @each_range
 def test_half_sines_and_cosines_are_right_to_one_and_a_half_eps(angles: Sequence[float]) -> None:
-    for angle, sine, cosine in zip(angles, *trig.half_sincos(np.array(angles), arrays), strict=True):
+    for angle, sine, cosine in zip(angles, *floats.half_sincos(np.array(angles), arrays), strict=True):
         assert eps_off(float(sine), mpmath.sin(mpf(angle) / 2), mpf(1)) <= 1.5
         assert eps_off(float(cosine), mpmath.cos(mpf(angle) / 2), mpf(1)) <= 1.5
 
 
 def test_half_sines_of_small_angles_keep_relative_accuracy() -> None:
-    for angle, sine in zip(SMALL, trig.half_sincos(np.array(SMALL), arrays)[0], strict=True):
+    for angle, sine in zip(SMALL, floats.half_sincos(np.array(SMALL), arrays)[0], strict=True):
         exact = mpmath.sin(mpf(angle) / 2)
         assert eps_off(float(sine), exact, exact) <= 1.5
 
@@ -47,7 +47,7 @@ def test_half_sines_of_small_angles_keep_relative_accuracy() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_what_is_no_angle_has_no_sine(bad: float) -> None:
     with np.errstate(invalid="ignore"):
-        sine, cosine = trig.half_sincos(np.array([0.5, bad]), arrays)
+        sine, cosine = floats.half_sincos(np.array([0.5, bad]), arrays)
     assert math.isnan(sine[1])
     assert math.isnan(cosine[1])
 
@@ -63,9 +63,9 @@ def test_directions_have_their_angle_and_right_angles_exactly() -> None:
     angles = [*RANDOM.uniform(-math.pi, math.pi, 500).tolist(), *TURNS[:8]]
     for angle in angles:
         y, x = math.sin(angle), math.cos(angle)
-        found = float(trig.bearing(np.array([y]), np.array([x]), np.array([math.hypot(y, x)]), arrays)[0])
+        found = float(floats.bearing(np.array([y]), np.array([x]), np.array([math.hypot(y, x)]), arrays)[0])
         assert eps_off(found, mpmath.atan2(mpf(y), mpf(x)), mpmath.pi) <= 1.0
     straight = np.array([0.0, 1.0, 0.0, -1.0]), np.array([1.0, 0.0, -1.0, 0.0])
-    assert trig.bearing(*straight, np.ones(4), arrays).tolist() == [0.0, math.pi / 2, math.pi, -math.pi / 2]
+    assert floats.bearing(*straight, np.ones(4), arrays).tolist() == [0.0, math.pi / 2, math.pi, -math.pi / 2]
     half = np.array([0.0, math.sqrt(0.5), 1.0])
-    assert trig.incline(half, half[::-1], arrays).tolist() == [0.0, math.pi / 4, math.pi / 2]
+    assert floats.incline(half, half[::-1], arrays).tolist() == [0.0, math.pi / 4, math.pi / 2]

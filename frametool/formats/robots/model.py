@@ -26,7 +26,7 @@ from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
-from frametool.geometry.trig import DEGREE, RADIAN
+from frametool.geometry.floats import DEGREE, RADIAN
 from frametool.geometry.validation import as_numbers, scalars, single
 from frametool.grammar.pose import read_pose
 from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind

@@ -11,17 +11,16 @@ forms in YAML and JSON read their documents with stands below, and knows nothing
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.documents.source import InputFile, Pasted, Source, pointer
-from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown, warn
+from frametool.documents.source import InputFile, Source, pointer
+from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
-from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, within
+from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, tell, within
 from frametool.grammar.rotation_spelling import rotation_of
 from frametool.ros import messages
 
@@ -63,29 +62,6 @@ def without_slashes(edge: Edge, reading: Reading) -> Edge:
         return edge
     reading.here = edge.path
     return edge._replace(child=reading.bare(edge.child), parent=edge.parent and reading.bare(edge.parent))
-
-
-def tell(source: Source, notes: list[Note], most: int = 10) -> None:
-    """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
-    if not notes:
-        return
-    firsts: dict[str, Note] = {}
-    for note in notes:
-        firsts.setdefault(_alike(note), note)
-    counts = Counter(map(_alike, notes))
-    told = list(firsts.values())[:most]
-    places = locate_many(source.text, [note.path for note in told])
-    for (line, column), note in zip(places, told, strict=True):
-        place = source.name if isinstance(source, Pasted) else f"{source.name}:{source.first_line + line - 1}:{column}"
-        again = counts.pop(_alike(note)) - 1
-        warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}", rule=note.rule)
-    if counts:
-        warn(f"{source.name}: {counts.total()} more like these")
-
-
-def _alike(note: Note) -> str:
-    """Return what notes have in common that are told once; names with a slash are, whatever they are."""
-    return note.rule if note.rule == "slash" else note.message
 
 
 def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
