@@ -14,9 +14,9 @@ from frametool.calc.rules import in_radians
 from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, Term, Type, unit_text
 from frametool.errors import ValueInvalid, printable, shown
 from frametool.frames.lookups import Frames
+from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.text.numbers import parse_number

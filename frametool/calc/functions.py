@@ -23,7 +23,7 @@ from frametool.calc.values import (
     arithmetic,
     made,
 )
-from frametool.geometry import euler, quaternion, rigid, floats
+from frametool.geometry import euler, floats, quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

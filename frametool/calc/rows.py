@@ -16,8 +16,8 @@ from frametool.calc.rules import in_radians
 from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
 from frametool.documents.source import opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid
-from frametool.geometry.representations import notation
 from frametool.geometry.floats import RADIAN as DEGREES
+from frametool.geometry.representations import notation
 from frametool.stream.faults import BadRow
 from frametool.stream.gathering import Gathered
 from frametool.stream.request import Request

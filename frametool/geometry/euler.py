@@ -6,8 +6,8 @@ and three axis letters in the order of the rotations. Angles stand in the order 
 
 from __future__ import annotations
 
-from frametool.geometry.quaternion import EPS, settled
 from frametool.geometry.floats import RADIAN, bearing, half_sincos, half_sincos_deg, incline
+from frametool.geometry.quaternion import EPS, settled
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

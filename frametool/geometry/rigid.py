@@ -28,8 +28,8 @@ from math import isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, vectors
-from frametool.geometry.quaternion import cross, either, length, settled
 from frametool.geometry.floats import half_sincos, half_sincos_deg, incline, polynomial
+from frametool.geometry.quaternion import cross, either, length, settled
 
 TYPE_CHECKING = False
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import inf, isfinite
 
 from frametool.errors import ValueInvalid
-from frametool.geometry.quaternion import TINY, canonical, direction, length, unit_vector
 from frametool.geometry.floats import RADIAN, half_sincos, half_sincos_deg, incline
+from frametool.geometry.quaternion import TINY, canonical, direction, length, unit_vector
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

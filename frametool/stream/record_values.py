@@ -16,7 +16,6 @@ from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import holds_arrays
-from frametool.frames.stamps import parse_stamp
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, tell
 from frametool.grammar.result import Result
@@ -255,11 +254,12 @@ def _with_stamp_ns(extras: dict[str, Any], *, keeps: bool) -> dict[str, Any]:
 
     Raises ValueInvalid for what is no time.
     """
-    if "stamp_ns" in extras:
-        return extras | {"stamp_ns": parse_stamp(f"{extras['stamp_ns']}ns")}
-    if keeps or extras.get("stamp") is None:
+    if "stamp_ns" not in extras and (keeps or extras.get("stamp") is None):
         return extras
-    return extras | {"stamp_ns": parse_stamp(str(extras.pop("stamp")))}
+    from frametool.frames.stamps import parse_stamp
+
+    text = f"{extras['stamp_ns']}ns" if "stamp_ns" in extras else str(extras.pop("stamp"))
+    return extras | {"stamp_ns": parse_stamp(text)}
 
 
 def _used_keys(record: Record) -> set[str]:

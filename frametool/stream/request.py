@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rigid, vectors
-from frametool.geometry.representations import notation
 from frametool.geometry.floats import RADIAN
+from frametool.geometry.representations import notation
 from frametool.grammar.pose import VELOCITY
 from frametool.stream.faults import STOP
 from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, VECTOR, WRENCH, Shape, Target, pose_of

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
-from frametool.frames.stamps import BILLION, parse_stamp
 from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, kind
 
@@ -64,11 +63,13 @@ def read_header_stamp(seconds: str, nanoseconds: str) -> int:
     whole, below = (text.strip(" \t\"'") for text in (seconds, nanoseconds))
     if not (whole.lstrip("+-").isdecimal() and below.isdecimal()):
         raise ValueInvalid(f"a stamp is two whole numbers, found {shown(whole)} and {shown(below)}")
-    return int(whole) * BILLION + int(below)
+    return int(whole) * 1_000_000_000 + int(below)
 
 
 def read_stamp(text: str, *, in_ns: bool) -> int:
     """Read a cell as nanoseconds, quotes and blanks around it left out; raises ValueInvalid."""
+    from frametool.frames.stamps import parse_stamp
+
     bare = text.strip(" \t\"'")
     if in_ns and not bare.endswith("ns"):
         if not bare.lstrip("+-").isdecimal():

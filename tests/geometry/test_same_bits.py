@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import samples
 
-from frametool.geometry import arrays, euler, floats, matrix, quaternion, rigid, floats
+from frametool.geometry import arrays, euler, floats, matrix, quaternion, rigid
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform

@@ -24,9 +24,9 @@ from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.model import Joint, JointValue, Link
 from frametool.formats.robots.posture import Posture, Setting
 from frametool.geometry import floats, matrix, quaternion, rigid, vectors
+from frametool.geometry.floats import DEGREE, half_sincos, half_sincos_deg
 from frametool.geometry.quaternion import cross, unit_vector
 from frametool.geometry.rigid import IDENTITY
-from frametool.geometry.floats import DEGREE, half_sincos, half_sincos_deg
 from frametool.grammar.edges import Edge, Options, Tally, Topics
 
 if TYPE_CHECKING:

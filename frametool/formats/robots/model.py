@@ -23,10 +23,10 @@ from frametool.documents.source import Source
 from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
 from frametool.frames.path import edges_between
 from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry.floats import DEGREE, RADIAN
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
-from frametool.geometry.floats import DEGREE, RADIAN
 from frametool.geometry.validation import as_numbers, scalars, single
 from frametool.grammar.pose import read_pose
 from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind
