@@ -42,22 +42,11 @@ def _nanoseconds(seconds: str) -> int:
     return int(seconds.replace(".", ""))
 
 
-STAMPED = "PoseStamped, TransformStamped, TFMessage, PoseArray, Path, PoseWithCovarianceStamped, Odometry"
-HEADED = "PointStamped, Vector3Stamped, TwistStamped, WrenchStamped"
-FRAMELESS = "names: the text of a pose without a name does not say the frame it is in"
 RECORDS = "argument, lines"
 SEAMS = [
-    ("stamps: a record's own stamp ends a message in a traceback", "convert, move", "with a stamp, with seconds", "ros2", RECORDS),
-    ("stamps: a record's own stamp ends the text in a traceback", "convert, move", "with a stamp", "text", RECORDS),
-    ("stamps: a header's stamp becomes 0 in other messages", "convert", STAMPED, "ros2", RECORDS),
-    ("writing: the numbers of a header's stamp are written as texts", "move", f"{STAMPED}, {HEADED}", "ros2", RECORDS),
-    ("stamps: a header's stamp is left out untold", "convert", STAMPED, "yaml", RECORDS),
-    ("stamps: a header's stamp is left out untold", "convert, move", f"{STAMPED}, PointStamped", "csv", RECORDS),
     ("writing: a vector becomes a point", "move", "vector, Vector3Stamped", "csv", RECORDS),
     ("writing: half of a twist is left out untold", "move", "twist, wrench, TwistStamped, WrenchStamped", "csv", RECORDS),
-    (FRAMELESS, "convert, move", "PoseStamped, PoseArray, Path, PoseWithCovarianceStamped", "text", RECORDS),
-    (FRAMELESS, "convert", "position, flat point", "text", RECORDS),
-]  # fmt: skip
+]
 
 
 def cases() -> list[Any]:

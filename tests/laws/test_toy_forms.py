@@ -9,11 +9,17 @@ import io
 import json
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    Run = Callable[..., "Done"]
 
 ROOT = Path(__file__).resolve().parents[2]
 BARS = '''
@@ -77,23 +83,59 @@ class Done(NamedTuple):
     err: str
 
 
-def run(folder: Path, row: str, *arguments: str, stdin: bytes = b"", words: str = "") -> Done:
-    """Run the command line in a new interpreter that has the row; words: ask what completes them."""
-    (folder / "toy_bars.py").write_text(BARS)
-    (folder / "toy_doubles.py").write_text(DOUBLES)
-    (folder / "tree.yaml").write_text(TREE)
-    (folder / "walk.tum").write_text(AS_TUM)
-    (folder / "walk.bars").write_text(AS_BARS)
-    code = (
-        f"import sys; sys.path[:0] = [{str(folder)!r}, {str(ROOT)!r}]\nfrom frametool import FORMATS\n{row}\n"
-        f"from frametool.cli import run; sys.exit(run({list(arguments)!r}))"
-    )
-    completion = {"COMP_WORDS": words, "COMP_CWORD": "3", "_FRAMETOOL_COMPLETE": "bash_complete"} if words else {}
-    done = subprocess.run(
-        [sys.executable, "-c", code], input=stdin, capture_output=True, check=False, cwd=folder,
-        env={"PATH": "", "COLUMNS": "100", "NO_COLOR": "1", **completion},
-    )  # fmt: skip
-    return Done(done.returncode, done.stdout, done.stderr.decode())
+INTERPRETER = """
+import json, os, sys
+import numpy
+from frametool import FORMATS
+{row}
+from frametool.cli import run, streaming
+from frametool.cli.commands import apply, convert
+from frametool.stream import record_stream, table
+for line in sys.stdin:
+    folder, arguments, environment = json.loads(line)
+    if (child := os.fork()) == 0:
+        os.chdir(folder)
+        os.environ.update(environment)
+        sys.path.insert(0, folder)
+        for number, name in enumerate(("stdin", "stdout", "stderr")):
+            os.dup2(os.open(name, os.O_RDWR | os.O_CREAT), number)
+        sys.exit(run(arguments))
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+ENVIRONMENT = {"PATH": "", "PYTHONPATH": str(ROOT), "COLUMNS": "100", "NO_COLOR": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+
+@pytest.fixture(scope="module")
+def run() -> Iterator[Run]:
+    """Run the command line where a row was there before it; words: ask what completes them.
+
+    One interpreter a row is loaded, and every run is a fork of it.
+    """
+    with ExitStack() as stack:
+        started: dict[str, subprocess.Popen[str]] = {}
+
+        def call(folder: Path, row: str, *arguments: str, stdin: bytes = b"", words: str = "") -> Done:
+            if row not in started:
+                started[row] = stack.enter_context(
+                    subprocess.Popen(
+                        [sys.executable, "-c", INTERPRETER.format(row=row)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                        text=True, env=ENVIRONMENT,
+                    )
+                )  # fmt: skip
+            files = {"toy_bars.py": BARS, "toy_doubles.py": DOUBLES, "tree.yaml": TREE, "walk.tum": AS_TUM, "walk.bars": AS_BARS}
+            for name, text in files.items():
+                (folder / name).write_text(text)
+            for name, data in (("stdin", stdin), ("stdout", b""), ("stderr", b"")):
+                (folder / name).write_bytes(data)
+            completion = {"COMP_WORDS": words, "COMP_CWORD": "3", "_FRAMETOOL_COMPLETE": "bash_complete"} if words else {}
+            asked, answers = started[row].stdin, started[row].stdout
+            assert asked
+            assert answers
+            print(json.dumps([str(folder), arguments, completion]), file=asked, flush=True)
+            status = int(answers.readline())
+            return Done(status, (folder / "stdout").read_bytes(), (folder / "stderr").read_text())
+
+        yield call
 
 
 class Case(NamedTuple):
@@ -116,7 +158,7 @@ READ = {
     "relative": Case(("relative", "--consecutive", "--velocity", "-i", "{}", "-f", "json")),
 }
 @pytest.mark.parametrize("name", READ)
-def test_rows_of_a_made_up_form_are_read_as_those_of_tum(tmp_path: Path, name: str) -> None:
+def test_rows_of_a_made_up_form_are_read_as_those_of_tum(run: Run, tmp_path: Path, name: str) -> None:
     case = READ[name]
     outs = []
     for form, text in (("tum", AS_TUM), ("bars", AS_BARS)):
@@ -128,14 +170,14 @@ def test_rows_of_a_made_up_form_are_read_as_those_of_tum(tmp_path: Path, name: s
 
 
 @pytest.mark.parametrize("given", [("-i", "walk.bars"), ("--in", "bars")])
-def test_a_stream_in_a_made_up_form_stays_in_it(tmp_path: Path, given: tuple[str, ...]) -> None:
+def test_a_stream_in_a_made_up_form_stays_in_it(run: Run, tmp_path: Path, given: tuple[str, ...]) -> None:
     stdin = AS_BARS.encode() if "--in" in given else b""
     done = run(tmp_path, ROWS, "apply", "--transform", "{xyz: [1, 0, 0]}", *given, stdin=stdin)
     wanted = "".join(f"0.5|0.5|-0.5|0.5|{x + 1.0}|{y}|{z}|{stamp}\n" for stamp, (x, y, z) in WALK)
     assert (done.status, done.out.decode()) == (0, wanted), done.err
 
 
-def test_a_made_up_form_is_written_by_name_and_by_suffix(tmp_path: Path) -> None:
+def test_a_made_up_form_is_written_by_name_and_by_suffix(run: Run, tmp_path: Path) -> None:
     wanted = AS_BARS.replace("0.5\n", "0.500000000\n").replace("1.5\n", "1.500000000\n")
     assert run(tmp_path, ROWS, "convert", "-i", "walk.tum", "-f", "bars").out.decode() == wanted
     assert run(tmp_path, ROWS, "convert", "-i", "walk.tum", "-o", "out.bars").status == 0
@@ -143,14 +185,14 @@ def test_a_made_up_form_is_written_by_name_and_by_suffix(tmp_path: Path) -> None
     assert run(tmp_path, ROWS, "lookup", "walk.tum", "world", "body", "-f", "bars").out.decode() == wanted
 
 
-def test_what_is_wrong_in_a_made_up_row_names_its_line(tmp_path: Path) -> None:
+def test_what_is_wrong_in_a_made_up_row_names_its_line(run: Run, tmp_path: Path) -> None:
     for text, where in ((AS_BARS + "0.5|0.5|-0.5|0.5|x|0|0|9\n", "stdin:4:x:"), (AS_BARS + "1|2\n", "stdin:4:")):
         done = run(tmp_path, ROWS, "invert", "--in", "bars", "--on-error", "skip", stdin=text.encode())
         assert (done.status, done.out.count(b"\n")) == (3, len(WALK))
         assert where in done.err
 
 
-def test_help_lists_and_completes_a_made_up_form(tmp_path: Path) -> None:
+def test_help_lists_and_completes_a_made_up_form(run: Run, tmp_path: Path) -> None:
     assert b"bars" in run(tmp_path, ROWS, "convert", "--help").out
     assert b"a toy trajectory" in run(tmp_path, ROWS, "formats").out
     assert b"bars" in run(tmp_path, ROWS, words="frametool convert --in ba").out
@@ -168,7 +210,7 @@ SEVEN = [[*place, 0.5, -0.5, 0.5, 0.5] for _, place in WALK]
 NAMED = ("--from", "xyzw")
 
 
-def test_columns_of_a_made_up_form_are_moved(tmp_path: Path) -> None:
+def test_columns_of_a_made_up_form_are_moved(run: Run, tmp_path: Path) -> None:
     (tmp_path / "points.doubles").write_bytes(doubles(POINTS))
     done = run(tmp_path, ARRAYS, "apply", "--transform", "{xyz: [1, 0, 0]}", "-i", "points.doubles", "-o", "moved.doubles")
     assert done.status == 0, done.err
@@ -180,7 +222,7 @@ def test_columns_of_a_made_up_form_are_moved(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["convert", "invert", "mean"])
-def test_poses_of_a_made_up_form_of_columns_are_read_as_those_of_a_table(tmp_path: Path, command: str) -> None:
+def test_poses_of_a_made_up_form_of_columns_are_read_as_those_of_a_table(run: Run, tmp_path: Path, command: str) -> None:
     (tmp_path / "poses.doubles").write_bytes(doubles(SEVEN))
     (tmp_path / "poses.csv").write_text("x,y,z,qx,qy,qz,qw\n" + "".join(",".join(map(repr, row)) + "\n" for row in SEVEN))
     found = run(tmp_path, ARRAYS, command, *NAMED, "-i", "poses.doubles", "-f", "json", "--quiet")
@@ -188,7 +230,7 @@ def test_poses_of_a_made_up_form_of_columns_are_read_as_those_of_a_table(tmp_pat
     assert (found.status, found.out) == (0, wanted.out), found.err
 
 
-def test_a_made_up_form_of_columns_is_written_and_listed(tmp_path: Path) -> None:
+def test_a_made_up_form_of_columns_is_written_and_listed(run: Run, tmp_path: Path) -> None:
     assert run(tmp_path, ARRAYS, "convert", "-i", "walk.tum", "-o", "out.doubles").status == 0
     back = run(tmp_path, ARRAYS, "convert", "-i", "out.doubles", "-f", "json", "--quiet")
     found = [json.loads(line) for line in back.out.splitlines()]

@@ -104,7 +104,7 @@ PARENTS = ("frame", "frame_id", "parent", "parent_frame_id")
 NAMES = ("name", "child_frame_id", "child")
 POSITIONS = ("xyz", "position", "translation")
 BLOCKS = {"twist": ("linear", "angular"), "wrench": ("force", "torque")}
-TURNS = ("quaternion", "orientation", "rotation")
+TURNS = {"quaternion": "xyzw", "orientation": "xyzw", "rotation": "xyzw", "rotvec": "xyz"}
 
 
 def readings(text: str, form: str = "json") -> list[Reading]:
@@ -150,25 +150,21 @@ def reading(record: Any) -> Reading:
 
 
 def _kind_and_numbers(body: Any) -> tuple[str, tuple[float, ...]]:
-    position = next((_three(body[key]) for key in POSITIONS if key in body), _flat(body, "xyz"))
-    turn = next((_four(body[key]) for key in TURNS if key in body), _flat(body, ("qx", "qy", "qz", "qw")))
+    position = next((_components(body[key]) for key in POSITIONS if key in body), _flat(body, "xyz"))
+    turn = next((_components(body[key], axes) for key, axes in TURNS.items() if key in body), _flat(body, ("qx", "qy", "qz", "qw")))
     if turn:
         return ("pose", (*position, *turn)) if position else ("rotation", turn)
     for kind, parts_of in BLOCKS.items():
         if (block := body.get(kind, body if parts_of[0] in body else None)) is not None:
-            return kind, tuple(number for part in parts_of for number in _three(block[part]))
+            return kind, tuple(number for part in parts_of for number in _components(block[part]))
     for kind in ("point", "vector"):
         if kind in body:
-            return kind, _three(body[kind])
+            return kind, _components(body[kind])
     return "point", position
 
 
-def _three(value: Any) -> tuple[float, ...]:
-    return tuple(float(value[axis]) for axis in "xyz") if isinstance(value, dict) else tuple(map(float, value))
-
-
-def _four(value: Any) -> tuple[float, ...]:
-    return tuple(float(value[axis]) for axis in "xyzw") if isinstance(value, dict) else tuple(map(float, value))
+def _components(value: Any, axes: str = "xyz") -> tuple[float, ...]:
+    return tuple(float(value[axis]) for axis in axes) if isinstance(value, dict) else tuple(map(float, value))
 
 
 def _flat(body: Any, keys: Sequence[str]) -> tuple[float, ...]:
@@ -190,4 +186,3 @@ def _stamp_ns(record: Any) -> int | None:
         return None
     whole, _, below = str(stamp).partition(".")
     return int(whole) * BILLION + int(below.ljust(9, "0"))
-
