@@ -45,7 +45,6 @@ def _nanoseconds(seconds: str) -> int:
 RECORDS = "argument, lines"
 SEAMS = [
     ("writing: a vector becomes a point", "move", "vector, Vector3Stamped", "csv", RECORDS),
-    ("writing: half of a twist is left out untold", "move", "twist, wrench, TwistStamped, WrenchStamped", "csv", RECORDS),
 ]
 
 

@@ -37,11 +37,8 @@ def as_rows(run: Run, postures: list[Numbers], tip: str, form: str) -> list[Numb
     return [[*row["xyz"], *row["quaternion"].values()] for row in found]
 
 
-APART = pytest.mark.xfail(strict=True, reason="seam: evaluating: the motion of a joint is computed in two ways")
-
-
 @pytest.mark.parametrize("form", ["csv", "json"])
-@pytest.mark.parametrize("tip", [pytest.param(tip, marks=APART if tip != "tool" else []) for tip in TIPS])
+@pytest.mark.parametrize("tip", TIPS)
 def test_rows_of_joints_have_the_bits_of_one_posture(run: Run, tip: str, form: str) -> None:
     wanted = [one_at_a_time(run, posture, tip) for posture in POSTURES]
     assert as_rows(run, POSTURES, tip, form) == wanted

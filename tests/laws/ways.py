@@ -157,6 +157,8 @@ def _kind_and_numbers(body: Any) -> tuple[str, tuple[float, ...]]:
     for kind, parts_of in BLOCKS.items():
         if (block := body.get(kind, body if parts_of[0] in body else None)) is not None:
             return kind, tuple(number for part in parts_of for number in _components(block[part]))
+        if flat := _flat(body, [f"{part}_{axis}" for part in parts_of for axis in "xyz"]):
+            return kind, flat
     for kind in ("point", "vector"):
         if kind in body:
             return kind, _components(body[kind])
