@@ -319,6 +319,7 @@ class Run:
         results = np.empty((self.count, len(numbers)))
         for column, number in enumerate(numbers):
             results[:, column] = number
+        results += 0.0  # none is -0.0
         if not np.isfinite(results.sum()):
             for row in np.flatnonzero(~np.isfinite(results).all(axis=1)).tolist():
                 if row not in self.reasons:

@@ -164,7 +164,7 @@ class Target(NamedTuple):
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
         own = 6 if self.plain else 3 if len(parts) == 3 else 7
-        return [number + 0.0 for number in (*self.numbers(parts[:own], xp), *parts[own:])]  # no number is -0.0
+        return [*self.numbers(parts[:own], xp), *parts[own:]]
 
     def numbers(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""

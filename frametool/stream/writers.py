@@ -209,6 +209,7 @@ class TextWriter:
         values = np.empty((len(block.numbers), len(self.order)))
         for at, place in enumerate(self.order):
             values[:, at] = written[place]
+        values += 0.0  # none is -0.0
         return self._joined(rows, values, block)
 
     def _learn(self, block: RowPoses) -> None:

@@ -49,7 +49,7 @@ def test_a_record_alone_is_compared_with_nothing(run: Run, text: str) -> None:
 
 
 def test_a_pose_with_neither_position_nor_rotation_is_the_identity_in_text(run: Run) -> None:
-    assert run("invert", "{name: a}", "-f", "text").out == "  identity\n"
+    assert run("invert", "{name: a}", "-f", "text").out == "a pose seen from a\n  identity\n"
     assert run("invert", "{name: a, parent: b}", "-f", "text").out.endswith("\n  identity\n")
 
 
