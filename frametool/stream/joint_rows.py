@@ -21,7 +21,7 @@ from frametool.grammar.result import Result
 from frametool.ros import joint_state, messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
 from frametool.stream.faults import Fault, Misused
-from frametool.stream.record_stream import without_noise
+from frametool.stream.record_text import without_noise
 from frametool.stream.row_layout import POSE
 from frametool.stream.splitter import Splitter
 from frametool.text.numbers import parse_number

@@ -13,7 +13,7 @@ import numpy as np
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, RowNote
 from frametool.stream.record import KEYS_REMEDY
-from frametool.stream.record_stream import Rendered, attempt, null_of, rendered
+from frametool.stream.record_text import Rendered, attempt, null_of, rendered
 from frametool.stream.rows import Block, texts_as_rows, written
 from frametool.stream.run import Outcome
 from frametool.stream.splitter import ARRAY, DOCUMENTS, LINES

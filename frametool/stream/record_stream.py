@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import re
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from frametool.documents.document import locate_many
-from frametool.errors import FormatError, FrametoolError
-from frametool.ros.message_stream import NOISE
-from frametool.stream.answers import number_writer, written
 from frametool.stream.faults import SKIP, STOP, Fault, RowNote
+from frametool.stream.record_text import Rendered, attempt, null_of, rendered
 from frametool.stream.run import Outcome, mapped
 from frametool.stream.splitter import ARRAY, Splitter
-from frametool.stream.template import learn, nulled
 from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks
 
 if TYPE_CHECKING:
@@ -21,13 +17,11 @@ if TYPE_CHECKING:
 
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part
-    from frametool.stream.template import Template
     from frametool.text.lines import ByteRange, ByteStream
 
 FEW = 16  # records at the end of which a stream that is already complete needs no numpy
 SMALL = 1 << 14  # bytes
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
-_ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^])", re.MULTILINE)  # no key that ROS prints begins so
 
 
 def run_records(
@@ -133,77 +127,3 @@ def _singly(text: bytes, parts: list[Part], form: str, request: Request, source:
         out += [text[part.begin : part.start], made, text[part.end : part.after]]
     out.append(text[at:])
     return Outcome(b"".join(out), faults, len(parts), text.count(b"\n"), mended, notes, len(text), kept)
-
-
-class Rendered(NamedTuple):
-    """The text of a result, how many rotations were normalised for it, and what is worth telling."""
-
-    text: bytes
-    mended: int
-    notes: list[RowNote]
-
-
-def rendered(template: Template, request: Request, line: int) -> Rendered | Fault:
-    """Return the text of a record's result, or why there is none; lines count from 0."""
-    try:
-        answers = template.answers(request)
-        numbers = [number for each in answers for number in written(each)]
-    except FrametoolError as error:
-        return Fault.of(line + template.line, getattr(error, "column_name", ""), error)
-    locked = any(each.entry.target.locked(each.parts) for each in answers)
-    write = number_writer(request.precision, yaml=not template.json)
-    text = template.with_numbers([write(number) for number in numbers], locked=locked)
-    mended = sum(each.mended for each in answers)
-    return Rendered(text.encode(), mended, _notes(template, line))
-
-
-def _notes(template: Template, line: int) -> list[RowNote]:
-    """Return what is worth telling about a record and its numbers, each with its place."""
-    own = template.own_notes
-    places = locate_many(template.text, [note.path for note in own])
-    found = [RowNote(line + at - 1, note.rule, note.message, str(column))
-             for note, (at, column) in zip(own, places, strict=True)]  # fmt: skip
-    known = {note.about for note in found}
-    others = [each for each in template.notes if each.about not in known]
-    return sorted(found + [each._replace(line=line + template.line) for each in others])
-
-
-def null_of(record: bytes, *, json: bool) -> bytes:
-    """Return what stands for a record without a result: its keys with null in the place of ours, or null."""
-    body = record.rstrip(b"\r\n")
-    try:
-        text = nulled(body.decode(), json=json)
-    except UnicodeDecodeError:
-        text = None
-    return (b"null" if text is None else text.encode()) + record[len(body) :]
-
-
-def attempt(text: bytes, part: Part, form: str, request: Request, source: str) -> Template | bytes | Fault:
-    """Learn from a record; return its text where nothing is in it, or say what is wrong; lines count from 0."""
-    line = text.count(b"\n", 0, part.start)
-    if part.problem:
-        return Fault(line, "", part.problem)
-    record = text[part.start : part.end]
-    try:
-        decoded = _decoded(record, source, line)
-        if form == "yaml" and _ODD_START.search(decoded):
-            decoded = without_noise(decoded)
-        return learn(decoded, request, json=form == "json", source=source, line=line + 1) or record
-    except FormatError as error:
-        column = getattr(error, "column_name", "") or (str(error.column) if error.column else "")
-        return Fault(max(error.line, 1) - 1, column, error.message, kind=error.kind)
-    except FrametoolError as error:
-        return Fault.of(line, getattr(error, "column_name", ""), error)
-
-
-def without_noise(text: str) -> str:
-    """Blank the lines that the echo tools print between messages."""
-    return "\n".join("" if NOISE(line.rstrip("\r")) else line for line in text.split("\n"))
-
-
-def _decoded(text: bytes, source: str, line: int) -> str:
-    try:
-        return text.decode()
-    except UnicodeDecodeError as error:
-        problem = f"not UTF-8 text: byte 0x{text[error.start]:02x}"
-        raise FormatError(problem, source=source, line=line + 1 + text.count(b"\n", 0, error.start)) from None

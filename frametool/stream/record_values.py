@@ -334,7 +334,7 @@ def stream_results(
 ) -> Iterator[Value]:
     """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
     from frametool.stream.faults import Fault
-    from frametool.stream.record_stream import without_noise
+    from frametool.stream.record_text import without_noise
     from frametool.stream.splitter import Splitter
     from frametool.text.lines import read_blocks
 
