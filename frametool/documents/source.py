@@ -93,11 +93,16 @@ LEAF, LIST, MAP, END = range(4)  # kinds of events
 
 
 class Source(NamedTuple):
-    """A text under the name that messages use for it; first_line: where it begins in what has that name."""
+    """A text under the name that messages use for it; `first_line` and `column` say where in that it begins."""
 
     name: str
     text: str
     first_line: int = 1
+    first_column: int = 1
+
+    def place(self, line: int, column: int) -> tuple[int, int]:
+        """Return a place in the text as one in what has its name."""
+        return self.first_line + line - 1, column + (self.first_column - 1) * (line == 1)
 
 
 class Verbatim(str):

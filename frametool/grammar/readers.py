@@ -107,7 +107,7 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     told = list(firsts.values())[:most]
     places = locate_many(source.text, [note.path for note in told])
     for (line, column), note in zip(places, told, strict=True):
-        place = source.name if isinstance(source, Pasted) else f"{source.name}:{source.first_line + line - 1}:{column}"
+        place = ":".join(map(str, (source.name, *(() if isinstance(source, Pasted) else source.place(line, column)))))
         again = counts.pop(_alike(note)) - 1
         warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}", rule=note.rule)
     if counts:

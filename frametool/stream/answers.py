@@ -67,12 +67,20 @@ def read_entries(
     reading = Reading(source, degrees=request.degrees, normalize=request.normalize)
     try:
         records = list(find_records(document.value, request, reading, (document.index,)))
-        note(reading.notes)
+        note([_at_its_number(each, records) for each in reading.notes])
         return [_entry(document, record, request) for record in records]
     except Misfit as misfit:
         error = placed(misfit, source)
         error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
         raise error from misfit
+
+
+def _at_its_number(note: Note, records: Sequence[Record]) -> Note:
+    """Return a note about a rotation with the place of the first of its numbers, as blocks of rows have it."""
+    found = (each for each in records if note.rule == "rounded" and each.path == note.path and each.shape.notation)
+    record = next(found, None)
+    path = record and record.numbers[record.shape.rotation_at[0]]
+    return note._replace(path=path) if path else note
 
 
 def _entry(document: Document, record: Record, request: Request) -> Entry:

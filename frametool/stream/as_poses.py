@@ -139,7 +139,7 @@ class OtherForm:
         count = 0
         yield Step(_none(), Outcome(b"", lines=begun.lines, size=begun.taken))
         for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
-            before = rows.rows
+            before, mended = rows.rows, rows.mended
             poses = rows.of_block(text)
             stamps = self._stamps(poses, form, count)
             count += len(poses.numbers)
@@ -148,7 +148,9 @@ class OtherForm:
                 unasked = None
             yield Step(
                 poses._replace(stamps_ns=stamps),
-                Outcome(b"", rows.faults, rows.rows - before, text.count(b"\n"), notes=rows.notes, size=len(text)),
+                Outcome(
+                    b"", rows.faults, rows.rows - before, text.count(b"\n"), rows.mended - mended, rows.notes, len(text)
+                ),
             )
         if self.stamps:
             self.stamps.finish(count, self.source)

@@ -13,7 +13,7 @@ import numpy as np
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, RowNote
 from frametool.stream.record import KEYS_REMEDY
-from frametool.stream.record_text import Rendered, attempt, null_of, rendered
+from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
 from frametool.stream.rows import Block, texts_as_rows, written
 from frametool.stream.run import Outcome
 from frametool.stream.splitter import ARRAY, DOCUMENTS, LINES
@@ -154,7 +154,9 @@ class RecordBlocks:
                 learned: Template | bytes | Fault | Rendered = self._learn(chunk, part)
                 line = text.count(b"\n", 0, start)
                 if isinstance(learned, Template) and learned.is_long and not self.request.in_order:
-                    learned = rendered(learned, self.request, chunk.count(b"\n", 0, part.start))
+                    learned = rendered(
+                        learned, self.request, chunk.count(b"\n", 0, part.start), column_in(chunk, part.start)
+                    )
                 if isinstance(learned, Rendered):
                     row = chunk[part.begin : part.start] + learned.text + chunk[part.end : part.after]
                     found.odd.append((start + part.begin, row))
@@ -253,8 +255,7 @@ class RecordBlocks:
             if not template.regular:
                 return line_of(row), ""
             start = int(starts[row, template.numbers[number]]) - MARGIN
-            begin = text.rfind(b"\n", 0, start) + 1
-            return text.count(b"\n", 0, start), str(len(text[begin:start].decode()) + 1)
+            return text.count(b"\n", 0, start), str(column_in(text, start))
 
         stamps = [tuple(without_quotes(parts[index]) for index in each) for each in template.stamps]
         numbers = _numbers(template, data, starts, ends)

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from frametool.stream.faults import SKIP, STOP, Fault, RowNote
-from frametool.stream.record_text import Rendered, attempt, null_of, rendered
+from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
 from frametool.stream.run import Outcome, mapped
 from frametool.stream.splitter import ARRAY, Splitter
 from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks
@@ -110,7 +110,9 @@ def _singly(text: bytes, parts: list[Part], form: str, request: Request, source:
         at = part.after
         line = text.count(b"\n", 0, part.start)
         template = attempt(text, part, form, request, source)
-        made = template if isinstance(template, (Fault, bytes)) else rendered(template, request, line)
+        made = template if isinstance(template, (Fault, bytes)) else rendered(
+            template, request, line, column_in(text, part.start)
+        )
         if isinstance(made, Rendered):
             mended += made.mended
             notes += made.notes

@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.document import locate_many
+from frametool.documents.source import Source
 from frametool.errors import FormatError, FrametoolError
 from frametool.ros.message_stream import NOISE
 from frametool.stream.answers import number_writer, written
@@ -28,8 +29,16 @@ class Rendered(NamedTuple):
     notes: list[RowNote]
 
 
-def rendered(template: Template, request: Request, line: int) -> Rendered | Fault:
-    """Return the text of a record's result, or why there is none; lines count from 0."""
+def column_in(text: bytes, place: int) -> int:
+    """Return the column, from 1, at which a place stands in its line."""
+    return len(text[text.rfind(b"\n", 0, place) + 1 : place].decode("utf-8", "replace")) + 1
+
+
+def rendered(template: Template, request: Request, line: int, column: int) -> Rendered | Fault:
+    """Return the text of a record's result, or why there is none.
+
+    line, column: where the record begins; lines count from 0
+    """
     try:
         answers = template.answers(request)
         numbers = [number for each in answers for number in written(each)]
@@ -39,15 +48,15 @@ def rendered(template: Template, request: Request, line: int) -> Rendered | Faul
     write = number_writer(request.precision, yaml=not template.json)
     text = template.with_numbers([write(number) for number in numbers], locked=locked)
     mended = sum(each.mended for each in answers)
-    return Rendered(text.encode(), mended, _notes(template, line))
+    return Rendered(text.encode(), mended, _notes(template, line, column))
 
 
-def _notes(template: Template, line: int) -> list[RowNote]:
+def _notes(template: Template, line: int, column: int) -> list[RowNote]:
     """Return what is worth telling about a record and its numbers, each with its place."""
     own = template.own_notes
-    places = locate_many(template.text, [note.path for note in own])
-    found = [RowNote(line + at - 1, note.rule, note.message, str(column))
-             for note, (at, column) in zip(own, places, strict=True)]  # fmt: skip
+    begin = Source("", template.text, line, column)
+    places = [begin.place(*each) for each in locate_many(template.text, [note.path for note in own])]
+    found = [RowNote(at, note.rule, note.message, str(there)) for note, (at, there) in zip(own, places, strict=True)]
     known = {note.about for note in found}
     others = [each for each in template.notes if each.about not in known]
     return sorted(found + [each._replace(line=line + template.line) for each in others])

@@ -70,10 +70,11 @@ def pose_of(record: Record, request: Request) -> Pose:
 
 
 class Teller:
-    """Tell what is odd in the documents of a text, with its place: of one rule the first few, then how many more."""
+    """Tell what is odd in documents, with its place: of one rule the first `most`, and at the end how many more."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST_TOLD) -> None:
         """Begin with nothing told."""
+        self.most = most
         self.counts: Counter[str] = Counter()
 
     def tell(self, source: Source, notes: Sequence[Note]) -> None:
@@ -81,13 +82,13 @@ class Teller:
         new = []
         for note in notes:
             self.counts[note.rule] += 1
-            if self.counts[note.rule] <= MOST_TOLD:
+            if self.counts[note.rule] <= self.most:
                 new.append(note)
         tell(source, new)
 
     def end(self, name: str) -> None:
         """Count what was not told."""
-        if more := sum(max(count - MOST_TOLD, 0) for count in self.counts.values()):
+        if more := sum(max(count - self.most, 0) for count in self.counts.values()):
             warn(f"{name}: {more} more like these")
 
 
@@ -334,13 +335,14 @@ def stream_results(
 ) -> Iterator[Value]:
     """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
     from frametool.stream.faults import Fault
-    from frametool.stream.record_text import without_noise
+    from frametool.stream.record_text import column_in, without_noise
+    from frametool.stream.run import tell_of_rounding
     from frametool.stream.splitter import Splitter
     from frametool.text.lines import read_blocks
 
     splitter = Splitter(form)
     line, rows = 1, 0
-    memory, teller = Memory(), Teller()
+    memory, teller = Memory(), Teller(most=1)
     for block in read_blocks(stream, whole=splitter.whole):
         for part in splitter.parts(block).parts:
             rows += 1
@@ -348,14 +350,17 @@ def stream_results(
             if part.problem:
                 bad.take([Fault(at, "", part.problem)])
                 continue
+            source = Source(bad.source, "", at)
             try:
                 text = decode(block[part.start : part.end], bad.source)
                 plain_text = without_noise(text) if form == "yaml" else text
-                yield from results(Source(bad.source, plain_text, at), request, style, memory, teller)
+                source = Source(bad.source, plain_text, at, column_in(block, part.start))
+                yield from results(source, request, style, memory, teller)
             except FormatError as error:
-                bad.take([Fault(at + max(error.line, 1) - 1, str(error.column or ""), error.message)])
+                below, column = source.place(max(error.line, 1), error.column)
+                bad.take([Fault(below, str(column) if error.column else "", error.message)])
             except FrametoolError as error:
                 bad.take([Fault.of(at, "", error)])
         line += block.count(b"\n")
-    teller.end(bad.source)
+    tell_of_rounding(bad.source, teller.counts["rounded"], rows)
     bad.finish(rows)

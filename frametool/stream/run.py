@@ -77,9 +77,14 @@ def run(
             warn(f"{bad.place(line + note.line, note.column)}: {note.sentence}")
         bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
-    if mended > 1:
-        warn(f"{bad.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
+    tell_of_rounding(bad.source, mended, rows)
     return bad.finish(rows)
+
+
+def tell_of_rounding(source: str, count: int, rows: int) -> None:
+    """Tell at the end of a stream how many rotations were normalised, of which the first was told of."""
+    if count > 1:
+        warn(f"{source}: {count} of {rows} rotations were off by more than 1e-6 and were normalised")
 
 
 def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes | ByteRange], jobs: int) -> Iterator[Outcome]:

@@ -144,9 +144,10 @@ class Splicer:
                 anchor = self.node.value[self.record.rotation][0] if self.record.rotation else self._first_key()
                 self._insert_before(anchor, self._member({"xyz": list(SAMPLE[:3])}, 0))
             return
-        if key in (POINT, VECTOR) and self.record.shape.kind in (POINT, VECTOR) and key != self.record.shape.kind:
+        kind = "xyz" if self.record.shape.kind == POSE else self.record.shape.kind
+        if key in (POINT, VECTOR) and key != kind:
             node = self.node.value[key][0]
-            self.edits.append(Edit(node.start, node.end, (Const(self._text(self.record.shape.kind).encode()),)))
+            self.edits.append(Edit(node.start, node.end, (Const(self._text(kind).encode()),)))
         members = (key,) if key else self.record.members
         there = self.record.shape.position_size
         if target.unit is None:
