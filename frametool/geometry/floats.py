@@ -1,10 +1,9 @@
 """The functions kernels find in `xp` when their components are Python floats, and how sines are computed; no numpy.
 
-Sine, cosine and arc tangent of floats and arrays by the same steps: + - * / and roots, which IEEE 754 rounds right.
-
-So one number and a million give the same bits, on every machine; no C library is asked, and no function of numpy's.
-The polynomials stand twice, in `floats` as one expression and in `arrays` step by step in place: the fastest way each.
-The coefficients come from interpolation at Chebyshev nodes with 60 digits; the tests hold the results to theirs.
+Sine, cosine and arc tangent of floats and arrays go by the same steps, + - * / and roots, which IEEE 754 rounds right:
+one number and a million give the same bits on every machine, and no C library is asked.  The polynomials stand twice,
+here as one expression and in `arrays` step by step in place, the fastest way each.  Their coefficients come from
+interpolation at Chebyshev nodes with 60 digits; the tests hold the results to theirs.
 """
 
 from __future__ import annotations

@@ -1,25 +1,9 @@
 """Kernels of rigid transforms: translation tx, ty, tz in metres, then the unit quaternion x, y, z, w.
 
-Knows numbers only; components are floats or arrays of one shape.
-
-Kernels of the way between two poses, prepared once and walked at many fractions.
-
-The rotation is that of `quaternion.slerp`, to the bit once it is normalised; what does not depend on the fraction is
-computed once.
-Knows numbers only; components are floats or arrays of one shape.
-
-Kernels of the motions of joints: what a joint does to the frame behind it, as components tx, ty, tz, x, y, z, w.
-
-Knows numbers only.  Axes are unit and plain floats; values are floats or arrays.
-
-Kernels of a chain of joints: the pose so far, carried across one joint, or one fixed piece, after the other.
-
-Axes and fixed pieces are plain floats; zeros among them cost nothing, which is most of them in robots.  What is left
-out depends on them alone, so that floats and arrays take the same steps.  Components are floats or arrays.
-
-Wrenches, twists and covariances seen from another frame: what the adjoint of a transform does to them.
-
-A transform is target_from_source as tx, ty, tz, x, y, z, w; vectors are three components, linear part first.
+Products and inverses; the way between two poses, prepared once and walked at many fractions, its rotation that of
+`quaternion.slerp` to the bit; chains of joints, whose fixed pieces cost nothing where they are zero; and twists,
+wrenches and covariances seen from another frame (linear part first), by the adjoint.
+Knows numbers only; components are floats or arrays of one shape, and both take the same steps.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The value of a rotation, or of many: components inside, numpy at its face.
 
 Knows no text and no files; radians only. One item is four Python floats and needs no numpy until it shows an array.
-
-What the two values share: components inside, one item or an array of them, numpy's ways of choosing.
+`Batched` is what it shares with `Transform`: one item or an array of them, numpy's ways of choosing.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
-"""The doors of the public face: lists and arrays in, checked components out.
+"""The doors of the public face: lists and arrays in, checked components out, kernels run on them, rows out.
 
 One item becomes Python floats without numpy; more become columns, views of the caller's array that are never
 written to. Errors name the argument, the shapes and the first bad row.
-
-Run kernels for the two values: floats directly, arrays in blocks, rows out for whoever asks for them.
-
-Loads numpy only where a batch or an array is asked for.
 """
 
 from __future__ import annotations

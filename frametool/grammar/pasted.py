@@ -1,32 +1,13 @@
 """Numbers as people paste them from other tools, turned into the mappings that `read_pose` takes.
 
-`pasted_objects` knows what says by its names what its numbers are, `pasted_rows` takes prints of numbers apart; here
-rows get their meaning: 3x3, 3x4 and 4x4 are matrices, others what the caller says.
-
-Each number stays the text it was.  None stands for a text that is nothing of the kind; what is and leaves its
-meaning open comes out as the bare list that the grammar refuses.
-
-Objects that say by their names what their numbers are, as tools print them.
-
+    array([[ 0., -1.], ..                  numpy, PyTorch, JAX, SymPy; [0 -1; 1 0] is MATLAB
     0.7071 + 0.7071k                       the algebra of tutorials: x, y, z of i, j, k, then w
     0.7071 << 0, 0, 0.7071 >>              spatialmath: w, then x, y, z; (x,y,z,w) = .. is Pinocchio's
-    Quaternion(x=0.0, ..)                  a repr with names, also <Quaternion (w=0.7071, ..)> of Blender
-    SE3(wxyz=[..], xyz=[..])               a repr with lists; RigidTransform(R=RotationMatrix([[..]]), p=[..])
-    R = .. p = ..                          a rotation and a position: Pinocchio, GTSAM, NumPy arrays
-    t = 1, 2, 3; rpy/zyx = 0, 0, 90 deg    one line of spatialmath
-    <Euler (x=0, y=0, z=1.57), order='XYZ'>
-    <origin xyz=".." rpy=".."/>
+    Quaternion(x=0.0, ..)                  a repr with names; <Euler (x=0, ..), order='XYZ'> of Blender
+    R = .. p = ..                          a rotation and a position; t = 1, 2, 3; rpy/zyx = 0, 0, 90 deg
 
-Each number stays the text it was.  None stands for a text that is nothing of the kind.
-
-Rows of numbers as tools print them, taken out of what stands around them.
-
-    array([[ 0., -1.], ..          numpy, PyTorch, JAX, SymPy: brackets, names with parentheses, dtype=..
-    [0 -1; 1 0]                    MATLAB; also its factor `1.0e+03 *` and its `Columns 1 through 3`
-    2x2 Matrix{Float64}:           Julia's heading; the indices of R and pandas
-    <Matrix 3x3 (..)               Blender; ` << 0, -1, ..;` is Eigen's comma initializer
-
-Knows nothing of poses.  Each number stays the text it was.
+Prints of 3x3, 3x4 and 4x4 are matrices, other rows what the caller says.  Each number stays the text it was.  None
+stands for a text that is nothing of the kind; a meaning left open comes out as the bare list that the grammar refuses.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Products, inverses and differences of poses that name their frames; frames that do not touch are refused.
 
-map_from_tool = product(map_from_base, base_from_tool)
+    map_from_tool = product(map_from_base, base_from_tool)
 
-Lookups as results: the pose of SOURCE in TARGET as an entry of a tree, with the times that mattered.
+A lookup is such a result too: the pose of SOURCE in TARGET as an entry of a tree, with the times that mattered.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Poses as the mappings that machine formats write: the grammar of `frametool.grammar.pose`, backwards.
 
-The pose of an edge in a few words, for drawings: millimetres and hundredths of a degree are enough there.
+In drawings an edge is a few words: millimetres and hundredths of a degree are enough there.
 """
 
 from __future__ import annotations

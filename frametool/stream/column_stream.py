@@ -1,6 +1,6 @@
 """Files of columns of numbers as streams: planned as tables are, evaluated in the same blocks, no text in between.
 
-Clouds of messages as files of columns: each moved by one pose, and written as a file of its own.
+The points of a message are such a file too: moved by one pose, and written as a file of their own.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Forward kinematics over rows: values of joints in columns or under keys, a pose beside them.
 
-Forward kinematics over the CSV of the echo tools, where each row is a JointState that names its joints.
+In the CSV of the echo tools each row is a JointState that names its joints.
 """
 
 from __future__ import annotations

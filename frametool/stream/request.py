@@ -1,8 +1,6 @@
 """What is asked of a stream, whatever its format: the operation, how rows are read, how results are written.
 
-What is done to each row: one object an operation, the same for floats and for arrays.
-
-What a row is compared with when that comes from the rows before: one record at a time, with plain floats.
+One `Operation` serves floats and arrays alike; `Memory` is what one record leaves for the next.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Blocks of poses to single results and back, and columns of texts to spans and back.
+"""The rows of a table as blocks of poses: for trees, and for results in another form than the table's.
 
-The rows of a table as poses rather than text: for trees, and for results in another form than the table's.
+Also turns single results into such blocks and back, and columns of texts into spans and back.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Stamps in bulk: decimal seconds or nanoseconds as text to integer nanoseconds, never through a float.
+"""What the rows of a block say beside their poses: stamps, weights, and the poses that move each of them.
 
-What stands in the rows of a block beside their poses: the stamps of velocities, the weights of a mean.
-
-The poses that move the rows of a block: by the frame each row is given in, and at the time it says.
+Stamps are read in bulk, decimal seconds or nanoseconds to integer nanoseconds, never through a float.
 """
 
 from __future__ import annotations

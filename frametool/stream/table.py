@@ -3,9 +3,7 @@
 id,x,y,z,tag                            1305031102.1758 1.34 0.62 1.65 0.657 0.612 -0.295 -0.311
 007,1.0,2.0,3.0,"a,b"                   (TUM: t x y z qx qy qz qw; s, m; the pose of the body in the world)
 
-The frames that rows of a table name: the one a row is given in, what it is the pose of, and those of its result.
-
-The columns of trajectories whose form says what stands where: TUM, EuRoC and KITTI, with a header or without.
+Knows how a table is written, which frames its rows name, and which columns a trajectory has by its form.
 """
 
 from __future__ import annotations
