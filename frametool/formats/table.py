@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Poses(NamedTuple):
@@ -31,7 +31,8 @@ class Format(NamedTuple):
         `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
         holds one frame that moves
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
-        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`
+        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; where all poses
+        are written alike, `ROWS` of `writer` (a RowForm) says how, in the place of `write_poses`
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
     asks: the options that say what it leaves open
@@ -40,6 +41,7 @@ class Format(NamedTuple):
     delimiter: what stands between the cells of its rows, "" for blanks; None where it has no such rows
     columns: what its rows hold, in order, where no header says so; widths: how many of them, where others are refused
     poses: what its rows mean, of a trajectory
+    texts: whether columns of texts have a place among its `arrays`
     """
 
     summary: str
@@ -58,11 +60,33 @@ class Format(NamedTuple):
     columns: tuple[str, ...] = ()
     widths: tuple[int, ...] = ()
     poses: Poses | None = None
+    texts: bool = False
 
     @property
     def is_table(self) -> bool:
         """Tell whether its lines are rows of cells."""
         return self.delimiter is not None
+
+
+def _trajectory(
+    summary: str, module: str, *, reader: str = "", asks: tuple[str, ...] = ("frames", "stamps", "camera_axes"),
+    **fields: Any,
+) -> Format:  # fmt: skip
+    """Return the row of a form that lists poses of one frame, which one module writes, and reads unless told."""
+    reads, writes = ("tree", "trajectory", "rows"), ("poses", "trajectory")
+    return Format(summary, reads=reads, reader=reader or module, writes=writes, writer=module, asks=asks, **fields)
+
+
+def _tree(summary: str, module: str, **fields: Any) -> Format:
+    """Return the row of a form of trees that one module reads and writes."""
+    return Format(summary, reads=("tree",), reader=module, writes=("tree",), writer=module, **fields)
+
+
+def _arrays(
+    summary: str, module: str, *, writes: tuple[str, ...] = ("poses", "points", "arrays"), **fields: Any
+) -> Format:
+    """Return the row of a form of columns of numbers that one module reads and writes."""
+    return Format(summary, reads=("arrays",), reader=module, writes=writes, writer=module, **fields)
 
 
 # what options say about files whose form leaves it open
@@ -161,13 +185,11 @@ FORMATS = {
         signs=(("header", r"#|\s*\S+\s+\S"),),
         delimiter="",
     ),
-    "tum": Format(
+    "tum": _trajectory(
         "trajectory: t x y z qx qy qz qw",
+        "frametool.formats.rows.tum",
         suffixes=(".tum",),
-        reads=("tree", "trajectory", "rows"),
         reader=_TABLE,
-        writes=("poses", "trajectory"),
-        writer="frametool.formats.rows.tum",
         signs=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
         states="world<-body, seconds, metres, quaternion x y z w",
         asks=("frames",),
@@ -233,12 +255,10 @@ FORMATS = {
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
     "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
-    "euroc": Format(
+    "euroc": _trajectory(
         "EuRoC ground truth",
-        reads=("tree", "trajectory", "rows"),
+        "frametool.formats.rows.euroc",
         reader=_TABLE,
-        writes=("poses", "trajectory"),
-        writer="frametool.formats.rows.euroc",
         signs=(
             ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
             ("line", rf"\d{{19}}(?:\s*,\s*{_NUMBER}){{7}}(?:(?:\s*,\s*{_NUMBER}){{9}})?\s*$"),
@@ -250,69 +270,51 @@ FORMATS = {
         widths=(8, 17),
         poses=Poses("wxyz", counted=""),
     ),
-    "colmap": Format(
+    "colmap": _trajectory(
         "COLMAP images.txt",
-        reads=("tree", "trajectory", "rows"),
-        reader="frametool.formats.rows.colmap",
-        writes=("poses", "trajectory"),
-        writer="frametool.formats.rows.colmap",
+        "frametool.formats.rows.colmap",
         names=("images.txt",),
         signs=(
             ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
             ("line", rf"\d+(?:[ \t]+{_NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
         ),
         states="the file holds camera<-world, quaternion w x y z",
-        asks=("frames", "stamps", "camera_axes"),
     ),
-    "nerf": Format(
+    "nerf": _trajectory(
         "NeRF transforms.json",
-        reads=("tree", "trajectory", "rows"),
-        reader="frametool.formats.rows.nerf",
-        writes=("poses", "trajectory"),
-        writer="frametool.formats.rows.nerf",
+        "frametool.formats.rows.nerf",
         names=("transforms.json",),
         signs=(("json path", "frames/transform_matrix"),),
         states="world<-camera; opengl: x right, y up, z backward",
-        asks=("frames", "stamps", "camera_axes"),
     ),
-    "kitti": Format(
+    "kitti": _trajectory(
         "KITTI poses",
-        reads=("tree", "trajectory", "rows"),
+        "frametool.formats.rows.kitti",
         reader=_TABLE,
-        writes=("poses", "trajectory"),
-        writer="frametool.formats.rows.kitti",
         signs=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),),
         states="world<-cam0, metres",
-        asks=("frames", "stamps", "camera_axes"),
         delimiter="",
         columns=("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"),
         widths=(12,),
         poses=Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),
     ),
-    "g2o": Format(
+    "g2o": _trajectory(
         "g2o pose graph",
+        "frametool.formats.rows.g2o",
         suffixes=(".g2o",),
-        reads=("tree", "trajectory", "rows"),
-        reader="frametool.formats.rows.g2o",
-        writes=("poses", "trajectory"),
-        writer="frametool.formats.rows.g2o",
         signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
         states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
         asks=("frames", "stamps"),
     ),
-    "open3d": Format(
+    "open3d": _trajectory(
         "Open3D camera trajectory",
+        "frametool.formats.rows.open3d",
         suffixes=(".log",),
-        reads=("tree", "trajectory", "rows"),
-        reader="frametool.formats.rows.open3d",
-        writes=("poses", "trajectory"),
-        writer="frametool.formats.rows.open3d",
         signs=(
             ("text", _OPEN3D),
             ("json path", "parameters/extrinsic"),
         ),
         states=".log holds world<-camera, .json camera<-world",
-        asks=("frames", "stamps", "camera_axes"),
     ),
     "bundler": Format(
         "Bundler's bundle.out",
@@ -327,21 +329,15 @@ FORMATS = {
         signs=(("magic", rb".{4}\0{4}.{4}.{56}.{4}[\x20-\x7e]{1,200}\0"),),
         instead="write it as text: colmap model_converter --input_path . --output_path . --output_type TXT",
     ),
-    "autoware": Format(
+    "autoware": _tree(
         "Autoware sensor calibration",
-        reads=("tree",),
-        reader="frametool.formats.trees.autoware",
-        writes=("tree",),
-        writer="frametool.formats.trees.autoware",
+        "frametool.formats.trees.autoware",
         signs=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
         states="parent<-child, metres, radians, roll pitch yaw about fixed axes",
     ),
-    "camchain": Format(
+    "camchain": _tree(
         "camera chain of Kalibr, OpenVINS or okvis; matrices by name",
-        reads=("tree",),
-        reader="frametool.formats.trees.camchain",
-        writes=("tree",),
-        writer="frametool.formats.trees.camchain",
+        "frametool.formats.trees.camchain",
         signs=(
             ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),
             ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
@@ -349,12 +345,9 @@ FORMATS = {
         states="target<-source as each key says; metres; intrinsics are not kept",
         asks=("direction", "frames"),
     ),
-    "opencv": Format(
+    "opencv": _tree(
         "OpenCV FileStorage",
-        reads=("tree",),
-        reader="frametool.formats.trees.opencv",
-        writes=("tree",),
-        writer="frametool.formats.trees.opencv",
+        "frametool.formats.trees.opencv",
         signs=(
             ("xml", "opencv_storage"),
             ("json path", "*/type_id"),
@@ -387,12 +380,9 @@ FORMATS = {
         signs=(("yaml key", "directives"),),
         states="parent<-frame, metres, degrees, rpy about fixed axes",
     ),
-    "handeye": Format(
+    "handeye": _tree(
         "hand-eye calibration of easy_handeye",
-        reads=("tree",),
-        reader="frametool.formats.trees.handeye",
-        writes=("tree",),
-        writer="frametool.formats.trees.handeye",
+        "frametool.formats.trees.handeye",
         signs=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
         states="effector (base if not on the hand)<-tracking base, metres, x y z w",
     ),
@@ -412,13 +402,10 @@ FORMATS = {
         states="parent<-child, metres, radians unless their names say deg",
         asks=("dh", "frames"),
     ),
-    "launch": Format(
+    "launch": _tree(
         "launch file",
+        "frametool.formats.trees.launch",
         suffixes=(".launch",),
-        reads=("tree",),
-        reader="frametool.formats.trees.launch",
-        writes=("tree",),
-        writer="frametool.formats.trees.launch",
         signs=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
         states="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
     ),
@@ -438,13 +425,10 @@ FORMATS = {
         signs=(("xml", "sdf"),),
         states="parent<-child, metres, radians unless degrees; frames are model::link",
     ),
-    "urdf": Format(
+    "urdf": _tree(
         "URDF robot",
+        "frametool.formats.robots.urdf",
         suffixes=(".urdf",),
-        reads=("tree",),
-        reader="frametool.formats.robots.urdf",
-        writes=("tree",),
-        writer="frametool.formats.robots.urdf",
         signs=(("xml", "robot"),),
         loses="written as links that are fixed to one another; joints, limits and shapes are no frames",
         states="parent<-child, metres, radians, rpy about fixed axes",
@@ -457,91 +441,71 @@ FORMATS = {
         signs=(("xml child", f"robot/(?:{_SRDF})"),),
         states="virtual joints: parent_frame<-child_link; its states are values of joints (--joints FILE:STATE)",
     ),
-    "npy": Format(
+    "npy": _arrays(
         "NPY of numpy: n x 3 points, n x 7 poses, records with fields",
+        "frametool.formats.rows.npy",
         suffixes=(".npy",),
-        reads=("arrays",),
-        reader="frametool.formats.rows.npy",
-        writes=("poses", "points", "arrays"),
-        writer="frametool.formats.rows.npy",
         signs=(("magic", rb"\x93NUMPY"),),
     ),
-    "npz": Format(
+    "npz": _arrays(
         "NPZ of numpy, several arrays in a zip file",
+        "frametool.formats.rows.npz",
         suffixes=(".npz",),
-        reads=("arrays",),
-        reader="frametool.formats.rows.npz",
-        writes=("poses", "points", "arrays"),
-        writer="frametool.formats.rows.npz",
         signs=(("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
         asks=("array",),
     ),
-    "pcd": Format(
+    "pcd": _arrays(
         "PCD point cloud",
+        "frametool.formats.rows.pcd",
         suffixes=(".pcd",),
-        reads=("arrays",),
-        reader="frametool.formats.rows.pcd",
         writes=("points", "arrays"),
-        writer="frametool.formats.rows.pcd",
         signs=(("magic", _PCD),),
         states="metres; VIEWPOINT: pose of the sensor among the points, w first",
     ),
-    "ply": Format(
+    "ply": _arrays(
         "PLY point cloud or mesh",
+        "frametool.formats.rows.ply",
         suffixes=(".ply",),
-        reads=("arrays",),
-        reader="frametool.formats.rows.ply",
         writes=("points", "arrays"),
-        writer="frametool.formats.rows.ply",
         signs=(("magic", rb"ply\r?\n"),),
         states="metres",
     ),
-    "las": Format(
+    "las": _arrays(
         "LAS laser scan",
+        "frametool.formats.rows.las",
         suffixes=(".las",),
-        reads=("arrays",),
-        reader="frametool.formats.rows.las",
         writes=("points", "arrays"),
-        writer="frametool.formats.rows.las",
         signs=(("magic", rb"LASF.{100}[\x00-\x7f]"),),
         states="metres",
     ),
-    "laz": Format(
+    "laz": _arrays(
         "LAZ laser scan",
+        "frametool.formats.rows.las",
         suffixes=(".laz",),
-        reads=("arrays",),
-        reader="frametool.formats.rows.las",
         writes=("points", "arrays"),
-        writer="frametool.formats.rows.las",
         signs=(("magic", rb"LASF.{100}[\x80-\xff]"),),
         states="metres",
     ),
-    "parquet": Format(
+    "parquet": _arrays(
         "Parquet (pip install 'frametool[arrow]')",
+        _ARROW,
         suffixes=(".parquet", ".pq"),
-        reads=("arrays",),
-        reader=_ARROW,
-        writes=("poses", "points", "arrays"),
-        writer=_ARROW,
         signs=(("magic", rb"PAR1"),),
+        texts=True,
     ),
-    "arrow": Format(
+    "arrow": _arrays(
         "a file of Arrow, Feather (pip install 'frametool[arrow]')",
+        _ARROW,
         suffixes=(".arrow", ".feather", ".ipc"),
-        reads=("arrays",),
-        reader=_ARROW,
-        writes=("poses", "points", "arrays"),
-        writer=_ARROW,
         signs=(("magic", rb"ARROW1"),),
+        texts=True,
     ),
-    "arrows": Format(
+    "arrows": _arrays(
         "a stream of Arrow (pip install 'frametool[arrow]')",
+        _ARROW,
         suffixes=(".arrows",),
-        reads=("arrays",),
-        reader=_ARROW,
-        writes=("poses", "points", "arrays"),
-        writer=_ARROW,
         signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
+        texts=True,
     ),
     "feather1": Format(
         "Feather of the first version",

@@ -423,7 +423,7 @@ class _InOtherForm:
 
     def __init__(self, columns: Sequence[OutColumn], into: Any, style: Style) -> None:
         """Choose the columns."""
-        has_texts = getattr(into, "HOLDS_TEXTS", False)
+        has_texts = FORMATS[style.form].texts
         self.columns = columns
         self.kept = [column for column in columns if column.kind is not None or has_texts]
         self.writer: ColumnWriter = into.create([column._replace(passed=None) for column in self.kept], None, style)
@@ -515,7 +515,6 @@ class _GridOfForm:
         self.module: Any = import_module(FORMATS[form].writer)
         self.cloud = cloud
         self.pose = pose
-        self.HOLDS_TEXTS = getattr(self.module, "HOLDS_TEXTS", False)
 
     def create(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
         """Return what writes the points."""

@@ -330,7 +330,7 @@ class ArrayWriter:
         self.kind = kind
         self.extras = tuple(extras)
         self.module: Any = import_module(FORMATS[style.form].writer)
-        self.has_texts = getattr(self.module, "HOLDS_TEXTS", False)
+        self.has_texts = FORMATS[style.form].texts
         self.target = target_in(style, kind, placed=placed)
         self.placed = placed
         self.columns: list[OutColumn] = []

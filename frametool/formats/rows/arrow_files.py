@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.text.spans import Ints
 
-HOLDS_TEXTS = True
 BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow", b"\xff\xff\xff\xff": "arrows"}
 LARGEST = 3 << 26  # bytes of a group of rows that is held as a whole, four times in all: below 1 GB
 NEW_GROUP = 1 << 20  # rows of a group where the input has none
