@@ -335,8 +335,8 @@ class Assembly:
         if track is None:
             follows = samples.child not in self._first
         else:
-            follows = samples.child in self._moves and not track.standing and track.parent == samples.parent
-            follows = follows and track.last_ns < samples.stamps_ns[0]  # type: ignore[union-attr]
+            goes_on = self._goes_on(samples.parent, samples.child)
+            follows = goes_on and track.last_ns < samples.stamps_ns[0]  # type: ignore[union-attr]
         return follows and all(map(lt, samples.stamps_ns, islice(samples.stamps_ns, 1, None)))
 
     def _place_before(self, child: str, stamp_ns: int) -> Place | None:

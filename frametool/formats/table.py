@@ -130,6 +130,12 @@ _EUROC = (
     "b_a_RS_S_z [m s^-2]",
 )  # fmt: skip
 
+# forms that differ only in their names and signs
+_ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.echo_format")
+_CALLS = Format("", writes=("poses", "tree"), writer="frametool.ros.publisher")
+_LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), states="metres")
+_LAS_HEAD = rb"LASF.{100}"
+
 FORMATS = {
     "yaml": Format(
         "YAML: trees, poses, documents parted by ---",
@@ -235,23 +241,11 @@ FORMATS = {
         signs=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
     ),
     "mcap": Format("MCAP file", (".mcap",), ("tree",), BAG, signs=(("magic", rb"\x89MCAP0\r\n"),)),
-    "ros1": Format(
-        "messages as `rostopic echo` prints them",
-        writes=("poses", "points", "tree"),
-        writer="frametool.ros.echo_format",
-    ),
-    "ros2": Format(
-        "messages as `ros2 topic echo` prints them",
-        writes=("poses", "points", "tree"),
-        writer="frametool.ros.echo_format",
-    ),
+    "ros1": _ECHO._replace(summary="messages as `rostopic echo` prints them"),
+    "ros2": _ECHO._replace(summary="messages as `ros2 topic echo` prints them"),
     "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
-    "static1": Format(
-        "static_transform_publisher of ROS 1", writes=("poses", "tree"), writer="frametool.ros.publisher"
-    ),
-    "static2": Format(
-        "static_transform_publisher of ROS 2", writes=("poses", "tree"), writer="frametool.ros.publisher"
-    ),
+    "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
+    "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
     "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
@@ -470,22 +464,8 @@ FORMATS = {
         signs=(("magic", rb"ply\r?\n"),),
         states="metres",
     ),
-    "las": _arrays(
-        "LAS laser scan",
-        "frametool.formats.rows.las",
-        suffixes=(".las",),
-        writes=("points", "arrays"),
-        signs=(("magic", rb"LASF.{100}[\x00-\x7f]"),),
-        states="metres",
-    ),
-    "laz": _arrays(
-        "LAZ laser scan",
-        "frametool.formats.rows.las",
-        suffixes=(".laz",),
-        writes=("points", "arrays"),
-        signs=(("magic", rb"LASF.{100}[\x80-\xff]"),),
-        states="metres",
-    ),
+    "las": _LAS._replace(summary="LAS laser scan", suffixes=(".las",), signs=(("magic", _LAS_HEAD + rb"[\x00-\x7f]"),)),
+    "laz": _LAS._replace(summary="LAZ laser scan", suffixes=(".laz",), signs=(("magic", _LAS_HEAD + rb"[\x80-\xff]"),)),
     "parquet": _arrays(
         "Parquet (pip install 'frametool[arrow]')",
         _ARROW,

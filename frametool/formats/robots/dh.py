@@ -145,8 +145,7 @@ def _row(number: int, cells: dict[str, Cell], fail: Fail) -> DhRow:
     kind = "prismatic" if d.variable is not None else "revolute"
     if "type" in cells and (written := cells["type"].text):
         if written.lower() not in KINDS:
-            message = f"unknown type {shown(written)}; known: revolute (R, 0), prismatic (P, 1), fixed"
-            raise cells["type"].fail(message)
+            raise cells["type"].fail(f"unknown type {shown(written)}; known: revolute (R, 0), prismatic (P, 1), fixed")
         kind = KINDS[written.lower()]
     if (d.variable if kind != "prismatic" else theta.variable) is not None:
         raise fail(f"a {kind} joint with a variable {'d' if kind != 'prismatic' else 'theta'}")

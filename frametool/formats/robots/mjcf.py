@@ -102,8 +102,7 @@ class MjcfModel:
     def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
         """Read one element; of a body or frame return what surrounds that which it holds."""
         if node.tag in MADE:
-            message = f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}"
-            self.options.tally.note_each(message, node.line)
+            self.options.tally.note_each(f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}", node.line)
         elif node.tag == "frame":
             pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node)))
             return inside._replace(around=self._class(node, inside.around), frame=pose)
@@ -162,8 +161,7 @@ class MjcfModel:
         if known := self.joints.get(name):
             raise node.error(f"joint {shown(name)} twice; first in line {known.line}", "name")
         if kind == "free" and link.parent != WORLD:
-            message = f"joint {shown(name)} is free: it belongs into a body directly in the world"
-            raise node.error(message)
+            raise node.error(f"joint {shown(name)} is free: it belongs into a body directly in the world")
         if link.joints and "floating" in (link.joints[0].kind, TYPES[kind]):
             message = f"joint {shown(name)} beside others in body {shown(link.child)}, one of them free; keep that"
             raise node.error(message)
@@ -317,8 +315,7 @@ class Classes:
     def check(self, name: str, node: XmlNode, attribute: str) -> None:
         """Raise FormatError for a class that is nowhere defined."""
         if name not in self.classes:
-            message = f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}"
-            raise node.error(message, attribute)
+            raise node.error(f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}", attribute)
 
 
 class PoseReader:
@@ -363,8 +360,7 @@ class PoseReader:
     def _unit(self, attributes: Attributes, name: str, vector: tuple[float, ...]) -> Vector:
         x, y, z = vector
         if quaternion.magnitude(x, y, z, floats) < LEAST:
-            message = f"{name}: {x:g} {y:g} {z:g} has no direction"
-            raise attributes[name].error(message)
+            raise attributes[name].error(f"{name}: {x:g} {y:g} {z:g} has no direction")
         return unit_vector(x, y, z, floats)
 
     def pose(self, attributes: Attributes) -> Rigid:
@@ -391,8 +387,7 @@ class PoseReader:
     def _orientation(self, attributes: Attributes) -> Quaternion:
         given = [name for name in ORIENTATIONS if name in attributes]
         if len(given) > 1:
-            message = f"{' and '.join(given)} in one element; keep one"
-            raise attributes[given[1]].error(message)
+            raise attributes[given[1]].error(f"{' and '.join(given)} in one element; keep one")
         return getattr(self, f"_{given[0]}")(attributes) if given else (0.0, 0.0, 0.0, 1.0)
 
     def _quat(self, attributes: Attributes) -> Quaternion:

@@ -81,7 +81,8 @@ class Posture:
     def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> Posture:
         """Find out where the joints of some links stand."""
         joints = (joint for link in links for joint in link.joints)
-        return cls(joints, options, fail or _at_its_line, fixed=[link.fixed for link in links if link.fixed])
+        fail = fail or (lambda joint, problem: FormatError(problem, line=joint.line))
+        return cls(joints, options, fail, fixed=[link.fixed for link in links if link.fixed])
 
     def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
         """Yield an edge a link: for good, or a sample at each time at which one of its joints has a value."""
@@ -241,10 +242,6 @@ class Posture:
         at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)
         many = f"{len(free)} joint{'s' * (len(free) > 1)}"
         return f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
-
-
-def _at_its_line(joint: Joint, problem: str) -> FormatError:
-    return FormatError(problem, line=joint.line)
 
 
 def _about_limits(joint: Joint, beyond: Sequence[float], count: int) -> str:

@@ -68,8 +68,7 @@ def read_pose(holder: XmlNode, options: Options) -> tuple[Rigid, str]:
         options.tally.note_each(message, pose.line)
     degrees, form = pose.attribute("degrees").lower() in TRUE, pose.attribute("rotation_format")
     if form not in ("", "euler_rpy", "quat_xyzw"):
-        message = f"rotation_format {shown(form)}; expected euler_rpy or quat_xyzw"
-        raise pose.error(message, "rotation_format")
+        raise pose.error(f"rotation_format {shown(form)}; expected euler_rpy or quat_xyzw", "rotation_format")
     if degrees and form == "quat_xyzw":
         raise pose.error("degrees with quat_xyzw; keep one", "degrees")
     relative_to = pose.attribute("relative_to")
@@ -392,8 +391,7 @@ class SdfJoints:
                     raise
                 return None
         inside = [frame for frame in self.frames.all.values() if frame.scope is model]
-        links = (frame for kind in ("link", "model") for frame in inside if frame.kind == kind)
-        return next(links, None)
+        return next((frame for kind in ("link", "model") for frame in inside if frame.kind == kind), None)
 
     def _read(self, frame: SdfFrame) -> SdfJoint:
         holder = frame.holder

@@ -22,7 +22,7 @@ from frametool.formats.load import Recording, refuse_unknown_joints
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
-from frametool.geometry import euler, floats, quaternion
+from frametool.geometry import euler, floats
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
@@ -139,8 +139,7 @@ class _Reader:
             raise self.xml.error(inner.element, message)
         name = self._bare(node.element, "name")
         if name in self.frames:
-            message = f"link {shown(name)} twice; first in line {self.frames[name]}"
-            raise self.xml.error(node.element, message, "name")
+            raise self.xml.error(node.element, f"link {shown(name)} twice; first in line {self.frames[name]}", "name")
         self.frames[name] = node.element.line
 
     def _bare(self, element: Element, attribute: str) -> str:
@@ -281,11 +280,13 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 def _joint(parent: str, child: str, components: Rigid, style: Style) -> str:
     """Write one edge."""
+    from frametool.formats.trees.written_poses import of_angles
+
     pose = Pose.of(components)
     exact = tuple(rotation_numbers(pose, notation("xyzw"), style))
     angles = rotation_numbers(pose, notation("rpy_rad"), style)
     short = [float(f"{angle:.15g}") for angle in angles]  # as people write them
-    said = next((each for each in (short, angles) if _from_rpy(each) == exact), None)
+    said = next((each for each in (short, angles) if of_angles(each) == exact), None)
     origin = f'xyz="{_numbers(components[:3], style)}" rpy="{_numbers(said or angles, style)}"'
     if said is None and style.precision is None:
         origin += f' quat_xyzw="{_numbers(exact, style)}"'
@@ -293,12 +294,6 @@ def _joint(parent: str, child: str, components: Rigid, style: Style) -> str:
         f'  <joint name="{_attribute(child)}_joint" type="fixed">\n    <origin {origin}/>\n'
         f'    <parent link="{_attribute(parent)}"/>\n    <child link="{_attribute(child)}"/>\n  </joint>\n'
     )
-
-
-def _from_rpy(angles: Sequence[float]) -> tuple[float, ...]:
-    """Return the quaternion that `frametool.formats.robots.urdf` makes of the angles."""
-    roll, pitch, yaw = angles
-    return quaternion.canonical(*euler.to_quaternion(roll, pitch, yaw, "sxyz", floats), floats)
 
 
 def _numbers(values: Sequence[float], style: Style) -> str:

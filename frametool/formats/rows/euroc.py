@@ -6,22 +6,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from frametool.formats.rows.pose_rows import Numbers, RowForm
 from frametool.formats.table import FORMATS
 
-if TYPE_CHECKING:
-
-    from frametool.geometry.types import N
-
-
-def _w_first(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> tuple[N, ...]:
-    return tx, ty, tz, w, x, y, z
-
-
 ROWS = RowForm(
     ("nanoseconds", b",", Numbers(7, b","), b"\n"),
-    _w_first,
+    lambda tx, ty, tz, x, y, z, w: (tx, ty, tz, w, x, y, z),
     head=",".join(FORMATS["euroc"].columns[:8]).encode() + b"\n",
 )

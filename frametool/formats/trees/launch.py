@@ -19,15 +19,7 @@ from frametool.documents.source import InputFile, Source
 from frametool.documents.xml import XmlFile
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.detect import Beginning
-from frametool.formats.trees.launch_actions import (
-    COMPOSABLE,
-    PACKAGES,
-    Action,
-    composed,
-    not_followed,
-    not_read,
-    runs_publisher,
-)
+from frametool.formats.trees.launch_actions import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Misfit, Reading, kind
 from frametool.ros import publisher
@@ -180,9 +172,9 @@ def _action(tag: str, entry: Mapping[str, Any], conditions: list[str], include: 
     """Make of one element or entry what there is to read or to tell of it; None for what starts no publisher."""
     command = entry.get("cmd")
     if tag == "include":
-        return not_followed(include, entry.get("file", ""))
+        return Action.not_followed(include, entry.get("file", ""))
     if tag == "composable_node":
-        return composed() if entry.get("plugin") == COMPOSABLE else None
+        return COMPOSED if entry.get("plugin") == COMPOSABLE else None
     if tag == "node" and entry.get("pkg") in PACKAGES and entry.get("exec", entry.get("type")) == publisher.CALL:
         key = "args"
     elif tag == "executable" and type(command) is str and runs_publisher(command.split()):
@@ -191,14 +183,14 @@ def _action(tag: str, entry: Mapping[str, Any], conditions: list[str], include: 
         return None
     text = entry.get(key)
     if type(text) is not str:
-        return not_read(f"its {key} must be text, found {kind(text)}" if key in entry else f"it has no {key}")
+        return Action.not_read(f"its {key} must be text, found {kind(text)}" if key in entry else f"it has no {key}")
     if substitution := _SUBSTITUTION.search(text):
-        return not_read(f"its arguments have {shown(substitution[0])}")._replace(key=key)
+        return Action.not_read(f"its arguments have {shown(substitution[0])}", key)
     open_conditions = []
     for condition in conditions:
         word, value = condition[:-1].lower().split('="', 1)
         if value in (_NO if word == "if" else _YES):
-            return not_read(f"it never starts ({condition})")._replace(key=key)
+            return Action.not_read(f"it never starts ({condition})", key)
         if value not in (*_NO, *_YES):
             open_conditions.append(condition)
     return Action(text, conditions=open_conditions, key=key)

@@ -30,20 +30,18 @@ class Action(NamedTuple):
     line: int = 0
     column: int = 0
 
+    @classmethod
+    def not_read(cls, why: str, key: str = "") -> Action:
+        """Make the action for a call that cannot be read."""
+        return cls(unread=f"{CALL} not read: {why}", key=key)
 
-def not_read(why: str) -> Action:
-    """Make the action for a call that cannot be read."""
-    return Action(unread=f"{CALL} not read: {why}")
+    @classmethod
+    def not_followed(cls, what: str, named: object) -> Action:
+        """Make the action for a file that is included."""
+        return cls(unread=f"{what} {shown(named)} is not followed; read that file too: --with FILE")
 
 
-def not_followed(what: str, named: object) -> Action:
-    """Make the action for a file that is included."""
-    return Action(unread=f"{what} {shown(named)} is not followed; read that file too: --with FILE")
-
-
-def composed() -> Action:
-    """Make the action for a node that publishes without a call."""
-    return not_read("it is a composable node, whose transform stands in its parameters")
+COMPOSED = Action.not_read("it is a composable node, whose transform stands in its parameters")
 
 
 def runs_publisher(words: Sequence[str]) -> bool:

@@ -12,15 +12,7 @@ import ast
 import warnings
 
 from frametool.errors import FormatError, shown
-from frametool.formats.trees.launch_actions import (
-    COMPOSABLE,
-    PACKAGES,
-    Action,
-    composed,
-    not_followed,
-    not_read,
-    runs_publisher,
-)
+from frametool.formats.trees.launch_actions import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
 from frametool.ros.publisher import CALL
 
 TYPE_CHECKING = False
@@ -229,9 +221,9 @@ def _action(node: ast.Call, scope: Bindings, conditions: tuple[str, ...]) -> Act
     given = {each.arg: each.value for each in node.keywords if each.arg}
     if getattr(node.func, "attr", getattr(node.func, "id", "")) == "IncludeLaunchDescription":
         named = node.args[0] if node.args else given.get("launch_description_source", node.func)
-        return not_followed("IncludeLaunchDescription", _written(named))
+        return Action.not_followed("IncludeLaunchDescription", _written(named))
     if _text(given.get("plugin"), scope) == COMPOSABLE:
-        return composed()
+        return COMPOSED
     name = "cmd" if "cmd" in given else "arguments"
     if name == "cmd":  # other words of the command line need not be literal
         parts = getattr(given["cmd"], "elts", ())
@@ -242,13 +234,13 @@ def _action(node: ast.Call, scope: Bindings, conditions: tuple[str, ...]) -> Act
     if not is_call:
         return None
     if name not in given:
-        return not_read(f"it has no {name}")
+        return Action.not_read(f"it has no {name}")
     try:
         value = evaluate(given[name], scope)
     except NotLiteral as error:
-        return not_read(f"{shown(_written(error.node))} is not a literal")
+        return Action.not_read(f"{shown(_written(error.node))} is not a literal")
     if not isinstance(value, list):
-        return not_read(f"{name} is no list")
+        return Action.not_read(f"{name} is no list")
     return Action([str(word) for word in value], conditions=conditions)
 
 

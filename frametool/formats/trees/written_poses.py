@@ -13,6 +13,8 @@ from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.geometry import euler, floats, matrix, quaternion, rigid
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid, Three
     from frametool.grammar.readers import Quaternion
@@ -68,24 +70,20 @@ def angles_of(rotation: Quaternion) -> tuple[Three[float], Quaternion]:
     """Return roll, pitch, yaw of a rotation, and the rotation that they read back to.
 
     The angles with the fewest decimals that give the same bits, which are those of a file the rotation came from;
-    without such ones the nearest angles.
+    without such ones the nearest angles.  Each angle is tried the other way round too.
     """
     given = quaternion.from_quaternion(*rotation, floats)
     exact: Three[float] = euler.from_quaternion(*given, "sxyz", floats)
     for decimals in range(MOST_DECIMALS):
-        for roll, yaw in product(*map(_turns, (exact[0], exact[2]))):
+        for roll, yaw in product(*((angle, angle - copysign(2.0 * pi, angle)) for angle in (exact[0], exact[2]))):
             angles = (round(roll, decimals), round(exact[1], decimals), round(yaw, decimals))
-            if _turned(angles) == given:
+            if of_angles(angles) == given:
                 return angles, given
-    return exact, _turned(exact)
+    return exact, of_angles(exact)
 
 
-def _turns(angle: float) -> tuple[float, float]:
-    """Return an angle, and the same one reached the other way round."""
-    return angle, angle - copysign(2.0 * pi, angle)
-
-
-def _turned(angles: Three[float]) -> Quaternion:
+def of_angles(angles: Iterable[float]) -> Quaternion:
+    """Return the rotation that roll, pitch and yaw are read as."""
     return quaternion.canonical(*euler.to_quaternion(*angles, "sxyz", floats), floats)
 
 
