@@ -13,7 +13,7 @@ from io import BytesIO
 from itertools import islice
 from operator import lt
 from os import PathLike
-from typing import Any, BinaryIO, NamedTuple, Protocol
+from typing import Any, BinaryIO, NamedTuple
 
 from frametool.documents.document import format_error, locate, locate_many
 from frametool.documents.source import InputFile, Source, paused_collector
@@ -42,25 +42,6 @@ if TYPE_CHECKING:
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Report
-
-    class Place(Protocol):
-        """Where an edge was read."""
-
-        def error(self, message: str, kind: type[FormatError]) -> FormatError:
-            """Make the error for this place."""
-
-        def seen_from(self, other: Place) -> str:
-            """Name this place beside another one: `line 7`, or `other.yaml:7` in another source."""
-
-    class PlacedSamples(Protocol):
-        """Poses of one frame, and where each was read."""
-
-        @property
-        def samples(self) -> Samples:
-            """Return the poses."""
-
-        def place(self, at: int) -> Place:
-            """Return where one of them was read."""
 
 
 class Recording(InputFile):
@@ -253,7 +234,7 @@ class Assembly:
         self._replaced: list[Replaced] = []
         self._stamps: dict[str, int] = {}  # child -> its one stamp, while it has no other
         self._moves: set[str] = set()
-        self._whole: dict[str, list[PlacedSamples]] = {}  # child -> samples that were taken in one piece
+        self._whole: dict[str, list[SamplesOfFile]] = {}  # child -> samples that were taken in one piece
         self.axes: dict[str, str] = {}  # frame -> the axes of the camera it is
 
     @property
@@ -288,7 +269,7 @@ class Assembly:
         except ValueInvalid as error:
             raise place.error(str(error), FormatError) from None
 
-    def add_samples(self, placed: PlacedSamples) -> None:
+    def add_samples(self, placed: SamplesOfFile) -> None:
         """Add the poses of one frame: in one piece where nothing can be wrong with their order, else one by one."""
         parent, child, stamps_ns, components, _ = placed.samples
         if not stamps_ns:
@@ -320,7 +301,7 @@ class Assembly:
             self.add_samples(SamplesOfFile(file, samples))
         for pair, edge in zip(pairs, columns.edges(), strict=True) if len(whole) < len(found) else ():
             if pair not in whole:
-                self.add(*pair, edge.components, edge.stamp_ns, EdgePlace(file, edge))
+                self.add(*pair, edge.components, edge.stamp_ns, Place(file, edge))
 
     def _goes_on(self, parent: str, child: str) -> bool:
         """Tell whether a frame is known to move, now in this parent."""
@@ -442,7 +423,7 @@ class Assembly:
         return place.error(message, BadTopology)
 
 
-class EdgePlace(NamedTuple):
+class Place(NamedTuple):
     """Where an edge was read."""
 
     file: Recording
@@ -455,10 +436,9 @@ class EdgePlace(NamedTuple):
         return kind(message, source=self.file.name, line=self.edge.line)
 
     def seen_from(self, other: Place) -> str:
-        """Return `line 7`, or `other.yaml:7` beside a place in another file."""
+        """Name this place beside another one: `line 7`, or `other.yaml:7` in another file."""
         line = locate(self.file.text, self.edge.path)[0] if self.edge.path else self.edge.line
-        same = isinstance(other, EdgePlace) and other.file.name == self.file.name
-        return f"line {line}" if same else f"{self.file.name}:{line}"
+        return f"line {line}" if other.file.name == self.file.name else f"{self.file.name}:{line}"
 
 
 class SamplesOfFile(NamedTuple):
@@ -467,9 +447,9 @@ class SamplesOfFile(NamedTuple):
     file: Recording
     samples: Samples
 
-    def place(self, at: int) -> EdgePlace:
+    def place(self, at: int) -> Place:
         """Return where one of them was read."""
-        return EdgePlace(self.file, self.samples.edge(at))
+        return Place(self.file, self.samples.edge(at))
 
 
 def load(
@@ -530,13 +510,12 @@ def load_sources(
 
 def lines_of(places: Sequence[Place]) -> list[tuple[str, int]]:
     """Return file and line of many places, each file walked once; 0 where a line says nothing."""
-    edges = [place for place in places if isinstance(place, EdgePlace)]
     lines: dict[int, int] = {}
-    for file in {id(each.file): each.file for each in edges}.values():
-        inside = [each for each in edges if each.file is file and each.edge.path]
+    for file in {id(each.file): each.file for each in places}.values():
+        inside = [each for each in places if each.file is file and each.edge.path]
         found = locate_many(file.text, [each.edge.path for each in inside]) if inside else []
         lines |= {id(each): line for each, (line, _) in zip(inside, found, strict=True)}
-    return [(each.file.name, lines.get(id(each), each.edge.line)) for each in edges]
+    return [(each.file.name, lines.get(id(each), each.edge.line)) for each in places]
 
 
 def _add(assembly: Assembly, file: Recording) -> None:
@@ -550,7 +529,7 @@ def _add(assembly: Assembly, file: Recording) -> None:
         elif piece.parent is None:
             assembly.add_root(piece.child)
         else:
-            assembly.add(piece.parent, piece.child, piece.components, piece.stamp_ns, EdgePlace(file, piece))
+            assembly.add(piece.parent, piece.child, piece.components, piece.stamp_ns, Place(file, piece))
     if piece is None:
         raise FormatError("no frames in it", source=file.name)
     assembly.axes |= file.tally.axes

@@ -82,6 +82,11 @@ def _tree(summary: str, module: str, **fields: Any) -> Format:
     return Format(summary, reads=("tree",), reader=module, writes=("tree",), writer=module, **fields)
 
 
+def _read_tree(summary: str, module: str, **fields: Any) -> Format:
+    """Return the row of a form of trees that one module reads and none writes."""
+    return Format(summary, reads=("tree",), reader=module, **fields)
+
+
 def _arrays(
     summary: str, module: str, *, writes: tuple[str, ...] = ("poses", "points", "arrays"), **fields: Any
 ) -> Format:
@@ -96,7 +101,6 @@ DH = ("standard", "modified")
 _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
 _TABLE = "frametool.stream.table_samples"
-_ARROW = "frametool.formats.rows.arrow_files"
 BAG = "frametool.ros.bags"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
@@ -135,6 +139,7 @@ _ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.ech
 _CALLS = Format("", writes=("poses", "tree"), writer="frametool.ros.publisher")
 _LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), states="metres")
 _LAS_HEAD = rb"LASF.{100}"
+_ARROW = _arrays("", "frametool.formats.rows.arrow_files", texts=True)
 
 FORMATS = {
     "yaml": Format(
@@ -351,26 +356,23 @@ FORMATS = {
         states="target<-source as each key says, camera<-object by rvec and tvec; metres",
         asks=("direction", "frames"),
     ),
-    "euroc-sensor": Format(
+    "euroc-sensor": _read_tree(
         "sensor.yaml of EuRoC",
-        reads=("tree",),
-        reader="frametool.formats.trees.camchain",
+        "frametool.formats.trees.camchain",
         signs=(("yaml key", "T_BS"),),
         states="T_BS is body<-sensor, metres",
         asks=("frames",),
     ),
-    "kitti-calib": Format(
+    "kitti-calib": _read_tree(
         "KITTI calibration",
-        reads=("tree",),
-        reader="frametool.formats.trees.kitti_calib",
+        "frametool.formats.trees.kitti_calib",
         signs=(("text", _KITTI),),
         states="parent<-child, metres, optical axes of cameras",
         asks=("frames",),
     ),
-    "drake": Format(
+    "drake": _read_tree(
         "Drake model directives",
-        reads=("tree",),
-        reader="frametool.formats.robots.drake",
+        "frametool.formats.robots.drake",
         signs=(("yaml key", "directives"),),
         states="parent<-frame, metres, degrees, rpy about fixed axes",
     ),
@@ -380,18 +382,16 @@ FORMATS = {
         signs=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
         states="effector (base if not on the hand)<-tracking base, metres, x y z w",
     ),
-    "nuscenes": Format(
+    "nuscenes": _read_tree(
         "nuScenes table",
-        reads=("tree",),
-        reader="frametool.formats.trees.nuscenes",
+        "frametool.formats.trees.nuscenes",
         signs=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
         states="ego<-sensor, global<-ego, metres, w first, microseconds",
         asks=("frames",),
     ),
-    "dh": Format(
+    "dh": _read_tree(
         "Denavit-Hartenberg table",
-        reads=("tree",),
-        reader="frametool.formats.robots.dh",
+        "frametool.formats.robots.dh",
         signs=(("text", _DH),),
         states="parent<-child, metres, radians unless their names say deg",
         asks=("dh", "frames"),
@@ -411,11 +411,10 @@ FORMATS = {
         signs=(("xml", "mujoco"),),
         states="parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)",
     ),
-    "sdf": Format(
+    "sdf": _read_tree(
         "SDF of Gazebo",
+        "frametool.formats.robots.sdf",
         suffixes=(".sdf", ".world"),
-        reads=("tree",),
-        reader="frametool.formats.robots.sdf",
         signs=(("xml", "sdf"),),
         states="parent<-child, metres, radians unless degrees; frames are model::link",
     ),
@@ -466,26 +465,20 @@ FORMATS = {
     ),
     "las": _LAS._replace(summary="LAS laser scan", suffixes=(".las",), signs=(("magic", _LAS_HEAD + rb"[\x00-\x7f]"),)),
     "laz": _LAS._replace(summary="LAZ laser scan", suffixes=(".laz",), signs=(("magic", _LAS_HEAD + rb"[\x80-\xff]"),)),
-    "parquet": _arrays(
-        "Parquet (pip install 'frametool[arrow]')",
-        _ARROW,
+    "parquet": _ARROW._replace(
+        summary="Parquet (pip install 'frametool[arrow]')",
         suffixes=(".parquet", ".pq"),
         signs=(("magic", rb"PAR1"),),
-        texts=True,
     ),
-    "arrow": _arrays(
-        "a file of Arrow, Feather (pip install 'frametool[arrow]')",
-        _ARROW,
+    "arrow": _ARROW._replace(
+        summary="a file of Arrow, Feather (pip install 'frametool[arrow]')",
         suffixes=(".arrow", ".feather", ".ipc"),
         signs=(("magic", rb"ARROW1"),),
-        texts=True,
     ),
-    "arrows": _arrays(
-        "a stream of Arrow (pip install 'frametool[arrow]')",
-        _ARROW,
+    "arrows": _ARROW._replace(
+        summary="a stream of Arrow (pip install 'frametool[arrow]')",
         suffixes=(".arrows",),
         signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
-        texts=True,
     ),
     "feather1": Format(
         "Feather of the first version",

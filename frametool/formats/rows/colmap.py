@@ -58,7 +58,7 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:  # noqa: ARG0
             of_frames |= comments and "Frame list" in bare
             continue
         comments = False
-        yield _frame(file, number, bare) if of_frames else _image(file, number, bare)
+        yield _pose(file, number, bare, of_frame=of_frames)
         if not of_frames:
             next(lines, None)
 
@@ -68,23 +68,13 @@ def read(file: InputFile, options: Options) -> Iterator[Samples]:
     return samples(poses(file, options), POSES, file, options)
 
 
-def _image(file: InputFile, number: int, line: str) -> Written:
-    words = line.split(maxsplit=9)  # the name may hold blanks
-    if len(words) != 10:
-        raise FormatError(f"expected 10 words ({IMAGE_LINE}), found {len(words)}", source=file.name, line=number)
-    w, x, y, z, *position = numbers_in(file, number, words[1:8])
-    return Written((*position, w, x, y, z), _count(file, number, words[0]), number, words[9])
-
-
-def _frame(file: InputFile, number: int, line: str) -> Written:
-    words = line.split()
-    if len(words) < 9:
-        raise FormatError(f"expected {FRAME_LINE} .., found {len(words)} words", source=file.name, line=number)
-    w, x, y, z, *position = numbers_in(file, number, words[2:9])
-    return Written((*position, w, x, y, z), _count(file, number, words[0]), number)
-
-
-def _count(file: InputFile, number: int, word: str) -> int:
-    if not word.isdecimal():
-        raise FormatError(f"expected an id, found {shown(word)}", source=file.name, line=number)
-    return int(word)
+def _pose(file: InputFile, line: int, text: str, *, of_frame: bool) -> Written:
+    words = text.split(maxsplit=9)  # the name of a picture may hold blanks
+    if of_frame and len(words) < 9:
+        raise FormatError(f"expected {FRAME_LINE} .., found {len(words)} words", source=file.name, line=line)
+    if not of_frame and len(words) != 10:
+        raise FormatError(f"expected 10 words ({IMAGE_LINE}), found {len(words)}", source=file.name, line=line)
+    w, x, y, z, *position = numbers_in(file, line, words[1 + of_frame : 8 + of_frame])
+    if not words[0].isdecimal():
+        raise FormatError(f"expected an id, found {shown(words[0])}", source=file.name, line=line)
+    return Written((*position, w, x, y, z), int(words[0]), line, "" if of_frame else words[9])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
 from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, rows_of_matrix
-from frametool.formats.rows.trajectory import Written, samples
+from frametool.formats.rows.trajectory import Written, position_and_turn, samples
 from frametool.formats.table import Poses
 from frametool.grammar.readers import Misfit, Note, as_mapping, kind, read_numbers, within
 
@@ -62,10 +62,8 @@ def _pose(entry: Any, index: int) -> Written:
     rows = [within((MATRIX, at), read_numbers, row, "1234") for at, row in enumerate(matrix)]
     if rows[3:] not in ([], [LAST_ROW]):
         raise Misfit("the last row of a pose is 0 0 0 1", (MATRIX, 3))
-    position = [row[3] for row in rows[:3]]
     image = frame.get("file_path")
-    turn = [number for row in rows[:3] for number in row[:3]]
-    return Written((*position, *turn), index, image=image if type(image) is str else "")
+    return Written(position_and_turn(rows), index, image=image if type(image) is str else "")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Samples]:

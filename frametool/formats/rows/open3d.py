@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from frametool.documents.document import parse_documents
 from frametool.errors import FormatError
 from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix
-from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
+from frametool.formats.rows.trajectory import Written, numbers_in, position_and_turn, samples, text_lines
 from frametool.formats.table import Poses
 from frametool.grammar.readers import Misfit, as_mapping, read_numbers, within
 
@@ -29,9 +29,8 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
 
-FRAMES = ("world", "camera")
-LOG = Poses("matrix", axes="optical", frames=FRAMES)
-EXTRINSIC = Poses("matrix", inverse=True, axes="optical", frames=FRAMES)
+LOG = Poses("matrix", axes="optical", frames=("world", "camera"))
+EXTRINSIC = LOG._replace(inverse=True)
 LAST_ROW = [0.0, 0.0, 0.0, 1.0]
 ROWS = RowForm(
     ("number", b" ", "number", b" ", "next", b"\n", *(Numbers(4), b"\n") * 3, b"0.0 0.0 0.0 1.0\n"),
@@ -71,7 +70,7 @@ def _blocks(file: InputFile) -> Iterator[Written]:
             rows.append(numbers_in(file, at, row))
         if rows[3] != LAST_ROW:
             raise FormatError("the last row of a pose is 0 0 0 1", source=file.name, line=at)
-        yield Written(_position_and_rows(rows), int(words[0]), number)
+        yield Written(position_and_turn(rows), int(words[0]), number)
 
 
 def _parameters(file: InputFile) -> Iterator[Written]:
@@ -86,13 +85,9 @@ def _parameters(file: InputFile) -> Iterator[Written]:
             rows = [list(numbers[row::4]) for row in range(4)]
             if rows[3] != LAST_ROW:
                 raise Misfit("the last row of a pose is 0 0 0 1; an extrinsic stands column by column", path)
-            yield Written(_position_and_rows(rows), index, path=(document.index, *path))
+            yield Written(position_and_turn(rows), index, path=(document.index, *path))
     except Misfit as misfit:
         raise misfit.placed(file.source, document.index) from None
-
-
-def _position_and_rows(rows: list[list[float]]) -> tuple[float, ...]:
-    return (*(row[3] for row in rows[:3]), *(number for row in rows[:3] for number in row[:3]))
 
 
 def read(file: InputFile, options: Options) -> Iterator[Samples]:

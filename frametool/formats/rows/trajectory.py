@@ -192,6 +192,11 @@ def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
         yield from enumerate(text.split("\n"), piece.line)
 
 
+def position_and_turn(rows: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    """Return the numbers of a pose from the rows of its matrix, as `Written` has them."""
+    return (*(row[3] for row in rows[:3]), *(number for row in rows[:3] for number in row[:3]))
+
+
 def numbers_in(file: InputFile, line: int, words: Sequence[str]) -> list[float]:
     """Read the words of a line as numbers; raises FormatError."""
     try:
