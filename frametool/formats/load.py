@@ -333,10 +333,8 @@ class Assembly:
         made: FrameTree | TransformBuffer = self.tree
         if self.buffer is not None:
             made = self.buffer
-            standing = set()
-            if not self.rules.moving:
-                moving = [track.child for track in made.tracks() if not track.standing]
-                standing = {child for child in moving if child not in self._moves}
+            single = (track.child for track in made.tracks() if not track.standing and track.child not in self._moves)
+            standing = set() if self.rules.moving else set(single)
             for child in standing:
                 made.make_stand(child)
             self._tell_replaced(standing)

@@ -572,7 +572,7 @@ def is_trajectory(name: str) -> bool:
 
 def holds_arrays(name: str) -> bool:
     """Tell whether a form holds columns of numbers and no text."""
-    return name in FORMATS and not {"arrays"}.isdisjoint((*FORMATS[name].reads, *FORMATS[name].writes))
+    return name in FORMATS and "arrays" in (*FORMATS[name].reads, *FORMATS[name].writes)
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:

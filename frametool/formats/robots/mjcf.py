@@ -201,10 +201,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
 
     Raises FormatError.
     """
-    try:
-        xml = XmlFile(file)
-    finally:
-        file.close()
+    xml = XmlFile(file)
     root = read_nodes(xml, HELD)
     links = MjcfModel(root, Options(Tally(), Topics())).links.values()
     joints = [joint for link in links for joint in link.joints]  # a body's before those of the bodies in it

@@ -316,11 +316,8 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
     holder, dot, rest = name.partition(".")
     if dot and holder in _HOLDERS:
         return _with_unit(rest, joints)
-    if match := BRACKETS.search(name):
-        return name[: match.start()], match[1]
-    if match := _UNIT.search(name):
-        return name[: match.start()], match[1]
-    return name, ""
+    match = BRACKETS.search(name) or _UNIT.search(name)
+    return (name[: match.start()], match[1]) if match else (name, "")
 
 
 def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, bool] | None:

@@ -152,19 +152,20 @@ class SdfFrames:
             for holder in scope.holder.children:
                 if holder.tag == "include":
                     name = shown(holder.text_of("name") or holder.text_of("uri"))
-                    message = (
-                        f"<include> {name} is left out, it needs other files; with them: gz sdf -p FILE > whole.sdf"
-                    )
-                    self.options.tally.note_each(message, holder.line)
+                    remedy = "it needs other files; with them: gz sdf -p FILE > whole.sdf"
+                    self.note(holder, f"<include> {name} is left out, {remedy}")
                 elif holder.tag == "state":
-                    message = "<state> is left out: every model stands where its own pose has it"
-                    self.options.tally.note_each(message, holder.line)
+                    self.note(holder, "<state> is left out: every model stands where its own pose has it")
                 elif holder.tag in ("model", "link", "joint", "frame"):
                     frame = self._named(holder, scope)
                     if holder.tag == "model":
                         scopes.append(frame)
                     for sensor in holder.all("sensor"):
                         self.sensors.append(SdfFrame("sensor", self._name(sensor), frame, sensor))
+
+    def note(self, holder: XmlNode, message: str) -> None:
+        """Note what is odd about an element."""
+        self.options.tally.note_each(message, holder.line)
 
     def _name(self, holder: XmlNode) -> str:
         name = holder.attribute("name")
@@ -179,8 +180,7 @@ class SdfFrames:
             raise holder.error(f"the name {shown(frame.local)} is reserved", "name")
         known = self.all.get(frame.name)
         if known is not None and self.version < (1, 7) and holder.tag == "joint" and known.kind == "link":
-            message = f"joint {shown(frame.local)} has the name of a link; its frame is {frame.local}_joint"
-            self.options.tally.note_each(message, holder.line)
+            self.note(holder, f"joint {shown(frame.local)} has the name of a link; its frame is {frame.local}_joint")
             frame = SdfFrame("joint", f"{frame.local}_joint", scope, holder)
             known = self.all.get(frame.name)
         if known is not None:
@@ -200,8 +200,7 @@ class SdfFrames:
                 if error is not self.missing:
                     raise
                 lost.append(frame)
-                message = f"{frame.kind} {shown(frame.name)} is left out: {error.message}"
-                self.options.tally.note_each(message, frame.holder.line)
+                self.note(frame.holder, f"{frame.kind} {shown(frame.name)} is left out: {error.message}")
         self.gone |= {frame.name for frame in lost}
         self.all = {name: each for name, each in self.all.items() if not self._is_gone(each)}
         self.sensors = [each for each in self.sensors if not self._is_gone(each)]
@@ -403,8 +402,8 @@ class SdfJoints:
         if parent is None or child is None or parent is child:
             raise holder.error(f"joint {shown(frame.local)} does not connect two links")
         if kind in STILL:
-            message = f"joint {shown(frame.local)} is a {kind}: it stands as in the file and takes no value"
-            self.frames.options.tally.note_each(message, holder.line)
+            named = f"joint {shown(frame.local)} is a {kind}"
+            self.frames.note(holder, f"{named}: it stands as in the file and takes no value")
         hanging, outer = (parent, child) if child.kind == WORLD else (child, parent)
         return SdfJoint(frame, parent, child, self._motions(frame, kind), hanging, outer)
 
@@ -422,8 +421,7 @@ class SdfJoints:
                 direction, mimic = self._direction(frame, axis), self._mimic(frame, axis)
                 motions.append(Joint(called, plain, direction, lower, upper, mimic, line=line))
             else:
-                message = f"joint {shown(frame.local)} has no <{tag}>: it takes no value there"
-                self.frames.options.tally.note_each(message, line)
+                self.frames.note(frame.holder, f"joint {shown(frame.local)} has no <{tag}>: it takes no value there")
         return tuple(motions)
 
     def _direction(self, frame: SdfFrame, axis: XmlNode) -> Vector:

@@ -51,7 +51,7 @@ KEYS = (
     ("T<letter><letter>", "<a>", "<b>"),  # ORB-SLAM3: Tbc
 )
 # these name two frames, and people write both directions so
-ASKED = ("(?:T_)?<a>_to_<b>", "(?:T_)?<a>2<b>")
+ASKED = (("(?:T_)?<a>_to_<b>", "<a>", "<b>"), ("(?:T_)?<a>2<b>", "<a>", "<b>"))
 # two keys side by side, a rotation (3x3, or a rotation vector of three numbers) and a translation, and the frames they
 # are about: together they take points of the second to the first; without frames their direction is asked for
 PAIRS = (
@@ -98,16 +98,14 @@ def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -
     known: names for what stands in braces; frames: names that the user told, which may be parts of the key.
     """
     last = key.rpartition(".")[2]
-    for pattern in ASKED:
-        if ways := _ways(pattern, last, frames):
-            parent, child = ways[0]
-            return Ambiguous(tuple(ways)) if len(ways) > 1 else Meaning(parent, child, child, said=False)
-    for pattern, target, source in KEYS:
+    for row in (*ASKED, *KEYS):
+        pattern, target, source = row
         if ways := _ways(pattern, last, frames):
             if len(ways) > 1:
                 return Ambiguous(tuple(ways))
             names = {"<a>": ways[0][0], "<b>": ways[0][1]} | {f"{{{name}}}": frame for name, frame in known.items()}
-            return Meaning(names[target], names[source], names["{me}" if "{me}" in (target, source) else source])
+            child = names["{me}" if "{me}" in (target, source) else source]
+            return Meaning(names[target], names[source], child, said=row not in ASKED)
     return None
 
 

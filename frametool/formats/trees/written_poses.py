@@ -84,7 +84,8 @@ def angles_of(rotation: Quaternion) -> tuple[Three[float], Quaternion]:
 
 def of_angles(angles: Iterable[float]) -> Quaternion:
     """Return the rotation that roll, pitch and yaw are read as."""
-    return quaternion.canonical(*euler.to_quaternion(*angles, "sxyz", floats), floats)
+    roll, pitch, yaw = angles
+    return quaternion.canonical(*euler.to_quaternion(roll, pitch, yaw, "sxyz", floats), floats)
 
 
 def rows_of(pose: Rigid) -> tuple[list[list[float]], Rigid]:
