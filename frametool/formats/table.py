@@ -208,29 +208,25 @@ FORMATS = {
         columns=("t", "x", "y", "z", "qx", "qy", "qz", "qw"),
         poses=Poses("xyzw", counted=""),
     ),
-    "echo": Format(
+    "echo": _read_tree(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
-        reads=("tree",),
-        reader=_MESSAGES,
+        _MESSAGES,
         signs=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
     ),
-    "jsonl": Format(
+    "jsonl": _read_tree(
         "messages as JSON, one a line (rosbridge, Foxglove)",
-        reads=("tree",),
-        reader=_MESSAGES,
+        _MESSAGES,
         signs=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
     ),
-    "csv1": Format("CSV of `rostopic echo -p`", reads=("tree",), reader=_MESSAGES, signs=(("line", "%time,"),)),
-    "csv2": Format(
+    "csv1": _read_tree("CSV of `rostopic echo -p`", _MESSAGES, signs=(("line", "%time,"),)),
+    "csv2": _read_tree(
         "CSV of `ros2 topic echo --csv`",
-        reads=("tree",),
-        reader=_MESSAGES,
+        _MESSAGES,
         signs=(("line", r"-?\d{1,12},\d{1,10},[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$"),),
     ),
-    "calls": Format(
+    "calls": _read_tree(
         "static_transform_publisher calls",
-        reads=("tree",),
-        reader="frametool.ros.publisher",
+        "frametool.ros.publisher",
         signs=(
             ("line", r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]"),
             # numbers and two names: poses of a trajectory are numbers only
@@ -238,14 +234,13 @@ FORMATS = {
         ),
     ),
     "bag1": Format("ROS 1 bag", (".bag",), ("tree",), BAG, signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),)),
-    "bag2": Format(
+    "bag2": _read_tree(
         "ROS 2 bag: sqlite3, or a folder",
+        BAG,
         suffixes=(".db3",),
-        reads=("tree",),
-        reader=BAG,
         signs=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
     ),
-    "mcap": Format("MCAP file", (".mcap",), ("tree",), BAG, signs=(("magic", rb"\x89MCAP0\r\n"),)),
+    "mcap": _read_tree("MCAP file", BAG, suffixes=(".mcap",), signs=(("magic", rb"\x89MCAP0\r\n"),)),
     "ros1": _ECHO._replace(summary="messages as `rostopic echo` prints them"),
     "ros2": _ECHO._replace(summary="messages as `ros2 topic echo` prints them"),
     "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),

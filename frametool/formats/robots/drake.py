@@ -100,8 +100,7 @@ class _Scene:
         positions = within((JOINTS,), as_mapping, model.get(JOINTS, {}), "positions of joints")
         if positions and isinstance(found, Recording):
             self._say_joints(found, positions, (*path, JOINTS))
-        free = within((BODIES,), as_mapping, model.get(BODIES, {}), "poses of bodies")
-        for body, pose in free.items():
+        for body, pose in within((BODIES,), as_mapping, model.get(BODIES, {}), "poses of bodies").items():
             here = (*path, BODIES, body)
             with_base = within(here[-2:], as_mapping, pose, "a pose")
             child = f"{name}::{body}" if body else name  # "" is the only body that a model has

@@ -165,14 +165,14 @@ class Posture:
     def _take_options(self) -> None:
         """Read what `--joint` says; it wins over files."""
         for name, text in self._options.answers.joints.items():
-            place = f"--joint {name}={text}"
             joint = self.joints.get(name)
             if joint is None:
                 problem = unknown_joint(name, self.joints, self._fixed)
                 self._options.tally.unknown_joints[name] = BadAnswer(f"--joint: {problem}")
                 continue
             try:
-                value = read_value(joint, text, Source(place, text), normalize=self._options.normalize)
+                source = Source(f"--joint {name}={text}", text)
+                value = read_value(joint, text, source, normalize=self._options.normalize)
             except ValueInvalid as error:
                 raise BadAnswer(f"--joint {shown(name)}: {error}") from None
             self._take(name, [(None, value)])
@@ -197,11 +197,10 @@ class Posture:
         mimic = self.joints[name].mimic
         if name in self.still or name in self.moving or mimic is None or mimic.joint in self._fixed:
             return None
-        if mimic.joint not in self.joints:
-            raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is no joint")
-        if self.joints[mimic.joint].posed:
-            kind = self.joints[mimic.joint].kind
-            raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {kind}")
+        leader = self.joints.get(mimic.joint)
+        if leader is None or leader.posed:
+            which = "no joint" if leader is None else leader.kind
+            raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {which}")
         return mimic.joint
 
     def _settle(self, joint: Joint) -> None:

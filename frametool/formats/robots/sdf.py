@@ -438,8 +438,7 @@ class SdfJoints:
         elif version < (1, 5) or (version < (1, 7) and axis.text_of("use_parent_model_frame").lower() in TRUE):
             outer = frame.scope  # before 1.5 an axis is seen from the model, until 1.6 where it says so
         if outer is not frame:
-            turned = self.frames.relative(frame, outer)[3:]
-            x, y, z = quaternion.rotate(*turned, x, y, z)
+            x, y, z = quaternion.rotate(*self.frames.relative(frame, outer)[3:], x, y, z)
         return unit_vector(x, y, z, floats)
 
     def _limit(self, limit: XmlNode | None, which: str) -> float | None:

@@ -80,8 +80,7 @@ def _value(xml: XmlFile, element: Element, text: str) -> Any:
     words = text.split()
     if len(words) <= 1:
         return words[0] if words else ""
-    numbers = xml.numbers(element, "value", 3 if len(words) == 3 else 7)
-    texts = [repr(number) for number in numbers]
+    texts = [repr(number) for number in xml.numbers(element, "value", 3 if len(words) == 3 else 7)]
     if len(texts) == 3:
         return {"xyz": [*texts[:2], "0"], "rpy": ["0", "0", texts[2]]}
     return {"xyz": texts[:3], "xyzw": texts[3:]}

@@ -87,8 +87,7 @@ class NpzFile(npy.NpyFile):
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Return what writes a file with the same arrays."""
-        inner = super().rewriter(columns, style, drops=drops)
-        return NpzWriter(inner, self.member, self)
+        return NpzWriter(super().rewriter(columns, style, drops=drops), self.member, self)
 
 
 class NpzWriter:

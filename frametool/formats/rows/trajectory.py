@@ -188,8 +188,7 @@ class StampFile:
 def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
     """Yield the lines of a file with their numbers, in bounded memory."""
     for piece in lines(file.stream, file.name):
-        text = piece.text.removesuffix("\n")
-        yield from enumerate(text.split("\n"), piece.line)
+        yield from enumerate(piece.text.removesuffix("\n").split("\n"), piece.line)
 
 
 def position_and_turn(rows: Sequence[Sequence[float]]) -> tuple[float, ...]:

@@ -182,8 +182,7 @@ class Calibration:
         for name, camera in names.items():
             if field := self.fields.get(name):
                 self.options.tally.about = f"{name}: {camera}_rect<-{camera}; P0 .. P3 are about rectified cameras"
-                turned = self._turn(name, field.texts)
-                yield camera, f"{camera}_rect", rigid.inverse(0.0, 0.0, 0.0, *turned), field.line
+                yield camera, f"{camera}_rect", rigid.inverse(0.0, 0.0, 0.0, *self._turn(name, field.texts)), field.line
 
     def _baselines(self) -> Iterator[tuple[str, str, Rigid, int]]:
         """Yield where projections have their cameras, on the x axis of the rectified first one."""

@@ -84,8 +84,7 @@ class StoredXml:
         self.value: dict[str, Any] = {}
         self._elements: dict[Path, Element] = {}
         elements = iter(xml.elements())
-        root = next(elements)
-        self._elements[()] = root
+        self._elements[()] = next(elements)
         inside = self._inside(elements, ())
         self.value = inside if type(inside) is dict else {}
 
