@@ -70,10 +70,6 @@ class Output:
         """Tell whether the form is that of the poses of one frame over time."""
         return is_trajectory(self.style.form)
 
-    def use(self, notations: tuple[Notation, ...]) -> None:
-        """Write rotations in these notations."""
-        self.style = self.style.in_notations(notations)
-
     @property
     def _holds_arrays(self) -> bool:
         return holds_arrays(self.style.form)
