@@ -44,7 +44,13 @@ class RowFrames:
         self, task: PoseTask, tree: FrameTree | TransformBuffer, target: str | None, source: str | None, at: int | None
     ) -> int:
         """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
-        fixed_target, fixed_source = self._fixed(target, source)
+        if self.target is not None and source is None:
+            target, source = None, target
+        for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
+            if (name is None) == (column is None):
+                raise click.UsageError(f"name {option} or its column, one of the two")
+        fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
+        frames = tuple(name for name in (self.target, self.source) if name is not None)
 
         def edge_of(names: str) -> Rigid:
             cells = names.split("\0") if len(frames) == 2 else [names]
@@ -52,18 +58,6 @@ class RowFrames:
                 raise UnknownFrame(names, known=tree.frames)  # a NUL in a cell is no end of a name
             return tree.lookup(fixed_target or cells[0], fixed_source or cells[-1], at).components
 
-        fixed_target = fixed_target and frame_name(fixed_target, tree)
-        fixed_source = fixed_source and frame_name(fixed_source, tree)
-        frames = tuple(name for name in (self.target, self.source) if name is not None)
         forms = task.output.notations or (notation("quaternion"),)
         request = task.request(poses=0, frames=frames, edge_of=edge_of, notations=forms)
         return task.stream.run(request, task.output, tables_only=True)
-
-    def _fixed(self, target: str | None, source: str | None) -> tuple[str | None, str | None]:
-        """Return the frames named on the command line; each frame is named once."""
-        if self.target is not None and source is None:
-            target, source = None, target
-        for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
-            if (name is None) == (column is None):
-                raise click.UsageError(f"name {option} or its column, one of the two")
-        return target, source

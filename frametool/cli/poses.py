@@ -267,16 +267,12 @@ def factors_of(arguments: Iterable[str]) -> list[Factor]:
 
 def _factor(text: str, *, is_inverse: bool) -> Factor:
     bare = text.strip()
-    while True:
-        if bare.startswith("~") and len(bare) > 1:
-            bare = bare[1:].strip()
-        elif bare.startswith(f"{INVERSE}(") and bare.endswith(")"):
-            bare = bare[len(INVERSE) + 1 : -1].strip()
-        else:
-            return Factor(bare if bare != text.strip() else text, is_inverse)
+    while found := re.fullmatch(rf"~(.+)|{INVERSE}\((.*)\)", bare, re.DOTALL):
+        bare = (found[1] or found[2]).strip()
         if not bare:
             raise click.UsageError(f"{shown(text)}: there is no pose whose inverse is meant")
         is_inverse = not is_inverse
+    return Factor(bare if bare != text.strip() else text, is_inverse)
 
 
 def combinations(arguments: Sequence[str | Factor], request: Request) -> list[tuple[Pose, ...]]:

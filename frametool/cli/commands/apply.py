@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -54,20 +55,8 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @pose_result_options("points", "trajectory")
 @explain_options
-@click.option(
-    "--frame-column",
-    "frame_column",
-    type=ColumnNames(),
-    metavar="NAME",
-    help="column with each row's frame, without SOURCE",
-)
-@click.option(
-    "--time-column",
-    "time_column",
-    type=ColumnNames(),
-    metavar="NAME",
-    help="column or key of each row's own time",
-)
+@click.option("--frame-column", type=ColumnNames(), metavar="NAME", help="column with each row's frame, without SOURCE")
+@click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of each row's own time")
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
 @reading_options(streams=True)
@@ -282,23 +271,21 @@ def _begins_number(argument: str) -> bool:
     return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
+def _is_apart(argument: str) -> bool:
+    """Tell what is no number of a point: a record, a text that was pasted, or nothing."""
+    return not argument or _is_record(argument) or (not _begins_number(argument) and is_pasted(argument))
+
+
 def _sources(arguments: Sequence[str], kind: str | None) -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
-    pending: list[str] = []
-    for argument in (*arguments, ""):
-        if argument and not (_is_record(argument) or (not _begins_number(argument) and is_pasted(argument))):
-            pending.append(argument)
-            continue
-        for x, y, z in _threes(pending, kind):
-            yield Source("argument", f'{{"{kind or "point"}": [{x!r}, {y!r}, {z!r}]}}')
-        pending = []
-        if argument:
-            yield argument
+    for are_apart, group in groupby(arguments, _is_apart):
+        texts = list(group)
+        yield from filter(None, texts) if are_apart else _points(texts, kind)
 
 
-def _threes(texts: Sequence[str], kind: str | None) -> Iterator[Sequence[float]]:
+def _points(texts: Sequence[str], kind: str | None) -> Iterator[Source]:
     """Take bare numbers three at a time."""
-    if texts and kind not in (None, "point", "vector"):
+    if kind not in (None, "point", "vector"):
         raise click.UsageError(f"a {kind} is a mapping, e.g. '{{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}'")
     try:
         numbers = [parse_number(text) for text in texts]
@@ -308,4 +295,5 @@ def _threes(texts: Sequence[str], kind: str | None) -> Iterator[Sequence[float]]
         raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
     if len(numbers) % 3:
         raise click.UsageError(f"points are three numbers each, found {len(numbers)}")
-    yield from (numbers[at : at + 3] for at in range(0, len(numbers), 3))
+    for at in range(0, len(numbers), 3):
+        yield Source("argument", f'{{"{kind or "point"}": {numbers[at : at + 3]}}}')

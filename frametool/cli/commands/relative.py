@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--time-column",
-    "time_column",
     type=ColumnNames(),
     metavar="NAME",
     help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
