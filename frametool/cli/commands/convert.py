@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from frametool.stream.request import Operation
 
 
-AXES = 3
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
-
-
 class ConvertCommand(Command):
     """A command whose help lists the representations."""
 
@@ -100,7 +96,7 @@ def command(
     operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
     forms = output.notations or (notation("quaternion"),)
     request = task.request(operation=operation, notations=forms, unwrap=unwrap)
-    if values or stream.path or not operation.turns or stream.has_input():
+    if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
     is_numbers = _are_numbers(values, has_from=request.given is not None)
     if len(values) == 1 and not (is_numbers or stream.path) and task.has_table(values[0]):
@@ -115,7 +111,7 @@ def command(
     results: list[Any]
     sources: Sequence[str | Source] = ()
     if is_numbers or not values:
-        pose = pose_from_numbers(values, request) if values else Pose(rotation=IDENTITY)
+        pose = pose_from_numbers(values, request) if values else Pose()
         results = [Result(_changed(pose, operation))]
     else:
         sources = [pose_source(each, request) for each in values] if task.derives else values
@@ -163,7 +159,7 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool)
         read = [parse_angle(text) for text in find.split(",")]
     except ValueInvalid as error:
         raise click.UsageError(f"--find: {error}") from None
-    if len(read) != AXES:
+    if len(read) != 3:
         raise click.UsageError(f"--find takes three angles like 0.1,0,pi/2; found {len(read)}")
     angles = [radians(angle) if unit == "deg" or (degrees and unit is None) else angle for angle, unit in read]
     axes = find_euler(Rotation.of(*poses[0].rotation), angles, tolerance=tolerance)
@@ -202,11 +198,9 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
 
 def _say_other_side(axes: str | None, world: str | None) -> None:
     """Tell what changes the axes of the other frame of a pose where such conventions come in pairs."""
-    if (axes is None) == (world is None):
-        return
     from frametool.geometry.conventions import other_side
 
-    if axes and (other := other_side(axes, of_world=False)):
+    if axes and world is None and (other := other_side(axes, of_world=False)):
         say(f"note: the frame that poses are seen from keeps its axes; --world-axes {other} changes them")
-    if world and (other := other_side(world, of_world=True)):
+    if world and axes is None and (other := other_side(world, of_world=True)):
         say(f"note: the frames that these are the poses of keep their axes; --axes {other} changes them")
