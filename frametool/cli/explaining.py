@@ -1,4 +1,4 @@
-"""`--explain`: the derivation with this run's numbers in place of the result."""
+"""What commands on poses share: their stream, their output, and `--explain`, the derivation in place of the result."""
 
 from __future__ import annotations
 
@@ -7,22 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import FULL, together
+from frametool.cli.options import FULL, pose_reading_options, together
+from frametool.cli.output import Output
+from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of
+from frametool.cli.streaming import Stream, stream_options
 from frametool.errors import FormatError, heard_by
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from typing import TypeVar
-
-    from frametool.cli.output import Output
-    from frametool.cli.streaming import Stream
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.given import Given
     from frametool.explain.render import Explanation
-    from frametool.geometry.representations import Notation
-
-    Function = TypeVar("Function", bound=Callable[..., Any])
+    from frametool.stream.request import Request
 
 FORMS = ("text", "markdown", "latex")
 ONE_RECORD = "--explain derives one record; write it as an argument"
@@ -31,38 +27,81 @@ EXPLAIN = click.option(
 )  # fmt: skip
 
 
-def explain_options(function: Function) -> Function:
-    """Add to a command the options of derivations; `Explaining` takes them."""
-    every = click.option("--explain-full", is_flag=True, help="that with all products of long chains")
-    return together(EXPLAIN, every)(function)
+explain_options = together(
+    EXPLAIN, click.option("--explain-full", is_flag=True, help="that with all products of long chains")
+)
+pose_stream_options = together(stream_options, pose_reading_options)
 
 
-class Explaining:
-    """Whether a derivation is wanted, and in which form; true if one is."""
+class PoseTask:
+    """What the options of a command on poses say.
 
-    def __init__(self, options: dict[str, Any]) -> None:
-        """Take the options out of a command's; `--explain-full` alone wants text."""
-        self.every: bool = options.pop("explain_full")
-        self.form: str = options.pop("explain") or ("text" if self.every else "")
-        self._precision: int | None = options.get("precision")
+    derives: whether the derivation is wanted instead of the result
+    """
 
-    def __bool__(self) -> bool:
-        """Return whether a derivation is wanted."""
-        return bool(self.form)
+    def __init__(self, options: dict[str, Any], *what: str) -> None:
+        """Take the options out of a command's; `--explain-full` alone wants text.
 
-    def plan(self, output: Output, stream: Stream | None = None) -> DerivationStyle:
+        what: the results that the command writes
+        """
+        self._every: bool = options.pop("explain_full", False)
+        self._form: str = options.pop("explain", None) or ("text" if self._every else "")
+        self._precision: int | None = options["precision"]
+        self.derives = bool(self._form)
+        self.normalize: bool = options.pop("normalize")
+        self.stream = Stream(options)
+        self.output = Output(*what or ("poses",), **options)
+
+    def request(self, **rest: Any) -> Request:
+        """Return what is done with rows and records: they are read as the options say."""
+        from frametool.stream.request import Request
+
+        degrees = self.output.style.degrees
+        return Request(given=self.stream.given, degrees=degrees, normalize=self.normalize, **rest)
+
+    def has_table(self, argument: str) -> bool:
+        """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
+        return not is_pasted(argument, self.stream.given) and self.stream.takes_rows(argument)
+
+    def answer(self, argument: str, request: Request) -> int:
+        """Write the results of the records of one argument: inline, a file, or the stream of the command."""
+        if self.stream.is_wanted(argument) or self.has_table(argument):
+            return self.stream.run(request, self.output)
+        self.output.values(values_of([argument], request, self.output))
+        return 0
+
+    def plan(self) -> DerivationStyle:
         """Return how to derive; refuse what a derivation cannot be: a machine format, a stream."""
         from frametool.explain.derive import DerivationStyle
 
-        if output.told not in (None, "text"):
-            raise click.UsageError(f"--explain writes {', '.join(FORMS)}, not {output.told}; leave one of them out")
-        if stream is not None and stream.path is not None:
+        if self.output.told not in (None, "text"):
+            instead = f"{', '.join(FORMS)}, not {self.output.told}"
+            raise click.UsageError(f"--explain writes {instead}; leave one of them out")
+        if self.stream.path is not None:
             raise click.UsageError(f"-i FILE is a stream; {ONE_RECORD}")
-        return DerivationStyle(output.style, significant(self._precision), self.every)
+        return DerivationStyle(self.output.style, significant(self._precision), self._every)
 
-    def write(self, explanation: Explanation, output: Output) -> int:
+    def written(self, argument: str | Source | None, *, warned: bool = False) -> Given:
+        """Read the one pose of an argument as it is written.
+
+        warned: its warnings are on stderr already
+        """
+        from frametool.explain.given import given_poses
+
+        request = self.request()
+        try:
+            source = pose_source(one_argument(argument), request)
+            with heard_by(lambda *_: None) if warned else nullcontext():
+                found = given_poses(source, degrees=request.degrees, normalize=request.normalize)
+        except FormatError as error:
+            raise usage_if_inline(error) from None
+        if len(found) != 1:
+            raise click.UsageError(f"--explain derives one pose, {source.name} holds {len(found)}")
+        return found[0]
+
+    def write(self, explanation: Explanation) -> int:
         """Write a derivation where the result would go."""
-        output.text(explanation.render(self.form))
+        self.output.text(explanation.render(self._form))
         return 0
 
 
@@ -80,32 +119,3 @@ def one_argument(argument: str | Source | None) -> str | Source:
     if argument in (None, "-"):
         raise click.UsageError(f"standard input is a stream; {ONE_RECORD}")
     return argument or ""
-
-
-def given(
-    argument: str | Source | None, notation: Notation | None = None, *, degrees: bool, normalize: bool,
-    warned: bool = False,
-) -> Given:  # fmt: skip
-    """Read the one pose of an argument as it is written.
-
-    notation: of numbers that do not say theirs.  warned: its warnings are on stderr already.
-    """
-    from frametool.cli.poses import pose_source, usage_if_inline
-    from frametool.explain.given import given_poses
-
-    try:
-        source = pose_source(one_argument(argument), notation, normalize=normalize)
-        with heard_by(lambda *_: None) if warned else nullcontext():
-            found = given_poses(source, degrees=degrees, normalize=normalize)
-    except FormatError as error:
-        raise usage_if_inline(error) from None
-    if len(found) != 1:
-        raise click.UsageError(f"--explain derives one pose, {source.name} holds {len(found)}")
-    return found[0]
-
-
-def all_given(
-    arguments: Sequence[str], notation: Notation | None = None, *, degrees: bool, normalize: bool
-) -> list[Given]:
-    """Read one pose from each argument, as they are written."""
-    return [given(each, notation, degrees=degrees, normalize=normalize) for each in arguments]

@@ -6,32 +6,26 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import ColumnNames
+from frametool.cli.options import ColumnNames, together
 from frametool.cli.trees import frame_name
 from frametool.errors import UnknownFrame
 from frametool.geometry.representations import notation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import TypeVar
 
-    from frametool.cli.output import Output
-    from frametool.cli.streaming import Stream
+    from frametool.cli.explaining import PoseTask
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
 
-    Function = TypeVar("Function", bound=Callable[..., Any])
+
+def _column_option(end: str) -> Callable[..., Any]:
+    about = f"column of a table with each row's {end.upper()}"
+    return click.option(f"--{end}-column", type=ColumnNames(), metavar="NAME", help=about)
 
 
-def column_options(function: Function) -> Function:
-    """Add to a command the options that name columns of frames; `RowFrames` takes them."""
-    function = click.option(
-        "--source-column", type=ColumnNames(), metavar="NAME", help="column of a table with each row's SOURCE"
-    )(function)
-    return click.option(
-        "--target-column", type=ColumnNames(), metavar="NAME", help="column of a table with each row's TARGET"
-    )(function)
+column_options = together(_column_option("target"), _column_option("source"))  # `RowFrames` takes them
 
 
 class RowFrames:
@@ -47,17 +41,16 @@ class RowFrames:
         return self.target is not None or self.source is not None
 
     def run(
-        self,
-        stream: Stream,
-        output: Output,
-        tree: FrameTree | TransformBuffer,
-        *,
-        target: str | None,
-        source: str | None,
-        at: int | None = None,
+        self, task: PoseTask, tree: FrameTree | TransformBuffer, target: str | None, source: str | None, at: int | None
     ) -> int:
         """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
-        fixed_target, fixed_source = self._fixed(target, source)
+        if self.target is not None and source is None:
+            target, source = None, target
+        for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
+            if (name is None) == (column is None):
+                raise click.UsageError(f"name {option} or its column, one of the two")
+        fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
+        frames = tuple(name for name in (self.target, self.source) if name is not None)
 
         def edge_of(names: str) -> Rigid:
             cells = names.split("\0") if len(frames) == 2 else [names]
@@ -65,21 +58,6 @@ class RowFrames:
                 raise UnknownFrame(names, known=tree.frames)  # a NUL in a cell is no end of a name
             return tree.lookup(fixed_target or cells[0], fixed_source or cells[-1], at).components
 
-        fixed_target = fixed_target and frame_name(fixed_target, tree)
-        fixed_source = fixed_source and frame_name(fixed_source, tree)
-        frames = tuple(name for name in (self.target, self.source) if name is not None)
-        forms = output.notations or (notation("quaternion"),)
-        from frametool.stream.request import Request
-
-        request = Request(poses=0, frames=frames, edge_of=edge_of, notations=forms, degrees=output.style.degrees)
-        status = stream.run(request, output, tables_only=True)
-        return status if isinstance(status, int) else 0
-
-    def _fixed(self, target: str | None, source: str | None) -> tuple[str | None, str | None]:
-        """Return the frames named on the command line; each frame is named once."""
-        if self.target is not None and source is None:
-            target, source = None, target
-        for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
-            if (name is None) == (column is None):
-                raise click.UsageError(f"name {option} or its column, one of the two")
-        return target, source
+        forms = task.output.notations or (notation("quaternion"),)
+        request = task.request(poses=0, frames=frames, edge_of=edge_of, notations=forms)
+        return task.stream.run(request, task.output, tables_only=True)

@@ -381,6 +381,12 @@ rotation_options = together(
 # how poses are read; commands have it with `rotation_options`
 pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation")
 
+
+def pose_result_options(*what: str) -> Callable[[Function], Function]:
+    """Add to a command the options that say how poses are read, and those of its result."""
+    return together(rotation_options, pose_options, result_options(*what))
+
+
 # --- times ---------------------------------------------------------------------------------------------------------
 
 LATEST = "latest"

@@ -57,7 +57,9 @@ class Output:
         self.notations = notations or ()
         self._form_is_default = not (self.told or otherwise)
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
-        if holds_arrays(form) and output is None and sys.stdout.isatty():
+        self._holds_arrays = holds_arrays(form)
+        self.is_trajectory = is_trajectory(form)  # of the poses of one frame over time
+        if self._holds_arrays and output is None and sys.stdout.isatty():
             raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
@@ -65,38 +67,22 @@ class Output:
         digits = None if full else precision
         self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
 
-    @property
-    def is_trajectory(self) -> bool:
-        """Tell whether the form is that of the poses of one frame over time."""
-        return is_trajectory(self.style.form)
-
-    def use(self, notations: tuple[Notation, ...]) -> None:
-        """Write rotations in these notations."""
-        self.style = self.style.in_notations(notations)
-
-    @property
-    def _holds_arrays(self) -> bool:
-        return holds_arrays(self.style.form)
-
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""
         if self._holds_arrays or self.is_trajectory:
             self.pieces(self._blocks(iter(results)))
-            return
-        self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))
+        else:
+            self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))
 
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
-        self.pieces(self._batches(results))
+        self.pieces(self._blocks(results) if self._holds_arrays or self.is_trajectory else self._batches(results))
 
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
         """Yield the text of some results after the other, short batches first.
 
         In every form the text of several results begins with that of the first: what follows it is the batch's.
         """
-        if self.is_trajectory or self._holds_arrays:
-            yield from self._blocks(results)
-            return
         write_poses = self._module("frametool.view.pose_text").write_poses
         size = 2
         begin = list(islice(results, size))
@@ -121,7 +107,7 @@ class Output:
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
         if self.is_trajectory:
-            self.poses_as_they_come(map(_as_pose, values))
+            self.poses(map(_as_pose, values))
             return
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
@@ -137,7 +123,7 @@ class Output:
         ):
             if self.is_trajectory:
                 self.style.axes = _axes_of_only_mover(tree, self.style.form)
-            self.poses_as_they_come(sample_results(tree)) if self.is_trajectory else self.poses(sample_results(tree))
+            self.poses(sample_results(tree))
             return
         if self.style.form != "text":
             if loses := FORMATS[self.style.form].loses:

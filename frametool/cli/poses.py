@@ -9,7 +9,7 @@ import os
 import re
 import sys
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,10 +23,9 @@ from frametool.grammar.rotation_spelling import read_spelled, rotation_of, spell
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.cli.output import Output
-    from frametool.cli.streaming import Stream
     from frametool.geometry.representations import Notation
     from frametool.grammar.result import Result
     from frametool.stream.request import Request
@@ -64,9 +63,8 @@ def rewritten(
     source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
     """Return a text that was pasted as one of the grammar; None for one that is."""
-    if source.name == INLINE and len(source.text) <= LONGEST_REMEMBERED:
-        return _rewritten_argument(source, given, normalize=normalize, points=points)
-    return _rewritten(source, given, normalize=normalize, points=points)
+    is_short = source.name == INLINE and len(source.text) <= LONGEST_REMEMBERED
+    return (_rewritten_argument if is_short else _rewritten)(source, given, normalize=normalize, points=points)
 
 
 def _rewritten(source: Source, given: Notation | None, *, normalize: bool, points: bool) -> Source | None:
@@ -185,46 +183,27 @@ def source_of(argument: str | Source) -> Source:
     return Source("stdin", read_text("-"))
 
 
-def pose_source(
-    argument: str | Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
-) -> Source:
+def pose_source(argument: str | Source, request: Request) -> Source:
     """Take an argument as text of the grammar of poses: what was pasted is rewritten, else as `source_of`.
 
-    points: three numbers are a point.
+    Where the request moves records, three numbers are a point.
     """
-    if not isinstance(argument, Source) and is_pasted(argument, given):
+    if not isinstance(argument, Source) and is_pasted(argument, request.given):
         argument = Source(INLINE, argument)
     source = source_of(argument)
     if source.name != INLINE and source.text.lstrip().startswith("<"):
         from frametool.formats.detect import refuse_robots
 
         refuse_robots(source.text.encode(), source.name)
-    return rewritten(source, given, normalize=normalize, points=points) or source
+    points = request.operation.moves
+    return rewritten(source, request.given, normalize=request.normalize, points=points) or source
 
 
-def poses_from(
-    argument: str | Source, given: Notation | None = None, *, degrees: bool = False, normalize: bool = False
-) -> list[Pose]:
-    """Read the poses of one argument: inline, `-` for standard input, or a file.
-
-    given: the notation of numbers that do not say theirs.
-    """
+def poses_from(argument: str | Source, request: Request) -> list[Pose]:
+    """Read the poses of one argument: inline, `-` for standard input, or a file."""
     from frametool.stream.record_values import read_poses
 
-    source = None
-    try:
-        source = pose_source(argument, given, normalize=normalize)
-        return read_poses(source, degrees=degrees, normalize=normalize)
-    except FormatError as error:
-        raise usage_if_inline(_hinting(error, source)) from None
-
-
-def write_results(argument: str, stream: Stream, request: Request, output: Output) -> int:
-    """Write the results of the records of one argument: inline, a file, or the stream of the command."""
-    if stream.is_wanted(argument) or (not is_pasted(argument, request.given) and stream.takes_rows(argument)):
-        return stream.run(request, output)
-    output.values(values_of([argument], request, output))
-    return 0
+    return list(_read(argument, request, partial(read_poses, degrees=request.degrees, normalize=request.normalize)))
 
 
 def values_of(arguments: Sequence[str | Source], request: Request, output: Output) -> Iterator[Result | dict[str, Any]]:
@@ -233,22 +212,21 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
 
     request = request._replace(notations=request.notations or output.notations)
     for argument in arguments:
-        source = None
-        try:
-            points = request.operation.moves
-            source = pose_source(argument, request.given, normalize=request.normalize, points=points)
-            yield from results(source, request, output.style)
-        except FormatError as error:
-            raise usage_if_inline(_hinting(error, source)) from None
+        yield from _read(argument, request, partial(results, request=request, style=output.style))
 
 
-def _hinting(error: FormatError, source: Source | None) -> FormatError:
-    """Return the error to raise for a source; that for a file of frames points to lookup."""
-    if source is None or source.name == INLINE:
-        return error
-    from frametool.formats.detect import with_hint
+def _read(argument: str | Source, request: Request, read: Callable[[Source], Iterable[Any]]) -> Iterator[Any]:
+    """Yield what is read of an argument; the error for a file of frames points to lookup."""
+    source = None
+    try:
+        source = pose_source(argument, request)
+        yield from read(source)
+    except FormatError as error:
+        if source is not None and source.name != INLINE:
+            from frametool.formats.detect import with_hint
 
-    return with_hint(error, source.text.encode(), source.name)
+            error = with_hint(error, source.text.encode(), source.name)
+        raise usage_if_inline(error) from None
 
 
 def usage_if_inline(error: FormatError) -> FormatError:
@@ -289,40 +267,30 @@ def factors_of(arguments: Iterable[str]) -> list[Factor]:
 
 def _factor(text: str, *, is_inverse: bool) -> Factor:
     bare = text.strip()
-    while True:
-        if bare.startswith("~") and len(bare) > 1:
-            bare = bare[1:].strip()
-        elif bare.startswith(f"{INVERSE}(") and bare.endswith(")"):
-            bare = bare[len(INVERSE) + 1 : -1].strip()
-        else:
-            return Factor(bare if bare != text.strip() else text, is_inverse)
+    while found := re.fullmatch(rf"~(.+)|{INVERSE}\((.*)\)", bare, re.DOTALL):
+        bare = (found[1] or found[2]).strip()
         if not bare:
             raise click.UsageError(f"{shown(text)}: there is no pose whose inverse is meant")
         is_inverse = not is_inverse
+    return Factor(bare if bare != text.strip() else text, is_inverse)
 
 
-def combinations(
-    arguments: Sequence[str | Source | Factor], given: Notation | None = None, *, degrees: bool, normalize: bool
-) -> list[tuple[Pose, ...]]:
+def combinations(arguments: Sequence[str | Factor], request: Request) -> list[tuple[Pose, ...]]:
     """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
-    factors = [each if isinstance(each, Factor) else Factor(each) for each in arguments]  # type: ignore[arg-type]
-    arguments = [each.argument for each in factors]
-    if list(arguments).count("-") > 1:
+    factors = [Factor(each) if isinstance(each, str) else each for each in arguments]
+    if [each.argument for each in factors].count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
-    read = [
-        list(map(each.of, poses_from(each.argument, given, degrees=degrees, normalize=normalize))) for each in factors
-    ]
-    several = [index for index, poses in enumerate(read) if len(poses) > 1]
+    read = [list(map(each.of, poses_from(each.argument, request))) for each in factors]
+    several = [f"{factor.argument} ({len(poses)})" for factor, poses in zip(factors, read, strict=True) if poses[1:]]
     if len(several) > 1:
-        counts = " and ".join(f"{arguments[index]} ({len(read[index])})" for index in several)
-        raise ValueInvalid(f"only one argument may hold several poses, found {counts}")
+        raise ValueInvalid(f"only one argument may hold several poses, found {' and '.join(several)}")
     most = max(map(len, read))
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 
 
-def one_pose(argument: str | Source, given: Notation | None = None, *, degrees: bool, normalize: bool) -> Pose:
+def one_pose(argument: str | Source, request: Request) -> Pose:
     """Read the one pose of an argument."""
-    poses = poses_from(argument, given, degrees=degrees, normalize=normalize)
+    poses = poses_from(argument, request)
     if len(poses) != 1:
         name = argument if isinstance(argument, str) else argument.name
         raise click.UsageError(f"one pose is wanted here, {name} holds {len(poses)}")
@@ -342,24 +310,21 @@ def misuse_unless_rotations(reading: Reading) -> Iterator[None]:
         warn(note.message)
 
 
-def pose_from_numbers(
-    texts: Sequence[str],
-    given: tuple[Notation, ...] | None,
-    *,
-    degrees: bool = False,
-    normalize: bool = False,
-) -> Pose:
+def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
     """Read bare numbers: a rotation in the order of its representation, after x y z if there is a position.
 
     Raises click.UsageError for what is no such list of numbers, ValueInvalid for what is no rotation.
     """
-    form = _form_of(texts, given)
-    if form.representation.whole and len(texts) == ROWS_OF_A_POSE:
-        return _pose_of_rows(texts, form, told=bool(given), normalize=normalize)
-    size = len(form.representation.columns)
-    reading = Reading(Source(INLINE, ""), degrees=degrees, normalize=normalize)
+    form = _form_of(texts, request.given)
+    whole, size = form.representation.whole, len(form.representation.columns)
+    reading = Reading(Source(INLINE, ""), degrees=request.degrees, normalize=request.normalize)
     with misuse_unless_rotations(reading):
-        if (whole := form.representation.whole) and len(texts) == len(whole.columns):
+        if whole and len(texts) == ROWS_OF_A_POSE:
+            from frametool.grammar.pasted import matrix_pose
+            from frametool.grammar.pose import read_pose
+
+            return read_pose(matrix_pose([list(texts)], form, told=request.given is not None) or {}, reading)
+        if whole and len(texts) == len(whole.columns):
             return Pose(*read_spelled(form, texts, INDICES, reading))
         if len(texts) not in (size, size + 3):
             expected = f"{size} numbers ({' '.join(form.columns)}), or {size + 3} with x y z before them"
@@ -369,40 +334,27 @@ def pose_from_numbers(
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
-def _pose_of_rows(texts: Sequence[str], form: Notation, *, told: bool, normalize: bool) -> Pose:
-    """Read the rows of a 3x4 pose one after the other."""
-    from frametool.grammar.pasted import matrix_pose
-    from frametool.grammar.pose import read_pose
-
-    reading = Reading(Source(INLINE, ""), normalize=normalize)
-    with misuse_unless_rotations(reading):
-        return read_pose(matrix_pose([list(texts)], form, told=told) or {}, reading)
-
-
-def source_from_numbers(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Source:
+def source_from_numbers(texts: Sequence[str], given: Notation | None) -> Source:
     """Write bare numbers, read by `pose_from_numbers` before, as the mapping that says the same."""
     from frametool.documents.json import dump
     from frametool.documents.source import Verbatim
 
     form = _form_of(texts, given)
-    size = len(form.representation.columns)
     whole = form.representation.whole
-    own = texts if whole and len(texts) == len(whole.columns) else texts[-size:]
+    size = len(texts) if whole and len(texts) == len(whole.columns) else len(form.representation.columns)
     unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
-    # the texts stand in the places of numbers, and are read as such
-    mapping = {"xyz": list(map(Verbatim, texts[: len(texts) - len(own)]))} if len(texts) > len(own) else {}
-    mapping[form.representation.name + unit] = spelled(form, list(map(Verbatim, own)))  # type: ignore[arg-type]
+    numbers: Any = list(map(Verbatim, texts))  # the texts stand in the places of numbers, and are read as such
+    mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
+    mapping[form.representation.name + unit] = spelled(form, numbers[-size:])
     return Source(INLINE, dump(mapping))
 
 
-def _form_of(texts: Sequence[str], given: tuple[Notation, ...] | None) -> Notation:
+def _form_of(texts: Sequence[str], given: Notation | None) -> Notation:
     """Settle what bare numbers are; only a matrix is known by their count."""
     from frametool.geometry.representations import REPRESENTATIONS, notation
 
-    if given and len(given) == 1:
-        return given[0]
-    if given:
-        raise click.UsageError("--from takes one representation")
+    if given is not None:
+        return given
     if len(texts) in (9, ROWS_OF_A_POSE, 16):
         return notation("matrix")
     choices = ", ".join(REPRESENTATIONS)

@@ -95,7 +95,7 @@ class Stream:
         self._tell = partial(say_error, in_json=options.get("format_name") == "json")
         self.options = {name: options.pop(name) for name in OPTIONS if name in options}
         self.given = one_notation(self.options.get("given"))
-        self.path: str | None = self.options["input_path"]
+        self.path: str | None = self.options.get("input_path")
         if self.path == "-":
             self.path = None
         self._opened: BufferedReader | None = None

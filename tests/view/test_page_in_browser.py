@@ -163,8 +163,9 @@ def test_what_is_copied_reads_back_as_the_same_pose(page_of: MakePage, visit: Vi
     yaml, command = tab.evaluate("() => window.copied")
     tree = frametool.load(ROOT / "examples" / "robot.yaml")
     from frametool.cli.poses import poses_from
+    from frametool.stream.request import Request
 
-    (pose,) = poses_from(yaml)
+    (pose,) = poses_from(yaml, Request())
     assert (pose.name, pose.parent) == ("tool", "map")
     assert frametool.Transform.of(*pose.components).is_close(tree.lookup("map", "tool"), angle=1e-13, distance=1e-13)
     assert command == "frametool lookup examples/robot.yaml map tool"

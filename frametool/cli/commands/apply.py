@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from frametool.cli.cloud_files import clouds_of
-from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options
-from frametool.cli.explaining import given as given_as_written
+from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options
 from frametool.cli.options import (
     FILE,
     TEXT,
@@ -17,14 +18,11 @@ from frametool.cli.options import (
     Command,
     array_option,
     at_ns,
-    pose_options,
+    pose_result_options,
     reading_options,
-    result_options,
-    rotation_options,
     rules,
     rules_options,
 )
-from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
@@ -38,7 +36,6 @@ if TYPE_CHECKING:
     from frametool.explain.derive import ByTree
     from frametool.explain.given import Given
     from frametool.formats.load import Rules
-    from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.request import Request
 
@@ -56,24 +53,10 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
     help="what the records are, once for each --columns",
 )
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@rotation_options
-@pose_options
-@result_options("points", "trajectory")
+@pose_result_options("points", "trajectory")
 @explain_options
-@click.option(
-    "--frame-column",
-    "frame_column",
-    type=ColumnNames(),
-    metavar="NAME",
-    help="column with each row's frame, without SOURCE",
-)
-@click.option(
-    "--time-column",
-    "time_column",
-    type=ColumnNames(),
-    metavar="NAME",
-    help="column or key of each row's own time",
-)
+@click.option("--frame-column", type=ColumnNames(), metavar="NAME", help="column with each row's frame, without SOURCE")
+@click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of each row's own time")
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
 @reading_options(streams=True)
@@ -83,8 +66,6 @@ def command(
     arguments: tuple[str, ...],
     pose: str | None,
     more: Sequence[str],
-    deg: bool,
-    normalize: bool,
     kinds: tuple[str, ...],
     frame_column: str | None,
     time_column: str | None,
@@ -105,16 +86,17 @@ def command(
     A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point (help records).
     Without SOURCE records say their own frame. Without records -i FILE, also a cloud's, or stdin is read.
     """
-    stream, explaining = Stream(options), Explaining(options)
-    output = Output("points", "trajectory", deg=deg, **options)
-    plan = explaining.plan(output, stream) if explaining else None
+    task = PoseTask(options, "points", "trajectory")
+    stream, output = task.stream, task.output
+    plan = task.plan() if task.derives else None
     clouds = clouds_of(stream, output) if stream.path else None
     if pose is None:
-        way, rest = _way_by_tree(arguments, more, rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize), at)
+        chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
+        way, rest = _way_by_tree(arguments, more, chosen, at)
     elif time_column is not None or at is not None:
         raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
-        way, rest = _way_by_pose(pose, stream.given, degrees=deg, normalize=normalize), arguments
+        way, rest = _way_by_pose(pose, task), arguments
     if time_column is not None:
         _check_timed(rest, at)
     if clouds is not None:
@@ -128,14 +110,17 @@ def command(
             raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
         try:
             from frametool.explain import derive
+            from frametool.stream.request import Operation
 
-            source = pose_source(records[0], stream.given, normalize=normalize, points=True)
-            made = derive.apply(plan, way.explained(), source, kind=kind or "", degrees=deg, normalize=normalize,
-                                counters=way.counters, timeless=at is not None)  # fmt: skip
+            asked = task.request(operation=Operation(moves=True))
+            source = pose_source(records[0], asked)
+            made = derive.apply(plan, way.explained(), source, kind=kind or "", degrees=asked.degrees,
+                                normalize=task.normalize, counters=way.counters, timeless=at is not None)  # fmt: skip
         except FormatError as error:
             raise usage_if_inline(error) from None
-        return explaining.write(made, output)
-    request = way.request(frame_column, time_column)._replace(kind=kind or "", degrees=deg, normalize=normalize)
+        return task.write(made)
+    request = way.request(frame_column, time_column)
+    request = request._replace(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
     if (count := len(stream.options["columns"])) > 1:
         request = request._replace(poses=count, kinds=(kinds if len(kinds) == count else (kind or "",) * count))
     if rest in ((), ("-",)):
@@ -244,6 +229,7 @@ def _way_by_tree(
 
     counters = not any(frame.isdecimal() for frame in tree.frames)
     in_time = at_times if chosen is None else None
+
     def explained() -> ByTree:
         from frametool.explain.derive import ByTree
 
@@ -252,18 +238,16 @@ def _way_by_tree(
     return Way(target, from_frame, in_time, moves, explained, source is not None, counters), rest
 
 
-def _way_by_pose(argument: str, given: Notation | None, *, degrees: bool, normalize: bool) -> Way:
+def _way_by_pose(argument: str, task: PoseTask) -> Way:
     """Move everything by one pose; where it names its frames, records must be given in its name."""
-    source = pose_source(argument, given, normalize=normalize)
-    pose = one_pose(source, given, degrees=degrees, normalize=normalize)
+    source = pose_source(argument, task.request())
+    pose = one_pose(source, task.request())
 
     def from_frame(own: str | None, _own_ns: int | None = None) -> Rigid:
         _settled(own, pose.name)
         return pose.components
 
-    def explained() -> Given:
-        return given_as_written(source, given, degrees=degrees, normalize=normalize, warned=True)
-
+    explained = partial(task.written, source, warned=True)
     return Way(pose.parent, from_frame, None, lambda _own: False, explained, has_source=True)
 
 
@@ -287,23 +271,21 @@ def _begins_number(argument: str) -> bool:
     return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
+def _is_apart(argument: str) -> bool:
+    """Tell what is no number of a point: a record, a text that was pasted, or nothing."""
+    return not argument or _is_record(argument) or (not _begins_number(argument) and is_pasted(argument))
+
+
 def _sources(arguments: Sequence[str], kind: str | None) -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
-    pending: list[str] = []
-    for argument in (*arguments, ""):
-        if argument and not (_is_record(argument) or (not _begins_number(argument) and is_pasted(argument))):
-            pending.append(argument)
-            continue
-        for x, y, z in _threes(pending, kind):
-            yield Source("argument", f'{{"{kind or "point"}": [{x!r}, {y!r}, {z!r}]}}')
-        pending = []
-        if argument:
-            yield argument
+    for are_apart, group in groupby(arguments, _is_apart):
+        texts = list(group)
+        yield from filter(None, texts) if are_apart else _points(texts, kind)
 
 
-def _threes(texts: Sequence[str], kind: str | None) -> Iterator[Sequence[float]]:
+def _points(texts: Sequence[str], kind: str | None) -> Iterator[Source]:
     """Take bare numbers three at a time."""
-    if texts and kind not in (None, "point", "vector"):
+    if kind not in (None, "point", "vector"):
         raise click.UsageError(f"a {kind} is a mapping, e.g. '{{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}'")
     try:
         numbers = [parse_number(text) for text in texts]
@@ -313,4 +295,5 @@ def _threes(texts: Sequence[str], kind: str | None) -> Iterator[Sequence[float]]
         raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
     if len(numbers) % 3:
         raise click.UsageError(f"points are three numbers each, found {len(numbers)}")
-    yield from (numbers[at : at + 3] for at in range(0, len(numbers), 3))
+    for at in range(0, len(numbers), 3):
+        yield Source("argument", f'{{"{kind or "point"}": {numbers[at : at + 3]}}}')

@@ -62,7 +62,7 @@ def _vectors(text: str) -> list[Vector]:
 
     request = Request(Operation(moves=True), kind=VECTOR)
     try:
-        read = documents(pose_source(text, points=True), request)
+        read = documents(pose_source(text, request), request)
         return [record.shape.position(record.values) for _, records in read for record in records]
     except FormatError as error:
         raise usage_if_inline(error) from None

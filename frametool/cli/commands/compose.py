@@ -7,11 +7,9 @@ from typing import Any
 
 import click
 
-from frametool.cli.explaining import Explaining, all_given, explain_options
-from frametool.cli.options import TEXT, Command, pose_options, pose_reading_options, result_options, rotation_options
-from frametool.cli.output import Output
+from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
+from frametool.cli.options import TEXT, Command, pose_result_options
 from frametool.cli.poses import combinations, factors_of, one_pose
-from frametool.cli.streaming import Stream, stream_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 from frametool.grammar.result import Result
@@ -19,13 +17,10 @@ from frametool.grammar.result import Result
 
 @click.command(cls=Command, name="compose")
 @click.argument("poses", nargs=-1, required=True, type=TEXT, metavar="POSE POSE ..")
-@rotation_options
-@pose_options
-@result_options("poses")
+@pose_result_options("poses")
 @explain_options
-@stream_options
-@pose_reading_options
-def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) -> int:
+@pose_stream_options
+def command(poses: tuple[str, ...], **options: Any) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 
     \b
@@ -37,33 +32,30 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
     POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch. The
     inverse of any of them is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
-    stream, explaining = Stream(options), Explaining(options)
-    output = Output("poses", deg=deg, **options)
+    task = PoseTask(options)
     factors = factors_of(poses)
     given = [each.argument for each in factors]
-    if explaining:
-        plan = explaining.plan(output, stream)
+    if task.derives:
+        plan = task.plan()
         from frametool.explain import derive
 
-        written = all_given(given, stream.given, degrees=deg, normalize=normalize)
+        written = [task.written(each) for each in given]
         turned = [each.turned() if factor.is_inverse else each for each, factor in zip(written, factors, strict=True)]
-        return explaining.write(derive.compose(plan, *turned), output)
+        return task.write(derive.compose(plan, *turned))
     if "-" not in given:
-        if stream.path:
+        if task.stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")
-        each_product = combinations(factors, stream.given, degrees=deg, normalize=normalize)
-        products = [reduce(product, each) for each in each_product]
-        output.poses(Result(each) for each in products)
+        task.output.poses([Result(reduce(product, each)) for each in combinations(factors, task.request())])
         return 0
     if given.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
     at = given.index("-")
-    left, right = (
-        [each.of(one_pose(each.argument, stream.given, degrees=deg, normalize=normalize)) for each in side]
-        for side in (factors[:at], factors[at + 1 :])
-    )
     rows = factors[at]
-    from frametool.stream.request import Operation, Request
+    request = task.request()
+    left, right = (
+        [each.of(one_pose(each.argument, request)) for each in side] for side in (factors[:at], factors[at + 1 :])
+    )
+    from frametool.stream.request import Operation
 
     before = reduce(product, left) if left else None
 
@@ -71,7 +63,6 @@ def command(poses: tuple[str, ...], deg: bool, normalize: bool, **options: Any) 
         result = reduce(product, [*filter(None, [before]), rows.of(Pose(name=name, parent=parent)), *right])
         return result.parent, result.name
 
-    operation = Operation(
-        before and before.components, tuple(each.components for each in right), inverse=rows.is_inverse
-    )
-    return stream.run(Request(operation, degrees=deg, normalize=normalize, rename=rename), output)
+    behind = tuple(each.components for each in right)
+    operation = Operation(before and before.components, behind, inverse=rows.is_inverse)
+    return task.stream.run(request._replace(operation=operation, rename=rename), task.output)

@@ -7,30 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.explaining import ONE_RECORD, Explaining, explain_options, one_argument
-from frametool.cli.explaining import given as given_as_written
-from frametool.cli.options import (
-    TEXT,
-    AxesName,
-    Command,
-    Number,
-    pose_options,
-    pose_reading_options,
-    result_options,
-    rotation_options,
-)
-from frametool.cli.output import Output
-from frametool.cli.poses import (
-    is_inline,
-    is_pasted,
-    pose_from_numbers,
-    pose_source,
-    rejoined,
-    source_from_numbers,
-    values_of,
-)
+from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options, one_argument, pose_stream_options
+from frametool.cli.options import TEXT, AxesName, Command, Number, pose_result_options
+from frametool.cli.poses import is_inline, pose_from_numbers, pose_source, rejoined, source_from_numbers, values_of
 from frametool.cli.stderr import say
-from frametool.cli.streaming import Stream, one_notation, stream_options
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, notation
@@ -45,10 +25,6 @@ if TYPE_CHECKING:
     from frametool.explain.operations import OtherAxes
     from frametool.geometry.representations import Notation
     from frametool.stream.request import Operation
-
-
-AXES = 3
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 class ConvertCommand(Command):
@@ -81,22 +57,16 @@ class ConvertCommand(Command):
 @click.option(
     "--tolerance", type=Number(), default=1e-6, metavar="RAD", help="how near --find wants it  [default: 1e-06]"
 )
-@rotation_options
-@pose_options
-@result_options("poses")
+@pose_result_options("poses")
 @explain_options
 @click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
-@stream_options
-@pose_reading_options
+@pose_stream_options
 def command(
     values: tuple[str, ...],
-    given: tuple[Notation, ...] | None,
     axes: str | None,
     world: str | None,
     find: str | None,
     tolerance: float,
-    deg: bool,
-    normalize: bool,
     unwrap: bool,
     **options: Any,
 ) -> int:
@@ -116,65 +86,56 @@ def command(
     standard input, also with several poses; without any argument standard input is read.
     """
     values = rejoined(values)
-    stream, explaining = Stream(options), Explaining(options)
-    output = Output("poses", deg=deg, **options)
-    if explaining:
-        explaining.plan(output, stream)
+    task = PoseTask(options)
+    stream, output = task.stream, task.output
+    if task.derives:
+        task.plan()
         one_argument(values[0] if values else axes or world)
-    from frametool.stream.request import Operation, Request
+    from frametool.stream.request import Operation
 
     operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
     forms = output.notations or (notation("quaternion"),)
-    request = Request(
-        operation,
-        given=one_notation(given),
-        degrees=deg,
-        normalize=normalize,
-        notations=forms,
-        unwrap=unwrap,
-    )
-    if values or stream.path or not operation.turns or stream.has_input():
+    request = task.request(operation=operation, notations=forms, unwrap=unwrap)
+    if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
-    is_numbers = _are_numbers(values, told=bool(given))
-    if len(values) == 1 and not (is_numbers or stream.path) and _is_table(values[0], stream):
-        if explaining:
+    is_numbers = _are_numbers(values, has_from=request.given is not None)
+    if len(values) == 1 and not (is_numbers or stream.path) and task.has_table(values[0]):
+        if task.derives:
             raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
         values = ()
-    is_alone = operation.turns and (explaining or not stream.has_input())
+    is_alone = operation.turns and (task.derives or not stream.has_input())
     if stream.path or values == ("-",) or not (values or is_alone):
         if values not in ((), ("-",)):
             raise click.UsageError("-i FILE and VALUES are two inputs; give one")
         return stream.run(request, output)
-    sources: list[Source] = []
-    if not values:
-        alone = _changed(Pose(rotation=IDENTITY), operation)
-        if explaining and alone.rotation:
-            sources = [source_from_numbers(list(map(repr, alone.rotation)), (notation("xyzw"),))]
-        results: list[Any] = [Result(alone)]
-    elif is_numbers:
-        pose = pose_from_numbers(values, given, degrees=deg, normalize=normalize)
-        sources = [source_from_numbers(values, given)] if explaining else []
+    results: list[Any]
+    sources: Sequence[str | Source] = ()
+    if is_numbers or not values:
+        pose = pose_from_numbers(values, request) if values else Pose()
         results = [Result(_changed(pose, operation))]
     else:
-        sources = [pose_source(each, request.given, normalize=normalize) for each in values] if explaining else []
-        results = list(values_of(sources or values, request, output))
+        sources = [pose_source(each, request) for each in values] if task.derives else values
+        results = list(values_of(sources, request, output))
     poses = [each.pose for each in results if isinstance(each, Result)]
     if find is not None:
-        output.use(_found(poses, find, tolerance, degrees=deg))
-    if explaining:
+        output.style = output.style.in_notations(_found(poses, find, tolerance, degrees=output.style.degrees))
+    if task.derives:
         if len(poses) != 1:
             raise click.UsageError(f"--explain derives one pose, found {len(results)}")
         from frametool.explain import derive
 
-        written = given_as_written(sources[0], request.given, degrees=deg, normalize=normalize, warned=True)
+        if not sources:
+            own = (values, request.given) if values else (list(map(repr, poses[0].components[3:])), notation("xyzw"))
+            sources = [source_from_numbers(*own)]
+        written = task.written(sources[0], warned=True)
         change = _named_change(axes, world, operation) if values else None
-        return explaining.write(derive.convert(explaining.plan(output), written, own=poses[0], change=change), output)
+        return task.write(derive.convert(task.plan(), written, own=poses[0], change=change))
     output.values(results)
     output.tell_of_lock(poses)
     return 0
 
 
-def _are_numbers(values: Sequence[str], *, told: bool) -> bool:
+def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
     """Tell bare numbers from mappings and files; one that is alone is a number where --from says of what."""
     if not values or is_inline(values[0]):
         return False
@@ -184,12 +145,7 @@ def _are_numbers(values: Sequence[str], *, told: bool) -> bool:
         parse_angle(values[0])
     except ValueInvalid:
         return False
-    return told
-
-
-def _is_table(value: str, stream: Stream) -> bool:
-    """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
-    return not is_pasted(value, stream.given) and stream.takes_rows(value)
+    return has_from
 
 
 def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool) -> tuple[Notation, ...]:
@@ -203,7 +159,7 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool)
         read = [parse_angle(text) for text in find.split(",")]
     except ValueInvalid as error:
         raise click.UsageError(f"--find: {error}") from None
-    if len(read) != AXES:
+    if len(read) != 3:
         raise click.UsageError(f"--find takes three angles like 0.1,0,pi/2; found {len(read)}")
     angles = [radians(angle) if unit == "deg" or (degrees and unit is None) else angle for angle, unit in read]
     axes = find_euler(Rotation.of(*poses[0].rotation), angles, tolerance=tolerance)
@@ -212,8 +168,6 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool)
 
 def _changed(pose: Pose, operation: Operation) -> Pose:
     """Return a pose with other axes; without a change its bits stay as they are."""
-    if not operation.turns:
-        return pose
     components = operation.pose([pose.components], None, floats)
     position = None if pose.position is None else pose.position if operation.keeps_position else components[:3]
     return Pose(position, components[3:7], pose.name, pose.parent)
@@ -244,11 +198,9 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
 
 def _say_other_side(axes: str | None, world: str | None) -> None:
     """Tell what changes the axes of the other frame of a pose where such conventions come in pairs."""
-    if (axes is None) == (world is None):
-        return
     from frametool.geometry.conventions import other_side
 
-    if axes and (other := other_side(axes, of_world=False)):
+    if axes and world is None and (other := other_side(axes, of_world=False)):
         say(f"note: the frame that poses are seen from keeps its axes; --world-axes {other} changes them")
-    if world and (other := other_side(world, of_world=True)):
+    if world and axes is None and (other := other_side(world, of_world=True)):
         say(f"note: the frames that these are the poses of keep their axes; --axes {other} changes them")

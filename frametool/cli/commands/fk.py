@@ -22,7 +22,7 @@ from frametool.formats.detect import detect
 from frametool.formats.robots.urdf import robot_of
 from frametool.formats.table import holds_arrays
 from frametool.stream.faults import ROWS_SKIPPED
-from frametool.stream.joint_rows import JointRows, echoed, names_in
+from frametool.stream.joint_rows import JointRows, echoed, joint_poses, names_in
 from frametool.stream.request import Operation, Request
 
 
@@ -69,8 +69,6 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
     if not echo_form:
         operation = Operation(moves=True, formula=rows)
         return stream.run(Request(operation, poses=0, degrees=deg, normalize=normalize), output)
-    from frametool.stream.joint_rows import joint_poses
-
     bad = stream.policy(name)
     with stream.opened() as source:
         output.poses_as_they_come(joint_poses(source, rows, bad, numbered=echo_form == "csv1"))

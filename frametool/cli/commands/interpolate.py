@@ -6,9 +6,8 @@ from typing import Any
 
 import click
 
-from frametool.cli.explaining import Explaining, all_given, explain_options
-from frametool.cli.options import TEXT, Command, Number, pose_options, result_options, rotation_options
-from frametool.cli.output import Output
+from frametool.cli.explaining import PoseTask, explain_options
+from frametool.cli.options import TEXT, Command, Number, pose_result_options
 from frametool.cli.poses import combinations
 from frametool.grammar.pose_algebra import interpolated
 from frametool.grammar.result import Result
@@ -18,11 +17,9 @@ from frametool.grammar.result import Result
 @click.argument("a", type=TEXT)
 @click.argument("b", type=TEXT)
 @click.argument("fractions", nargs=-1, required=True, type=Number())
-@rotation_options
-@pose_options
-@result_options("poses")
+@pose_result_options("poses")
 @explain_options
-def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: bool, **options: Any) -> None:
+def command(a: str, b: str, fractions: tuple[float, ...], **options: Any) -> int:
     """Print poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
 
     \b
@@ -32,16 +29,14 @@ def command(a: str, b: str, fractions: tuple[float, ...], deg: bool, normalize: 
     The rotation takes the shorter arc. Fractions outside 0 .. 1 extrapolate. Unlike a screw motion, position and
     rotation are independent.
     """
-    explaining = Explaining(options)
-    output = Output("poses", deg=deg, **options)
-    if explaining:
-        plan = explaining.plan(output)
+    task = PoseTask(options)
+    if task.derives:
+        plan = task.plan()
         if len(fractions) != 1:
             raise click.UsageError(f"--explain derives one fraction, found {len(fractions)}")
         from frametool.explain import derive
 
-        first, last = all_given((a, b), degrees=deg, normalize=normalize)
-        explaining.write(derive.interpolate(plan, first, last, fractions[0]), output)
-        return
-    pairs = combinations((a, b), degrees=deg, normalize=normalize)
-    output.poses([Result(interpolated(first, last, each)) for first, last in pairs for each in fractions])
+        return task.write(derive.interpolate(plan, task.written(a), task.written(b), fractions[0]))
+    pairs = combinations((a, b), task.request())
+    task.output.poses([Result(interpolated(first, last, each)) for first, last in pairs for each in fractions])
+    return 0

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.explaining import Explaining, explain_options
+from frametool.cli.explaining import PoseTask, explain_options
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.options import (
     FILE,
@@ -23,8 +23,7 @@ from frametool.cli.options import (
     rules_options,
     times_option,
 )
-from frametool.cli.output import Output
-from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.streaming import stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.grammar.edges import stop
 from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
@@ -32,6 +31,7 @@ from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_u
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.output import Output
     from frametool.frames.lookups import Frames
 
 
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], at: int | str | None,
     source_at: int | str | None, fixed: str | None, times: str | None, moving: bool, cache: int | None, tf2: str | None,
-    normalize: bool, **options: Any,
+    **options: Any,
 ) -> int:  # fmt: skip
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 
@@ -69,20 +69,20 @@ def command(
     TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp;
     nothing is extrapolated. Trajectories (-f tum, kitti ..) hold all samples of the way without --times.
     """
-    by_row, stream, explaining = RowFrames(options), Stream(options), Explaining(options)
-    output = Output("poses", **options)
-    if explaining and (by_row or times is not None):
+    by_row, task = RowFrames(options), PoseTask(options)
+    stream, output = task.stream, task.output
+    if task.derives and (by_row or times is not None):
         raise click.UsageError("--explain derives one lookup; name TARGET and SOURCE, and --at TIME if it matters")
-    plan = explaining.plan(output, stream) if explaining else None
+    plan = task.plan() if task.derives else None
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
-    chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=normalize)
+    chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
     frames = load_tree(tree, more, chosen, streams=bool(by_row))
     if by_row or target is None or source is None:
-        return by_row.run(stream, output, frames, target=target, source=source, at=at_ns(at))
+        return by_row.run(task, frames, target, source, at_ns(at))
     if tf2 is None:
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
@@ -90,7 +90,7 @@ def command(
         from frametool.explain import derive
 
         found = derive.lookup(plan, frames, target, source, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
-        return explaining.write(found, output)
+        return task.write(found)
     output.style.axes = frames.camera_axes.get(source, "")
     every = output.is_trajectory and at is None and fixed is None and frames.latest(target, source) is not None
     if times is not None or every:

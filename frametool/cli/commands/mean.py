@@ -7,19 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import TEXT, ColumnNames, Command, pose_options, result_options, rotation_options
-from frametool.cli.output import Output
+from frametool.cli.explaining import PoseTask
+from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import is_pasted, poses_from
-from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.streaming import stream_options
 from frametool.errors import ValueInvalid
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from frametool.grammar.result import Result
     from frametool.stream.gathering import Gathered
-    from frametool.stream.request import Request
 
 
 @click.command(cls=Command, name="mean")
@@ -30,11 +27,9 @@ if TYPE_CHECKING:
     metavar="NAME | W,W,..",
     help="column or key of each pose's weight, or the weights of the POSEs",
 )
-@rotation_options
-@pose_options
-@result_options("poses")
+@pose_result_options("poses")
 @stream_options
-def command(poses: tuple[str, ...], weights: str | None, deg: bool, normalize: bool, **options: Any) -> int:
+def command(poses: tuple[str, ...], weights: str | None, **options: Any) -> int:
     """Average poses: the mean position, the mean rotation, and how far the poses lie from them.
 
     \b
@@ -46,32 +41,27 @@ def command(poses: tuple[str, ...], weights: str | None, deg: bool, normalize: b
     of squared differences of matrices. distance_rms and distance_max are metres, angle_rms and angle_max radians (and
     _deg degrees) between the poses and the mean.
     """
-    stream = Stream(options)
-    output = Output("poses", deg=deg, **options)
+    task = PoseTask(options)
+    stream = task.stream
     from frametool.stream.gathering import Gathered
-    from frametool.stream.request import Operation, Request
 
     gathered = Gathered()
-    request = Request(
-        Operation(), given=stream.given, degrees=deg, normalize=normalize, beside=weights, gathered=gathered
-    )
+    request = task.request(beside=weights, gathered=gathered)
     status, given = 0, None
     if len(poses) == 1 and poses[0] != "-" and not stream.path and not is_pasted(poses[0], stream.given):
         stream.path, poses = poses[0], ()
     if poses in ((), ("-",)):
-        status = stream.run(request, output)
+        status = stream.run(request, task.output)
     else:
-        given = _take(poses, weights, request, gathered)
-    output.poses([_mean(gathered, given)])
+        for each in poses:
+            gathered.add(poses_from(each, request))
+        given = None if weights is None else _numbers(weights)
+    task.output.poses([_mean(gathered, given)])
     return status
 
 
-def _take(poses: Sequence[str], weights: str | None, request: Request, gathered: Gathered) -> list[float] | None:
-    """Read the poses that are arguments; return their weights."""
-    for each in poses:
-        gathered.add(poses_from(each, request.given, degrees=request.degrees, normalize=request.normalize))
-    if weights is None:
-        return None
+def _numbers(weights: str) -> list[float]:
+    """Read the weights of poses that are arguments."""
     try:
         return [parse_number(text.strip()) for text in weights.split(",")]
     except ValueInvalid as error:
@@ -90,11 +80,7 @@ def _mean(gathered: Gathered, given: list[float] | None) -> Result:
     extras: dict[str, Any] = {"count": len(transforms)}
     if gathered.placed:
         extras |= {"distance_rms": spread.distance_rms, "distance_max": spread.distance_max}
-    else:
-        pose = pose._replace(position=None)
     if gathered.turned:
         extras |= {"angle_rms": spread.angle_rms, "angle_rms_deg": math.degrees(spread.angle_rms)}
         extras |= {"angle_max": spread.angle_max, "angle_max_deg": math.degrees(spread.angle_max)}
-    else:
-        pose = pose._replace(rotation=None)
-    return Result(pose, extras)
+    return Result(Pose(pose.position if gathered.placed else None, pose.rotation if gathered.turned else None), extras)

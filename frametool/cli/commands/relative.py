@@ -6,19 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.explaining import Explaining, all_given, explain_options, one_argument
-from frametool.cli.options import (
-    TEXT,
-    ColumnNames,
-    Command,
-    pose_options,
-    pose_reading_options,
-    result_options,
-    rotation_options,
-)
-from frametool.cli.output import Output
-from frametool.cli.poses import combinations, one_pose, write_results
-from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.explaining import PoseTask, explain_options, one_argument, pose_stream_options
+from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
+from frametool.cli.poses import combinations, one_pose
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
 
@@ -29,12 +19,8 @@ if TYPE_CHECKING:
 @click.command(cls=Command, name="relative")
 @click.argument("a", type=TEXT, required=False)
 @click.argument("b", type=TEXT, required=False)
-@rotation_options
-@pose_options
-@result_options("poses")
-@click.option(
-    "--consecutive", is_flag=True, help="of a stream, each row seen from the row before it"
-)
+@pose_result_options("poses")
+@click.option("--consecutive", is_flag=True, help="of a stream, each row seen from the row before it")
 @click.option("--first", is_flag=True, help="of a stream, each row seen from the first")
 @click.option(
     "--velocity",
@@ -43,19 +29,15 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--time-column",
-    "time_column",
     type=ColumnNames(),
     metavar="NAME",
     help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
 )
 @explain_options
-@stream_options
-@pose_reading_options
+@pose_stream_options
 def command(
     a: str | None,
     b: str | None,
-    deg: bool,
-    normalize: bool,
     consecutive: bool,
     first: bool,
     velocity: bool,
@@ -77,19 +59,15 @@ def command(
 
     The twist in dt seconds is the body's, seen in A: linear R_A' (p_B - p_A) / dt, angular rotvec(A^-1 B) / dt.
     """
-    stream, explaining = Stream(options), Explaining(options)
-    output = Output("poses", deg=deg, **options)
-    if explaining:
-        plan = explaining.plan(output, stream)
+    task = PoseTask(options)
+    if task.derives:
+        plan = task.plan()
         if consecutive or first:
             raise click.UsageError("--consecutive and --first are about the rows of a stream; leave --explain out")
         from frametool.explain import derive
 
-        arguments = [str(one_argument(each)) for each in (a, b)]
-        given_a, given_b = all_given(arguments, stream.given, degrees=deg, normalize=normalize)
-        return explaining.write(derive.relative(plan, given_a, given_b), output)
-    from frametool.stream.request import Request
-
+        arguments = [one_argument(each) for each in (a, b)]
+        return task.write(derive.relative(plan, *map(task.written, arguments)))
     if velocity and not consecutive:
         raise click.UsageError("--velocity is that from one row to the next; give --consecutive too")
     if time_column is not None and not velocity:
@@ -99,29 +77,22 @@ def command(
         if (consecutive and first) or len(given) > 1:
             one = "--consecutive and --first are two questions" if consecutive and first else "leave A and B out"
             raise click.UsageError(f"rows are compared with one of themselves; {one}")
-        request = _along(consecutive=consecutive, velocity=velocity, beside=time_column or "")
-        request = request._replace(given=stream.given, degrees=deg, normalize=normalize)
-        return write_results(a or "-", stream, request, output)
+        from frametool.stream.request import PREVIOUS, START, Operation
+
+        # a row is seen from another one of the same stream, which is the same thing at another moment
+        operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
+        beside = (time_column or "") if velocity else None
+        request = task.request(operation=operation, beside=beside, rename=lambda _parent, name: (name, name))
+        return task.answer(a or "-", request)
     if len(given) < 2 or "-" in given:
-        request = Request(given=stream.given, degrees=deg, normalize=normalize)
-        return stream.run(_asked(a, b, request), output)
-    if stream.path:
+        return task.stream.run(_with_rows(a, b, task.request()), task.output)
+    if task.stream.path:
         raise click.UsageError("-i FILE is read where - stands for A or B")
-    pairs = combinations(given, stream.given, degrees=deg, normalize=normalize)
-    output.poses([relative(*pair) for pair in pairs])
+    task.output.poses([relative(*pair) for pair in combinations(given, task.request())])
     return 0
 
 
-def _along(*, consecutive: bool, velocity: bool, beside: str) -> Request:
-    """Compare a stream's rows with the row before, or with the first."""
-    from frametool.stream.request import PREVIOUS, START, Operation, Request
-
-    # a row is seen from another one of the same stream, which is the same thing at another moment
-    operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
-    return Request(operation, beside=beside if velocity else None, rename=lambda _parent, name: (name, name))
-
-
-def _asked(a: str | None, b: str | None, plain: Request) -> Request:
+def _with_rows(a: str | None, b: str | None, plain: Request) -> Request:
     """Compare a stream's rows with a fixed A or B, or with the row's own second pose."""
     from frametool.stream.request import Operation
 
@@ -132,7 +103,7 @@ def _asked(a: str | None, b: str | None, plain: Request) -> Request:
     if a == b == "-":
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     first = a != "-"
-    fixed = one_pose(str(a if first else b), plain.given, degrees=plain.degrees, normalize=plain.normalize)
+    fixed = one_pose(str(a if first else b), plain)
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         own = Pose(name=name, parent=parent)

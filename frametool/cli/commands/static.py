@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import TEXT, Command, pose_options, reading_options, result_options, rotation_options
+from frametool.cli.options import TEXT, Command, pose_result_options, reading_options, together
 from frametool.cli.output import Output
 from frametool.cli.poses import misuse_unless_rotations
 from frametool.cli.trees import load_tree
@@ -22,22 +22,16 @@ if TYPE_CHECKING:
     from frametool.grammar.pose import Pose
 
 
-def _flag_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Add the flags of static_transform_publisher."""
-    for name in reversed(FLAGS):
-        metavar = "FRAME" if name.endswith("id") else "N"
-        option = click.option(f"--{name}", type=TEXT, metavar=metavar, help="as static_transform_publisher has it")
-        function = option(function)
-    return function
+def _flag(name: str) -> Callable[..., Any]:
+    metavar = "FRAME" if name.endswith("id") else "N"
+    return click.option(f"--{name}", type=TEXT, metavar=metavar, help="as static_transform_publisher has it")
 
 
 @click.command(cls=Command, name="static")
 @click.argument("arguments", nargs=-1, type=TEXT, metavar="[TREE | X Y Z .. PARENT CHILD]")
-@_flag_options
+@together(*map(_flag, FLAGS))
 @reading_options()
-@rotation_options
-@pose_options
-@result_options("tree")
+@pose_result_options("tree")
 def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any) -> None:
     """Write the static_transform_publisher arguments of a TREE, or read such arguments into a tree.
 
