@@ -59,5 +59,5 @@ class RowFrames:
             return tree.lookup(fixed_target or cells[0], fixed_source or cells[-1], at).components
 
         forms = task.output.notations or (notation("quaternion"),)
-        request = task.request(poses=0, frames=frames, edge_of=edge_of, notations=forms)
+        request = task.request(poses=0, frames=frames, pose_of_row_frame=edge_of, notations=forms)
         return task.stream.run(request, task.output, tables_only=True)

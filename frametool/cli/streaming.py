@@ -226,7 +226,8 @@ class Stream:
             into = import_module(FORMATS[output.told].writer)
         style = output.style.in_form(output.told or form)
         outcomes = run_columns(opened, request, style, source=self.name, into=None if into is module else into)
-        return outcomes, lambda: f", now in {request.told}" if request.told and request.operation.moves else ""
+        now = f", now in {request.result_frame}" if request.result_frame and request.operation.moves else ""
+        return outcomes, lambda: now
 
     def _as_poses(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
         """Write the results of rows, or of poses that no table holds, in another form."""

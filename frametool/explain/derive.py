@@ -343,7 +343,7 @@ def apply(
 
     way: a lookup, or a pose.  source: text that holds one record.  timeless: the stamp of its header does not matter.
     """
-    request = Request(Operation(moves=True), kind=kind, degrees=degrees, normalize=normalize, counters=counters)
+    request = Request(Operation(moves=True), kind=kind, degrees=degrees, normalize=normalize, frame_is_counter=counters)
     records = [record for _, found in documents(source, request) for record in found]
     if len(records) != 1:
         raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")

@@ -94,10 +94,10 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
         stamp = record.stamp
     elif timed is not None and request.operation.formula is not None:
         stamp = (_beside(stamp_keys, document, record),)
-    elif request.beside is not None:
-        stamp = _path_beside(document, record, request.beside)
-    elif request.way is not None:
-        edge = request.way(record.parent.text)
+    elif request.extra_column is not None:
+        stamp = _path_beside(document, record, request.extra_column)
+    elif request.pose_from_frame is not None:
+        edge = request.pose_from_frame(record.parent.text)
     request = request.for_kind(record.shape.kind)
     parent, name = record.parent.text, record.name.text
     if request.rename is not None:

@@ -66,7 +66,7 @@ class OtherForm:
         self.is_table = FORMATS[form].is_table
         self.module: Any = None if self.is_table else import_module(FORMATS[form].reader)
         self.style = style.in_form(style.form)
-        self.request = request._replace(whole=True, notations=(QUATERNION,), keep_sign=True)
+        self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
         self.to_arrays = "arrays" in FORMATS[style.form].writes
         self.without = 0  # rows of an array that stand for no point or pose, and have no place in a text
@@ -246,7 +246,7 @@ def _plan(request: Request) -> Plan:
     """Plan poses that are no text."""
     shape = Shape(POSE, 1.0, QUATERNION)
     target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
-    edge = request.way if request.operation.moves and request.timed is not None else None
+    edge = request.pose_from_frame if request.operation.moves and request.timed is not None else None
     return Plan(
         (shape,), (target,), request.operation, (), ("x", "y", "z", "qx", "qy", "qz", "qw"), edge_of=edge,
         normalize=request.normalize, on_error=request.on_error, gathered=request.gathered,

@@ -281,7 +281,7 @@ class RecordBlocks:
             unwrap=request.unwrap,
             yaml=self.form == "yaml",
             timed=template.timed(request),
-            beside=template.beside if request.beside is not None else "",
+            beside=template.beside if request.extra_column is not None else "",
             gathered=request.gathered,
             remedies=tuple(_remedy(entry.record) for entry in template.entries),
             sources=tuple(entry.record.parent.text for entry in template.entries),

@@ -252,16 +252,16 @@ class Request(NamedTuple):
     columns: which columns are ours, one entry a pose
     keep, prefix: results stand beside what they come from, under other names
     frames: columns that name a row's frame
-    edge_of: the pose that moves a row from the frame it names
-    told: the frame results are in
-    way: the pose that moves a record given in a frame
+    pose_of_row_frame: the pose that moves a row from the frame it names
+    result_frame: the frame results are in
+    pose_from_frame: the pose that moves a record given in a frame
     timed: the poses that do so at the row's own time
     rename: turns a record's (parent, name) into those of its result
-    counters: a decimal `frame` is a counter, because no frame is called so
+    frame_is_counter: a decimal `frame` is a counter, because no frame is called so
     unwrap: angles go on beyond half a turn
-    beside: the column or key of a number that is read beside the pose: its stamp or weight; "" is the usual stamp
+    extra_column: the column or key of a stamp or weight that is read beside the pose; "" is the usual stamp
     gathered: takes the poses, nothing is written then
-    whole: all numbers of a result are wanted, also those that do not change
+    all_numbers: all numbers of a result are wanted, also those that do not change
     """
 
     operation: Operation = Operation()
@@ -278,17 +278,17 @@ class Request(NamedTuple):
     keep: bool = False
     prefix: str = ""
     frames: tuple[str, ...] = ()
-    edge_of: Callable[[str], Rigid] | None = None
-    way: Callable[[str | None], Rigid] | None = None
+    pose_of_row_frame: Callable[[str], Rigid] | None = None
+    pose_from_frame: Callable[[str | None], Rigid] | None = None
     timed: Timed | None = None
     rename: Callable[[str | None, str | None], tuple[str | None, str | None]] | None = None
-    told: str | None = None
-    counters: bool = True
+    result_frame: str | None = None
+    frame_is_counter: bool = True
     unwrap: bool = False
-    beside: str | None = None
+    extra_column: str | None = None
     gathered: Gathered | None = None
     on_error: str = STOP
-    whole: bool = False
+    all_numbers: bool = False
 
     @property
     def in_order(self) -> bool:
@@ -305,10 +305,10 @@ class Request(NamedTuple):
         if kind in SIX:
             return Target(None, (), plain=True)
         if kind != POSE:
-            return Target(1.0 if self.whole and shape.unit else shape.unit, ())
+            return Target(1.0 if self.all_numbers and shape.unit else shape.unit, ())
         there = shape.whole or shape.unit is not None
         placed = there or self.shifts
-        unit = 1.0 if self.whole and (self.notations or shape.notation is None) else shape.unit or 1.0
+        unit = 1.0 if self.all_numbers and (self.notations or shape.notation is None) else shape.unit or 1.0
         if self.notations or shape.notation is None:
             notations = self.notations or (() if self._only_turns_around else (notation("quaternion"),))
             whole = there and len(notations) == 1 and notations[0].representation.whole is not None
@@ -327,7 +327,7 @@ class Request(NamedTuple):
     @property
     def by_row(self) -> bool:
         """Tell whether each row has its own pose that moves it."""
-        return self.edge_of is not None or self.timed is not None
+        return self.pose_of_row_frame is not None or self.timed is not None
 
     @property
     def shifts(self) -> bool:
@@ -353,7 +353,7 @@ class Request(NamedTuple):
 
     def counts(self, frame: str) -> bool:
         """Tell whether what stands under `frame` is a counter rather than a frame's name."""
-        return self.counters and frame.isdecimal()
+        return self.frame_is_counter and frame.isdecimal()
 
     def in_degrees(self, form: Notation) -> bool:
         """Tell whether a notation's angles are degrees: its own word wins."""

@@ -77,7 +77,7 @@ class TablePoses:
         """
         self.table = begun.table
         self.form = form
-        self.plan, layout = plan_table(self.table, request._replace(whole=True), source)
+        self.plan, layout = plan_table(self.table, request._replace(all_numbers=True), source)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         named = request.for_kind(self.shape.kind)
         self.naming = Naming(self.table, layout, named)

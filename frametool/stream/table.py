@@ -157,7 +157,7 @@ def rename_of(request: Request) -> Rename | None:
     if request.rename is not None:
         return request.rename
     if request.operation.moves:
-        return lambda _parent, name: (request.told, name)
+        return lambda _parent, name: (request.result_frame, name)
     if request.operation.looks_back:
         return lambda _parent, name: (name, name)
     return (lambda _parent, _name: (None, None)) if request.operation.of == "pair" else None

@@ -29,7 +29,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find_if_read(table, request, source)
     only_turned = not request.operation.moves and request.operation.keeps_position and request.gathered is None
-    if request.poses == 1 and only_turned and not request.whole:
+    if request.poses == 1 and only_turned and not request.all_numbers:
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
         raise FormatError(wrong, source=source, line=1)
@@ -42,9 +42,9 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     frames = _frame_columns(table, request, source)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
-    edge_of = request.edge_of
+    edge_of = request.pose_of_row_frame
     if frames and edge_of is None and request.operation.moves:
-        edge_of = request.way
+        edge_of = request.pose_from_frame
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
@@ -55,7 +55,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     return Plan(
         shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
-        timed=request.timed, beside=request.beside or "", gathered=request.gathered,
+        timed=request.timed, beside=request.extra_column or "", gathered=request.gathered,
         frame_column=table.name(frames[0]) if len(frames) == 1 else "",
     ), layout  # fmt: skip
 
@@ -71,7 +71,7 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
-        names = ["" if name == request.beside else name for name in table.names]  # what it is for is known
+        names = ["" if name == request.extra_column else name for name in table.names]  # what it is for is known
         return find_poses(names, request.given, request.poses, source)
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
         return [named_pose(spec, None, table.width, request.given)]
@@ -172,7 +172,7 @@ def _place(name: str, names: Sequence[str], source: str) -> int:
 
 def _time_column(table: Table, request: Request, source: str) -> int | None:
     """Find the column of the stamps, by its name or, where there are none, by its number from 1."""
-    name = request.timed.name if request.timed else request.beside
+    name = request.timed.name if request.timed else request.extra_column
     if name is None:
         return None
     place = _place(name, _names_or_numbers(table), source)

@@ -114,8 +114,8 @@ def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
 def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request, Timed | None]:
     """Find the column of stamps that a request needs; or, where no option names one, the one nobody asked for."""
     timed = request.timed
-    if request.beside == "":
-        request = request._replace(beside=_stamp_column(table, source, "a velocity"))
+    if request.extra_column == "":
+        request = request._replace(extra_column=_stamp_column(table, source, "a velocity"))
     if timed is None:
         return request, None
     if request.operation.formula is not None:

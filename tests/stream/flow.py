@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from io import BufferedReader
 
 QUARTER = (1.0, 2.0, 3.0, 0.0, 0.0, 0.7071067811865476, 0.7071067811865476)
-MOVE = Request(Operation(left=QUARTER, moves=True), way=lambda _own: QUARTER, rename=lambda _parent, name: (None, name))
+MOVE = Request(Operation(left=QUARTER, moves=True), pose_from_frame=lambda _own: QUARTER, rename=lambda _parent, name: (None, name))
 INVERT = Request(Operation(inverse=True))
 
 

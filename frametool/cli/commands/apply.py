@@ -182,11 +182,11 @@ class Way(NamedTuple):
         return Request(
             Operation(left=edge_of(None) if has_source and not time_column else None, moves=True),
             frames=frames,
-            edge_of=edge_of if frames else None,
-            way=edge_of,
+            pose_of_row_frame=edge_of if frames else None,
+            pose_from_frame=edge_of,
             timed=timed,
-            told=self.target,
-            counters=self.counters,
+            result_frame=self.target,
+            frame_is_counter=self.counters,
             rename=lambda _parent, name: (self.target, name),
         )
 

@@ -160,5 +160,5 @@ def _request(formula: RowExpressions, kind: str, time_column: str | None, *, deg
     counters = not any(frame.isdecimal() for _, tree in formula.scope.trees for frame in tree.frames)
     return Request(
         Operation(moves=True, formula=formula), kind=kind, degrees=degrees, normalize=normalize, timed=timed,
-        counters=counters,
+        frame_is_counter=counters,
     )  # fmt: skip

@@ -46,7 +46,7 @@ def command(poses: tuple[str, ...], weights: str | None, **options: Any) -> int:
     from frametool.stream.gathering import Gathered
 
     gathered = Gathered()
-    request = task.request(beside=weights, gathered=gathered)
+    request = task.request(extra_column=weights, gathered=gathered)
     status, given = 0, None
     if len(poses) == 1 and poses[0] != "-" and not stream.path and not is_pasted(poses[0], stream.given):
         stream.path, poses = poses[0], ()

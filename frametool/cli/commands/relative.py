@@ -82,7 +82,7 @@ def command(
         # a row is seen from another one of the same stream, which is the same thing at another moment
         operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
         beside = (time_column or "") if velocity else None
-        request = task.request(operation=operation, beside=beside, rename=lambda _parent, name: (name, name))
+        request = task.request(operation=operation, extra_column=beside, rename=lambda _parent, name: (name, name))
         return task.answer(a or "-", request)
     if len(given) < 2 or "-" in given:
         return task.stream.run(_with_rows(a, b, task.request()), task.output)
