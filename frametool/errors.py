@@ -143,11 +143,8 @@ class UnknownFrame(LookupFailed):
         place = f" in {where}" if where else ""
         near = did_you_mean(name, self.known)
         self.short = f"unknown frame {shown(name)}{place}{near}"
-        super().__init__(
-            f"{self.short}{'' if near else ';'} frames: {listing(self.known)}",
-            frame=name,
-            known=nsmallest(20, self.known),
-        )
+        message = f"{self.short}{'' if near else ';'} frames: {listing(self.known)}"
+        super().__init__(message, frame=name, known=nsmallest(20, self.known))
 
 
 class NotConnected(LookupFailed):
@@ -226,13 +223,13 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
     return f"; did you mean {shown(near[0])}?" if near else ""
 
 
-def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6, slack: float = 0.2) -> list[str]:
+def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return the nearest known names: the best, and those that are nearly as near; empty where none is."""
     from difflib import SequenceMatcher
 
     ratios = {each: SequenceMatcher(None, each, name[:LONGEST_NAME]).ratio() for each in known}
     best = max(ratios.values(), default=0.0)
-    near = [(ratio, each) for each, ratio in ratios.items() if ratio >= max(cutoff, best - slack)]
+    near = [(ratio, each) for each, ratio in ratios.items() if ratio >= max(0.6, best - 0.2)]
     return [each for _, each in sorted(near, reverse=True)]
 
 
@@ -302,6 +299,15 @@ def printable(name: str) -> str:
     if name.isprintable():
         return name
     return "".join(each if each.isprintable() else repr(each)[1:-1] for each in name)
+
+
+def cells(text: str) -> int:
+    """Count the cells a text takes on a terminal: wide characters take two."""
+    if text.isascii():
+        return len(text)
+    from unicodedata import combining, east_asian_width
+
+    return sum(0 if combining(each) else 2 if east_asian_width(each) in "WF" else 1 for each in text)
 
 
 def shown(value: object) -> str:

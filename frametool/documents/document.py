@@ -2,24 +2,19 @@
 
 A document is dicts, lists, text and None: every scalar stays text as written, so that names stay names (`on`, `007`,
 `12:30`) and numbers are read by the one rule of `frametool.text.numbers`.  Places are not kept while reading; they
-are found again when a message needs them.
-
-The tree of a JSON or YAML text with the place of every value, for those who rewrite parts of a text.
-
-Knows syntax only.  The text must be one that `parse_documents` reads: nothing is checked again here.
+are found again when a message needs them.  Who rewrites parts of a text asks for the tree of its nodes, with the place
+of each.  Knows syntax only.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json import json_events, looks_like_json, parse_json
 from frametool.documents.source import END, LEAF, MAP, Source, check_text, error_at, find_marks, mark_of, places_of
 from frametool.errors import FormatError
 from frametool.text.numbers import odd_characters
-
-TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -151,8 +146,7 @@ def refuse_alias(node: Node) -> None:
         raise FormatError("an alias of YAML stands in the place of what is rewritten; write out what it stands for")
 
 
-NOTHING = Node(0, 0, {})
-"""A mapping without keys."""
+NOTHING = Node(0, 0, {})  # a mapping without keys
 
 
 class _Opened:
@@ -185,7 +179,7 @@ class _Opened:
 
 
 def parse_nodes(text: str) -> list[Node]:
-    """Return the trees of all documents of a text."""
+    """Return the trees of all documents of a text that `parse_documents` reads: nothing is checked again here."""
     roots: list[Node] = []
     opened: list[_Opened] = []
     for kind, word, start, end, style, column in events_of(text):

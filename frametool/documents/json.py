@@ -1,9 +1,7 @@
-"""JSON text to plain values, and to places: knows JSON, no meaning.
+"""JSON text to plain values and to places, and plain values to JSON on one line: knows JSON, no meaning.
 
 The json module is ten times faster than any YAML parser and starts sooner; it keeps no places, so they are found by
-a scan of their own when an error needs them.
-
-Plain values to JSON text on one line; how floats are written is the caller's.
+a scan of their own when an error needs them.  How floats are written is the caller's.
 """
 
 from __future__ import annotations

@@ -17,11 +17,9 @@ from bisect import bisect_right
 from contextlib import contextmanager
 from functools import cached_property
 from io import BufferedReader, BytesIO
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, shown
-
-TYPE_CHECKING = False
+from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, cells, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -32,17 +30,13 @@ if TYPE_CHECKING:
     # kind, text of a scalar, start, end, quote of a scalar or bracket of a container ("" for a block), column
     Event: TypeAlias = tuple[int, str, int, int, str, int]
 
-DEEPEST = 1000
-"""Most levels of lists and maps; a tree of 60 frames in a row has 120."""
-
+DEEPEST = 1000  # levels of lists and maps; a tree of 60 frames in a row has 120
+# of one file of documents, also in bytes; a million frames take 100 to 600 million
 MOST_CHARACTERS = 1 << 30
-"""Longest text read as one file of documents, also in bytes; a million frames take 100 to 600 million."""
-
+# lists and maps in one text: each takes 64 bytes or more, and 3 characters to write; a million messages: 6e6
 MOST_CONTAINERS = 10_000_000
-"""Most lists and maps in one text: each takes 64 bytes or more, and 3 characters to write; a million messages: 6e6."""
-
+# commas and line ends in one text: the value between two takes 60 bytes; a million messages in lines have 4e7
 MOST_VALUES = 50_000_000
-"""Most commas and line ends in one text: a value beside each takes 60 bytes; a million messages in lines have 4e7."""
 
 
 def size_problem(text: str) -> str:
@@ -61,9 +55,7 @@ def too_much(depth: int) -> str:
     return f"more than {MOST_CONTAINERS} lists and maps in one file; split it"
 
 
-HEAD = 1 << 16
-"""How many bytes of a file are looked at before it is read."""
-
+HEAD = 1 << 16  # bytes of a file that are looked at before it is read
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
 UTF32 = (b"\xff\xfe\x00\x00", b"\x00\x00\xfe\xff")
 LOOKED_AT = 4096
@@ -112,21 +104,22 @@ class Verbatim(str):
 
 
 class FileState(NamedTuple):
-    """What changes when a file does: of a folder, of one of the files in it."""
+    """What changes when a file does: of a folder, of one of the files in it.
+
+    others: its device, number, mode, and when its bytes were changed
+    """
 
     name: str
-    device: int
-    number: int
-    mode: int
     size: int
-    mtime_ns: int
     ctime_ns: int
+    others: tuple[int, ...]
 
     @classmethod
     def of(cls, found: os.stat_result, name: str = "") -> FileState:
         """Take it out of what the system says."""
-        place = found.st_dev, found.st_ino, found.st_mode
-        return cls(name, *place, found.st_size, found.st_mtime_ns, found.st_ctime_ns)
+        return cls(
+            name, found.st_size, found.st_ctime_ns, (found.st_dev, found.st_ino, found.st_mode, found.st_mtime_ns)
+        )
 
 
 def states_of(path: str) -> list[FileState]:
@@ -295,7 +288,8 @@ def pointer(line: str, column: int) -> str:
     """Return the line with a caret below the column: tabs kept, wide characters counted twice, long lines cut."""
     line, column = _cut(line, column)
     visible = "".join(c if c.isprintable() or c == "\t" else "\ufffd" for c in line)
-    return f"{visible}\n{''.join(map(_gap, visible[: column - 1]))}^"
+    gap = "".join("\t" if each == "\t" else " " * cells(each) for each in visible[: column - 1])
+    return f"{visible}\n{gap}^"
 
 
 def _cut(line: str, column: int) -> tuple[str, int]:
@@ -307,17 +301,6 @@ def _cut(line: str, column: int) -> tuple[str, int]:
     head = "..." if begin else ""
     tail = "..." if end < len(line) else ""
     return head + line[begin:end] + tail, column - begin + len(head)
-
-
-def _gap(character: str) -> str:
-    """Return as much emptiness as the character is wide."""
-    if character == "\t":
-        return "\t"
-    if character.isascii():
-        return " "
-    from unicodedata import combining, east_asian_width
-
-    return "" if combining(character) else "  " if east_asian_width(character) in "WF" else " "
 
 
 class InputFile:

@@ -1,9 +1,7 @@
-"""XML as a stream of elements with their places: expat of the standard library, without a tree and without entities.
+"""XML as a stream of elements with their places, or as a tree of those that a form has a use for; without entities.
 
-Knows syntax only.  Names keep their prefix as written (`sensor:camera`), so that files whose prefixes are bound nowhere
-are read too.
-
-Part of an XML file as a tree of elements: those that a form has a use for; the rest is left out while reading.
+Expat of the standard library.  Knows syntax only.  Names keep their prefix as written (`sensor:camera`), so that files
+whose prefixes are bound nowhere are read too.
 """
 
 from __future__ import annotations
@@ -11,14 +9,12 @@ from __future__ import annotations
 import re
 from functools import partial
 from math import inf, isfinite
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from xml.parsers import expat
 
 from frametool.documents.source import MOST_CHARACTERS, Source, line_of, not_text, pointer
 from frametool.errors import FileProblem, FormatError, bare, shown
 from frametool.text.numbers import parse_number
-
-TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -219,15 +215,12 @@ class XmlNode:
 
     def first(self, tag: str) -> XmlNode | None:
         """Return the first element of a kind, if there is one."""
-        for child in self.children:
-            if child.tag == tag:
-                return child
-        return None
+        return next(self.all(tag), None)
 
-    def text_of(self, tag: str, default: str = "") -> str:
-        """Return the text of the first element of a kind."""
+    def text_of(self, tag: str) -> str:
+        """Return the text of the first element of a kind; "" where there is none."""
         found = self.first(tag)
-        return default if found is None else found.text
+        return "" if found is None else found.text
 
     def attribute(self, name: str) -> str:
         """Return an attribute; "" where it is missing."""

@@ -1,21 +1,17 @@
 """YAML text to plain values, and to places, through the parser's events: knows YAML, no meaning.
 
 The library's constructors are not used: they build numbers, dates and truth values out of names, and they let a small
-text grow without bound.  The loop here keeps every scalar as text and counts depth and aliases as it goes.
-
-Long lists of plain maps, flow ones on a line each or block ones, and plain values in brackets: what big trees are.
+text grow without bound.  The loop here keeps every scalar as text and counts depth and aliases as it goes; what the
+parser complains of becomes one line that a person can act on.
 
       - {name: lidar, parent: base_link, xyz: [0.9, 0, 2.0], rpy_deg: [0, 0, 90]}
       - name: lidar
         parent: base_link
 
-Such lines differ from JSON only in the quotes.  Once a strict pattern has found nothing else in them, a few
-replacements make them JSON, which reads 100 000 of them in a quarter of the time that the YAML parser takes to tell its
-events (0.5 s against 2.1); anything unusual, also a mistake, goes to the parser.  In other forms lists and maps that
-stand in brackets behind their key, `f1: {xyz: [0.9, 0, 2.0]}`, are taken out in the same way: the parser then has one
-event of each.
-
-What the YAML parser complains of, in one line that a person can act on.
+Long lists of such maps, which big trees are, differ from JSON only in the quotes.  Once a strict pattern has found
+nothing else in them, a few replacements make them JSON, which reads 100 000 of them in a quarter of the time that the
+parser takes to tell its events (0.5 s against 2.1); anything unusual, also a mistake, goes to the parser.  In other
+forms plain values in brackets behind their key, `f1: {xyz: [0.9, 0, 2.0]}`, are taken out in the same way.
 """
 
 from __future__ import annotations
@@ -75,8 +71,7 @@ _QUOTES = (
 STANDIN = "0"
 _BRACKETED = rf"(?am)^( *+(?:- )?{_WORD}: )(\{{{_PAIR}(?:, {_PAIR})*+\}}|{_LIST})$"
 _NOT_PLAIN = r"""["'|>#&*!%@`?\t\r]"""  # quotes, comments, texts of several lines, anchors: brackets may be none there
-BRACKETS = "\ue000"
-"""Stands for a value in brackets."""
+BRACKETS = "\ue000"  # stands for a value in brackets
 
 
 def split_run(text: str) -> tuple[str, list[Any]] | None:
@@ -418,7 +413,7 @@ class _Builder:
                 self.copies -= len(container)
                 if self.copies < 0:
                     raise self._error(event, f"aliases repeat more than {SPARE_COPIES + len(self.source.text)} values")
-                for key, inner in _children(container):
+                for key, inner in list(container.items() if type(container) is dict else enumerate(container)):
                     if type(inner) is dict or type(inner) is list:
                         container[key] = inner.copy()
                         below.append(container[key])
@@ -430,8 +425,3 @@ class _Builder:
     def _error(self, event: Any, message: str) -> FormatError:
         """Make the error for the place where an event begins."""
         return error_at(self.source, event.start_mark.index, message)
-
-
-def _children(container: dict[str, Value] | list[Value]) -> list[tuple[Any, Value]]:
-    """Return keys or indices with their values."""
-    return list(container.items() if isinstance(container, dict) else enumerate(container))

@@ -139,7 +139,8 @@ class TransformBuffer(Frames):
         """Add a further sample of a frame that moves; returns whether it replaced another one."""
         if self.keep_ns is not None:
             self.policy.refuse_old(track, stamp_ns, self.keep_ns, authority)
-            self.policy.prune_before(track, self.keep_ns)
+            if self.policy.prunes_first:
+                track.drop_before(track.last_ns - self.keep_ns)
         if known := track.samples_at(stamp_ns):
             self._varies = self._varies or parent != known[-1][0]
             self._queries.clear()
@@ -149,8 +150,8 @@ class TransformBuffer(Frames):
             self._varies = True
             self._queries.clear()
         track.add(stamp_ns, parent, components)
-        if self.keep_ns is not None:
-            self.policy.prune_after(track, self.keep_ns)
+        if self.keep_ns is not None and not self.policy.prunes_first:
+            track.drop_before(track.last_ns - self.keep_ns)
         return False
 
     def _refuse_cycle(self, parent: str, child: str, stamp_ns: int, *, standing: bool) -> None:

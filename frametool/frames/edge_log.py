@@ -1,6 +1,6 @@
-"""What can be said of a recording edge by edge: how often, from when to when, where it pauses, jumps or goes back.
+"""What can be said of edges: how often they come, from when to when, where they pause, jump or go back.
 
-What a tree holds, edge by edge: how often and over which time, in a few words and as tf2 lists it.
+Of the samples of a recording in the order they came, and of what a tree holds: in a few words, and as tf2 lists it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import UnknownFrame
 from frametool.frames.path import edges_between
-from frametool.frames.stamps import BILLION, format_stamp
+from frametool.frames.policy import seconds
+from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, rigid
 
 if TYPE_CHECKING:
@@ -142,11 +143,6 @@ class EdgeLog:
         first, last = self.span
         return (self.count - 1) * BILLION / (last - first) if self.moves else None
 
-    @property
-    def longest(self) -> SampleStep | None:
-        """Return the step with the longest pause."""
-        return max(self.steps, key=lambda step: step.pause_ns, default=None)
-
     def gaps(self) -> list[SampleStep]:
         """Return the steps that waited far longer than usual."""
         usual = _median([step.pause_ns for step in self.steps])
@@ -194,17 +190,12 @@ def motion(track: MovingTrack) -> str:
     """Return in a few words how a frame moves: `41 at 10 Hz, 0 .. 4 s`."""
     first, last = track.span
     if first == last:
-        return f"one at {_short(first)} s" if track.count == 1 else f"{track.count} at once"
+        return f"one at {seconds(first)} s" if track.count == 1 else f"{track.count} at once"
     rate = (track.count - 1) * BILLION / (last - first)
     changes = sum(1 for _ in track.changes())
     times = f" {changes} times" if changes > 1 else ""
     other = f", reparented{times}" if changes else ""
-    return f"{track.count} at {rate:.4g} Hz, {_short(first)} .. {_short(last)} s{other}"
-
-
-def _short(stamp_ns: int) -> str:
-    """Write a stamp without the zeros at its end."""
-    return format_stamp(stamp_ns).rstrip("0").removesuffix(".")
+    return f"{track.count} at {rate:.4g} Hz, {seconds(first)} .. {seconds(last)} s{other}"
 
 
 class CacheEntry:

@@ -1,8 +1,7 @@
 """What can be asked of frames: which there are, how they hang together, where one is seen from another, and when.
 
-A tree of frames that stand still relative to one another.
-
-A recording played back: the same lookup again and again while its time goes by, as tf2_echo does on a robot.
+`Frames` answers for trees that stand still and for recordings alike; `FrameTree` holds what stands still.  A replay is
+the same lookup again and again while its time goes by.  Knows no files and no text.
 """
 
 from __future__ import annotations
@@ -178,7 +177,26 @@ class Frames:
         rate_hz: steps in a second.  start_ns, stop_ns: None for the `span`.  If nothing moves there is one step.
         Raises ValueInvalid for a rate whose steps are not between a nanosecond and a century; otherwise as `lookup`.
         """
-        return replay(self, target, source, rate_hz, start_ns, stop_ns)
+        period = BILLION / Fraction(checked_rate(rate_hz))
+        span = self.span(target, source)
+        if span is None:
+            yield Replayed(start_ns, self.lookup(target, source))
+            return
+        begin = span[0] if start_ns is None else whole_stamp(start_ns)
+        end = span[1] if stop_ns is None else whole_stamp(stop_ns)
+        if begin > end:
+            self.lookup(target, source, begin if stop_ns is None else end)  # raises: all the data lie on one side of it
+        steps = floor((end - begin + HALF) / period) + 1
+        steps -= begin + round((steps - 1) * period) > end
+        first = min(max(ceil((span[0] - begin - HALF) / period), 0), steps)
+        last = min(max(floor((span[1] - begin + HALF) / period) + 1, first), steps)
+        for number, count in chain([(0, first)], zip(range(first, last), repeat(1)), [(last, steps - last)]):
+            at_ns = begin + round(number * period)
+            try:
+                if count:
+                    yield Replayed(at_ns, self.lookup(target, source, at_ns), count)
+            except NoDataAt as error:
+                yield Replayed(at_ns, error, count)
 
     # --- the way ---
 
@@ -367,32 +385,6 @@ class Replayed(NamedTuple):
     at_ns: int | None
     found: Transform | NoDataAt
     steps: int = 1
-
-
-def replay(
-    frames: Frames, target: str, source: str, rate_hz: float, start_ns: int | None, stop_ns: int | None
-) -> Iterator[Replayed]:
-    """Yield the lookups of a replay; see Frames.replay."""
-    period = BILLION / Fraction(checked_rate(rate_hz))
-    span = frames.span(target, source)
-    if span is None:
-        yield Replayed(start_ns, frames.lookup(target, source))
-        return
-    begin = span[0] if start_ns is None else whole_stamp(start_ns)
-    end = span[1] if stop_ns is None else whole_stamp(stop_ns)
-    if begin > end:
-        frames.lookup(target, source, begin if stop_ns is None else end)  # raises: all the data lie on one side of it
-    steps = floor((end - begin + HALF) / period) + 1
-    steps -= begin + round((steps - 1) * period) > end
-    first = min(max(ceil((span[0] - begin - HALF) / period), 0), steps)
-    last = min(max(floor((span[1] - begin + HALF) / period) + 1, first), steps)
-    for number, count in chain([(0, first)], zip(range(first, last), repeat(1)), [(last, steps - last)]):
-        at_ns = begin + round(number * period)
-        try:
-            if count:
-                yield Replayed(at_ns, frames.lookup(target, source, at_ns), count)
-        except NoDataAt as error:
-            yield Replayed(at_ns, error, count)
 
 
 def checked_rate(rate_hz: float) -> float:

@@ -1,6 +1,6 @@
 """What a buffer accepts, and the words of its refusals: frametool's own; those of tf2 are in `frametool.frames.tf2`.
 
-The error of a lookup at a time without data: which edge, how far off, and when the whole way has data.
+Here too is the error of a lookup at a time without data: which edge, how far off, and when the whole way has data.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ class BufferPolicy:
 
     zero_counts = True  # whether a newest stamp of 0 is a time like any other
     refuses_cycles = True
+    prunes_first = False  # whether old samples go before a new one comes, and not after
     listing_decimals = 3  # of stamps, where frames are listed
     default_keep_ns: int | None = None
 
@@ -113,13 +114,6 @@ class BufferPolicy:
         """Report two frames of different trees."""
         return error
 
-    def prune_before(self, track: MovingTrack, keep_ns: int) -> None:
-        """Prune ahead of a new sample: not here."""
-
-    def prune_after(self, track: MovingTrack, keep_ns: int) -> None:
-        """Prune after a new sample."""
-        track.drop_before(track.last_ns - keep_ns)
-
     def looped(
         self, buffer: Frames, error: BadTopology, target: str, source: str, at_ns: int | None,
     ) -> tuple[list[str], list[str]]:  # fmt: skip
@@ -163,9 +157,13 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
     begin, end = max(track.first_ns for track in moving), min(track.last_ns for track in moving)
     parent = worst.parent_near(at_ns)
     off = f"{seconds(short)} s too {'early' if early else 'late'}"
+    cover = f"samples cover {format_stamp(first)} .. {format_stamp(last)}"
+    if first == last:
+        cover = f"its only sample is at {format_stamp(first)}"
+    clocks = "; that is years: one of the clocks counts from 1970, the other does not" if short >= OTHER_CLOCK else ""
     message = (
-        f"no data for {bare(parent)} -> {bare(worst.child)} at {format_stamp(at_ns)}; {_cover(first, last)} ({off}), "
-        f"{_way(target, source, path)}{_whole(moving, begin, end)}{_clocks(short)}"
+        f"no data for {bare(parent)} -> {bare(worst.child)} at {format_stamp(at_ns)}; {cover} ({off}), "
+        f"{_way(target, source, path)}{_whole(moving, begin, end)}{clocks}"
     )
     return (TooEarly if early else TooLate)(
         message, parent=parent, child=worst.child, at_ns=at_ns, first_ns=first, last_ns=last, short_ns=short,
@@ -194,12 +192,6 @@ def seconds(duration_ns: int) -> str:
     return format_stamp(duration_ns).rstrip("0").rstrip(".")
 
 
-def _cover(first: int, last: int) -> str:
-    if first == last:
-        return f"its only sample is at {format_stamp(first)}"
-    return f"samples cover {format_stamp(first)} .. {format_stamp(last)}"
-
-
 def _way(target: str, source: str, path: Sequence[Track]) -> str:
     """Write the way with arrows from source to target, cut in the middle when it is long."""
     frames = list(map(bare, frames_on(target, source, path)))
@@ -226,9 +218,3 @@ def _whole(moving: Sequence[MovingTrack], begin: int, end: int) -> str:
     early = min(moving, key=lambda track: track.last_ns)
     ended, begun = (f"{bare(track.parent)} -> {bare(track.child)}" for track in (early, late))
     return f"; {ended} ends at {format_stamp(end)} before {begun} begins at {format_stamp(begin)}: they never overlap"
-
-
-def _clocks(short: int) -> str:
-    if short < OTHER_CLOCK:
-        return ""
-    return "; that is years: one of the clocks counts from 1970, the other does not"

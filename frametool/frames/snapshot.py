@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadTopology, LookupFailed
 from frametool.geometry import rigid
 from frametool.geometry.rigid import IDENTITY
 
-TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
@@ -117,5 +116,4 @@ def _further(seen: SeenPose, step: Rigid) -> SeenPose:
 
 
 def _size(pose: Rigid) -> float:
-    x, y, z = map(abs, pose[:3])
-    return float(max(x, y, z))
+    return max(map(abs, pose[:3]))

@@ -49,7 +49,7 @@ class Ros1(BufferPolicy):
     def _complaints(self, parent: str, child: str, components: Rigid, authority: str) -> list[str]:
         """Return what tf2 logs of names and numbers, in its order."""
         start = f'Ignoring transform for child_frame_id "{child}" from authority "{authority}" because of'
-        position, rotation = (" ".join(map(_number, part)) for part in (components[:3], components[3:]))
+        position, rotation = (" ".join(map("{:f}".format, part)) for part in (components[:3], components[3:]))
         off = abs(sum(value * value for value in components[3:]) - 1.0)
         lines = []
         if child == parent:
@@ -179,6 +179,7 @@ class Ros2(Ros1):
 
     between = 'with frame_id and  child_frame_id "'
     listing_decimals = 6
+    prunes_first = True  # what is over age then lives on until the next sample
 
     def received(self, components: Rigid) -> Rigid:
         """Normalise the quaternion, as the way through a matrix does; of zero only nan is left."""
@@ -203,13 +204,6 @@ class Ros2(Ros1):
         if (parent, components) not in track.samples_at(stamp_ns):
             track.add(stamp_ns, parent, components)
         return False
-
-    def prune_before(self, track: MovingTrack, keep_ns: int) -> None:
-        """Prune ahead of a new sample: what is over age then lives on until the next."""
-        track.drop_before(track.last_ns - keep_ns)
-
-    def prune_after(self, track: MovingTrack, keep_ns: int) -> None:
-        """Leave what is over age."""
 
     def invalid(self, name: str, argument: str) -> str:
         """Return the words for an empty name or one with a slash."""
@@ -283,11 +277,6 @@ def _unit(components: Rigid) -> Rigid:
 
 def _received(child: str, stamp_ns: int, authority: str) -> str:
     return f"for frame {child} at time {stamp_ns / BILLION:f} according to authority {authority}"
-
-
-def _number(value: float) -> str:
-    """Write a number as printf's %f does."""
-    return f"{value:f}"
 
 
 def _double(duration_ns: int) -> float:

@@ -1,8 +1,7 @@
 """What one frame does over time: one pose in its parent for ever, or poses in its parents, oldest first.
 
-Knows stamps in integer nanoseconds and components; knows no other frames.
-
-Successive samples of one frame: a piece of a track that is short enough to be put in order again and again.
+Samples stand on pages, short enough to be put in order again and again.  Knows stamps in integer nanoseconds and
+components; knows no other frames.
 """
 
 from __future__ import annotations

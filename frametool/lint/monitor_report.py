@@ -50,7 +50,7 @@ def monitor(
 
 def edge_entry(log: EdgeLog) -> dict[str, Any]:
     """Describe an edge; what is not known or does not apply is None."""
-    longest = log.longest
+    longest = max(log.steps, key=lambda step: step.pause_ns, default=None)
     delays = log.delays_ns
     return {
         "kind": "moving" if log.moves else "static",

@@ -195,11 +195,6 @@ class Child:
         self.newest = seen
         self.log.add(seen.parent, seen.components, seen.stamp_ns, seen.line)
 
-    @property
-    def moves(self) -> bool:
-        """Return whether there are two different stamps."""
-        return len(self.stamps) > 1
-
 
 def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
     """Apply the rules to all edges of all files together."""
@@ -224,10 +219,11 @@ def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
 def _child(child: Child) -> Iterator[Finding]:
     """Apply the rules about one frame."""
     first, frame = child.first, f"frame {shown(child.first.child)}"
-    if child.stands is not None and child.moves:
+    moves = len(child.stamps) > 1
+    if child.stands is not None and moves:
         moving = next(each for each in (first, child.newest) if each.stamp_ns is not None)
         yield moving.finding("static-and-moving", f"{frame} moves, but stands still in {_at(child.stands)}")
-    elif child.moves:
+    elif moves:
         yield from _moving(child, frame)
         yield from _steps(child)
     elif other := child.other_parent:

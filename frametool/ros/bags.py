@@ -36,14 +36,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     Raises FileProblem when the extra is missing; FormatError for a bag that is broken or holds no transforms.
     """
     try:
-        yield from _edges(file.path, options)
+        with opened_bag(file.path, options.tally) as reader:
+            yield from _transforms(reader, file.path, options)
     except FormatError as error:
         options.report(error)
-
-
-def _edges(path: str, options: Options) -> Iterator[Edge]:
-    with opened_bag(path, options.tally) as reader:
-        yield from _transforms(reader, path, options)
 
 
 @contextmanager
@@ -151,18 +147,15 @@ def _is_read(connection: Any, options: Options) -> bool:
     return kind in TYPES or (kind in POSES and options.topics.chooses(connection.topic))
 
 
-def _parts(message: Any, topic: str, options: Options) -> tuple[str, Any, Any]:
-    """Return what a transform or a pose is about, its position and its rotation."""
-    if hasattr(message, "transform"):
-        return message.child_frame_id, message.transform.translation, message.transform.rotation
-    pose = getattr(message.pose, "pose", message.pose)
-    return getattr(message, "child_frame_id", "") or body_of(topic, options.answers), pose.position, pose.orientation
-
-
 def _edge(message: Any, number: int, path: str, options: Options, topic: str) -> Edge:
     """Return one TransformStamped, or a pose over time."""
     tally = options.tally
-    named, moved, turned = _parts(message, topic, options)
+    if hasattr(message, "transform"):
+        named, moved, turned = message.child_frame_id, message.transform.translation, message.transform.rotation
+    else:
+        pose = getattr(message.pose, "pose", message.pose)
+        named = getattr(message, "child_frame_id", "") or body_of(topic, options.answers)
+        moved, turned = pose.position, pose.orientation
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
     parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(named)
     components = unit_components(numbers, number, tally, options.normalize)

@@ -1,19 +1,14 @@
-"""Every message of a recording in text, one after the other, whatever form it is in: bounded memory, any length.
+"""Messages and transforms of a recording in text, one after the other: bounded memory, any length.
 
-Forms are those of `frametool.formats.FORMATS`. A message is plain values, as the document reader gives them.
-
-Transforms out of ROS messages in text: what the echo tools print, their CSV, rosbridge and Foxglove JSON lines.
-
-The CSV of the echo tools, as the messages it was made from.
+Of what the echo tools print and their CSV, of rosbridge's and Foxglove's JSON lines; what the tools or the shell print
+in between is passed over and counted.  A message is plain values, as the document reader gives them.
 
     %time,field.header.seq,field.header.stamp,field.header.frame_id,field.point.x,..      rostopic echo -p
     1795206353524626016,1,1795206353524626016,turtle1,1.0,..                               stamps in ns, nothing quoted
     1683377979,902062451,world,turtle1,5.5,5.5,0.0,0.0,0.0,0.0,1.0                         ros2 topic echo --csv
 
-rostopic names every field once, in the header; later rows may hold more or fewer transforms than it names. The
-other has no header: the kind of message is known by how many fields there are, several transforms follow each other.
-
-What the echo tools or the shell print between messages.
+rostopic names every field once, in the header; later rows may hold more or fewer transforms than it names.  The other
+has no header: how many fields there are tells the kind of message; several transforms follow each other.
 """
 
 from __future__ import annotations
@@ -75,7 +70,8 @@ def message2(cells: Sequence[str]) -> dict[str, Any]:
     Raises Misfit for a row that none of the known messages gives.
     """
     if len(cells) == 6:
-        return _nested(_TWIST if _is_number(cells[2]) else _POINT, cells)
+        is_number = not cells[2].strip("-+.0123456789eE")
+        return _nested(_TWIST if is_number else _POINT, cells)
     if len(cells) == 10:
         return _nested(_POSE, cells)
     return {"transforms": _entries(cells, TRANSFORM2)}
@@ -109,10 +105,6 @@ def _stamp1(cell: str) -> dict[str, str]:
         raise Misfit(f"stamp must be whole nanoseconds, found {shown(cell)}")
     seconds, nanoseconds = divmod(int(cell), BILLION)
     return {"secs": str(seconds), "nsecs": str(nanoseconds)}
-
-
-def _is_number(cell: str) -> bool:
-    return not cell.strip("-+.0123456789eE")
 
 
 # what the tools or the shell print between messages; the note about lost messages is the one that ends a document
@@ -167,17 +159,12 @@ def piece_messages(piece: Piece, name: str, form: str, tally: Tally) -> Iterator
         return
     at, line = 0, piece.line
     while at < len(piece.text):
-        end = end_of_document(piece.text, at)
+        separator = _SEPARATOR.search(piece.text, at)
+        end = separator.end() if separator else len(piece.text)
         text = piece.text[at:end]
         yield from _parsed(without_noise(text, line, tally), line, name)
         line += text.count("\n")
         at = end
-
-
-def end_of_document(text: str, at: int) -> int:
-    """Return the offset behind the next line that ends in `---`, or the end of the text."""
-    separator = _SEPARATOR.search(text, at)
-    return separator.end() if separator else len(text)
 
 
 def without_noise(text: str, line: int, tally: Tally) -> str:

@@ -81,13 +81,8 @@ def messages(value: dict[str, Any], path: Path) -> Iterator[tuple[dict[str, Any]
             yield within((*here, index), as_mapping, entry, "a TransformStamped"), (*here, index)
 
 
-def read_transform(
-    message: dict[str, Any], reading: Reading, *, may_be_nameless: bool = False
-) -> tuple[str, str, Vector, Quaternion, int | None]:
-    """Read one TransformStamped as (parent, child, position, rotation, stamp_ns); no stamp is None.
-
-    may_be_nameless: as a pose it needs no frames; their names are then "".
-    """
+def read_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str, Vector, Quaternion, int | None]:
+    """Read one TransformStamped as (parent, child, position, rotation, stamp_ns); no stamp is None."""
     if "parent_frame_id" in message:
         return _read_frame_transform(message, reading)
     only(message, ("header", "child_frame_id", "transform"))
@@ -98,8 +93,8 @@ def read_transform(
     position, rotation = within(("transform",), read_rigid, transform, ("translation", "rotation"), reading)
     if STALE in transform:
         _warn_of_stale_angles(transform[STALE], rotation, reading)
-    parent = frame_of(header, "frame_id", ("header",), reading, may_be_empty=may_be_nameless)
-    child = frame_of(message, "child_frame_id", (), reading, may_be_empty=may_be_nameless)
+    parent = frame_of(header, "frame_id", ("header",), reading)
+    child = frame_of(message, "child_frame_id", (), reading)
     return parent, child, position, rotation, header_stamp(header)
 
 
@@ -118,11 +113,8 @@ def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) ->
 
 HAS = "a message with a pose has header, pose"
 TYPES = frozenset(
-    f"{package}/msg/{name}"
-    for package, name in (
-        ("geometry_msgs", "PoseStamped"), ("geometry_msgs", "PoseWithCovarianceStamped"), ("nav_msgs", "Odometry"),
-    )
-)  # fmt: skip
+    ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry")
+)
 
 
 def is_pose(value: Any) -> bool:
@@ -135,9 +127,7 @@ def body_of(topic: str, answers: Answers) -> str:
     return answers.frames[-1] if answers.frames else topic.strip("/") or "body"
 
 
-def read_pose(
-    message: dict[str, Any], reading: Reading, body: str
-) -> tuple[str, str, Vector, Quaternion, int | None]:
+def read_pose(message: dict[str, Any], reading: Reading, body: str) -> tuple[str, str, Vector, Quaternion, int | None]:
     """Read one message as (parent, child, position, rotation, stamp_ns); `body` is the child where it names none."""
     header = part(message, "header", HAS)
     pose = part(message, "pose", HAS)
@@ -224,13 +214,9 @@ def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
     return inner
 
 
-def frame_of(
-    mapping: dict[str, Any], key: str, path: Path, reading: Reading, *, may_be_empty: bool = False
-) -> str:
+def frame_of(mapping: dict[str, Any], key: str, path: Path, reading: Reading) -> str:
     """Read a frame's name; one leading `/` goes, as tf2 does it, and is noted."""
     name = mapping.get(key)
-    if may_be_empty and name in ("", None) and key in mapping:
-        return ""
     here = (*path, key) if key in mapping else path
     if type(name) is not str or not name:
         raise Misfit(f"{key} must name a frame, found {kind(name or None)}", here)

@@ -121,7 +121,7 @@ def planar(x: float, y: float, theta: float) -> Transform:
 
 
 STILL = 1e-4  # m/s and rad/s: draw_square's own threshold of standing
-CIRCLING = Twist(2.0, 1.8)  # the command of the turtlesim tutorial
+CIRCLING = Twist(2.0, 1.8)  # the command of the turtlesim tutorial: to the left with a radius of 1.11 m
 KEYS = {"up": Twist(2.0, 0.0), "down": Twist(-2.0, 0.0), "left": Twist(0.0, 2.0), "right": Twist(0.0, -2.0)}
 
 
@@ -136,10 +136,7 @@ class Heading(NamedTuple):
 
 
 # the keys around F of the ROS 2 teleop
-HEADINGS = {
-    **{key: Heading(math.radians(45.0 * count)) for count, key in enumerate("gtredcvb")},
-    "f": Heading(None),
-}  # fmt: skip
+HEADINGS = {key: Heading(math.radians(45.0 * count)) for count, key in enumerate("gtredcvb")} | {"f": Heading(None)}
 
 
 class Leader(Protocol):
@@ -242,11 +239,6 @@ class Periodic:
         return self._drive(now_ns, pose)
 
 
-def circle(now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG001 - looks at nothing
-    """Go round to the left with a radius of 1.11 m."""
-    return CIRCLING
-
-
 def figure_eight(now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG001
     """Go round to the left, then to the right, and so on."""
     turns = int(now_ns / BILLION * CIRCLING.angular_z / (2.0 * math.pi))
@@ -309,7 +301,7 @@ def wanderer(seed: int = 0) -> Callable[[int, TurtlePose], Twist]:
 # name -> what makes the leader of a seed
 LEADERS: dict[str, Callable[[int], Leader]] = {
     "still": lambda _: Script(()),
-    "circle": lambda _: Periodic(BILLION // 2, circle),
+    "circle": lambda _: Periodic(BILLION // 2, lambda *_: CIRCLING),
     "square": lambda _: Periodic(TICK_NS, Square().drive),
     "figure8": lambda _: Periodic(TICK_NS, figure_eight),
     "random": lambda seed: Periodic(BILLION // 10, wanderer(seed)),

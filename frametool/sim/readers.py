@@ -173,15 +173,8 @@ def parse_gains(text: str) -> list[float]:
     return [float(f"{value:.12g}") for value in values]  # 0.8 rather than 0.7999999999999999
 
 
-COLUMNS = {
-    "t": "t",
-    "linear": "linear",
-    "angular": "angular",
-    "linear_y": "linear_y",
-    "linear_x": "linear",
-    "angular_z": "angular",
-}
 NEEDED = ("t", "linear", "angular")
+COLUMNS = {name: name for name in (*NEEDED, "linear_y")} | {"linear_x": "linear", "angular_z": "angular"}
 RECORDED = ("turtle", "distance", "leader_x", "leader_y", "leader_theta", "x", "y", "theta")  # not looked at
 ENTRY_KEYS = ("t", "turtle", "linear", "angular", "linear_y")
 AXES = ("x", "y", "z")

@@ -70,7 +70,7 @@ def _has_ended(stream: ByteStream) -> bool:
 
     try:
         poll = select.poll()
-        poll.register(stream.fileno(), select.POLLIN | select.POLLHUP)  # type: ignore[attr-defined]
+        poll.register(stream.fileno(), select.POLLIN | select.POLLHUP)
     except (AttributeError, OSError, ValueError):
         return True
     return bool(poll.poll(20))

@@ -1,19 +1,11 @@
-"""The shortest decimal numbers that read back to the same floats, in bulk, as integers times powers of ten.
+"""Floats as the shortest decimals that read back the same, in bulk, and decimals laid out as text, the points aligned.
 
-For a float of ulp u let 10**k be the power with 1 <= u / 10**k < 10. The float is scaled by 10**-k to a sum of an
-integer and a fraction, good to about 2**-45; its neighbours' midpoints lie half an ulp away. A multiple of ten inside
-them is the shortest answer, once its trailing zeros are cut; there is at most one. Otherwise the nearest integer is.
-Whatever lies closer to a boundary than the error allows is marked unsure and left to `repr`.
-Source: the two candidates are those of Giulietti's Schubfach (2020), sections 8 and 9; the 128-bit integers are
-replaced by sums of two floats.
-
-Decimal numbers laid out in rows of 40 bytes, the point of every one in the same place, as spans.
-
-    bytes  0 .. 14   sign and whole part, right-aligned     0 ..  7, 8 .. 15   two words of characters
-    byte  15         the point
-    bytes 16 .. 32   fraction, left-aligned                16 .. 23, 24 .. 31, 32 .. 39   three words
-A number begins where its first digit or sign stands and ends where its last wanted digit does: what stands outside is
-never shown, so that neither leading nor trailing zeros have to be moved.
+For a float of ulp u let 10**k be the power with 1 <= u / 10**k < 10.  The float is scaled by 10**-k to a sum of an
+integer and a fraction, good to about 2**-45; its neighbours' midpoints lie half an ulp away.  A multiple of ten inside
+them is the shortest answer, once its trailing zeros are cut; there is at most one.  Otherwise the nearest integer is.
+What lies closer to a boundary than the error allows is marked unsure and left to `repr`.
+Source: the two candidates are those of Giulietti's Schubfach (2020), sections 8 and 9, with sums of two floats in the
+place of 128-bit integers.
 """
 
 from __future__ import annotations
@@ -130,7 +122,14 @@ _POINT_CHARACTER = np.uint64(ord(".") << 56)
 
 
 class Fields:
-    """Rows of WIDTH bytes, seen as five words and as one long array of bytes between two margins."""
+    """Rows of WIDTH bytes, seen as five words and as one long array of bytes between two margins.
+
+    bytes  0 .. 14   sign and whole part, right-aligned     0 ..  7, 8 .. 15   two words of characters
+    byte  15         the point
+    bytes 16 .. 32   fraction, left-aligned                16 .. 23, 24 .. 31, 32 .. 39   three words
+    A number begins where its first digit or sign stands and ends where its last wanted digit does: what stands outside
+    is never shown, so that neither leading nor trailing zeros have to be moved.
+    """
 
     def __init__(self, rows: int) -> None:
         """Make room for so many rows; their content is arbitrary until written."""

@@ -1,7 +1,6 @@
-"""Decimal digits of non-negative integers as eight characters in one 64-bit word, the first in the lowest byte.
+"""Decimal digits as eight characters in one 64-bit word, the first in the lowest byte, and arithmetic to 100 bits.
 
-Powers of ten as the sum of two floats, and exact products of floats: arithmetic to about 100 bits.
-
+Powers of ten are sums of two floats; products of floats are exact, as a float and its error.
 Source: Dekker 1971 (splitting, exact product); Veltkamp's constant 2^27 + 1.
 """
 

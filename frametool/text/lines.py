@@ -1,10 +1,7 @@
-"""Read a stream in blocks of whole lines: a typed line at once, a full pipe in large pieces.
+"""Read a stream in blocks of whole lines: a typed line at once, a full pipe in large pieces, a file also as ranges.
 
-Knows nothing of numpy, so that a tool which sees only a few lines stays light.
-
-Blocks of a file as the ranges of bytes where they stand, for processes that read them themselves.
-
-Knows nothing of what lines hold, nor of who reads them.
+Ranges are for processes that read them themselves.  Knows nothing of what lines hold, nor of numpy, so that a tool
+which sees only a few lines stays light.
 """
 
 from __future__ import annotations
@@ -12,33 +9,16 @@ from __future__ import annotations
 import os
 import stat
 from time import monotonic
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FileProblem, FormatError
 
-TYPE_CHECKING = False
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from typing import Protocol
+    from io import BufferedIOBase
+    from typing import TypeAlias
 
-    class ByteStream(Protocol):
-        """A binary stream that gives what has arrived."""
-
-        def read1(self, size: int, /) -> bytes:
-            """Return at most `size` bytes, waiting only while there are none; nothing at the end."""
-
-    class FileStream(ByteStream, Protocol):
-        """A stream that may be a file."""
-
-        def fileno(self) -> int:
-            """Return its descriptor."""
-
-        def tell(self) -> int:
-            """Return the place behind what was taken."""
-
-        def seek(self, place: int, /) -> int:
-            """Go on at a place."""
+    ByteStream: TypeAlias = BufferedIOBase  # `read1` gives what has arrived, and waits only while there is nothing
 
 
 BLOCK_BYTES = 1 << 19
@@ -119,7 +99,7 @@ def _readiness(stream: ByteStream) -> Callable[[int], bool]:
 
     try:
         poll = select.poll()
-        poll.register(stream.fileno(), select.POLLIN)  # type: ignore[attr-defined]
+        poll.register(stream.fileno(), select.POLLIN)
     except (AttributeError, OSError, ValueError):
         return lambda _patience: False
     return lambda patience: bool(poll.poll(patience))
@@ -163,9 +143,8 @@ class Extent(NamedTuple):
 def extent_in_file(stream: ByteStream) -> Extent | None:
     """Return what is left of a plain file, None if a stream is something else."""
     try:
-        file: FileStream = stream  # type: ignore[assignment]
-        about = os.fstat(file.fileno())
-        return Extent(file.tell(), about.st_size) if stat.S_ISREG(about.st_mode) else None
+        about = os.fstat(stream.fileno())
+        return Extent(stream.tell(), about.st_size) if stat.S_ISREG(about.st_mode) else None
     except (AttributeError, OSError, ValueError):
         return None
 
@@ -185,16 +164,13 @@ def blocks_behind(
     whole: makes what tells how many bytes of a text are finished records
     Raises FileProblem if the file ends before it did at the start: what was there is lost then.
     """
-    file: FileStream = stream  # type: ignore[assignment]
-    at = extent.begin + taken
-    for each in _ranges(file.fileno(), name, at, size, whole()):
+    at, file = extent.begin + taken, stream.fileno()
+    for each in _ranges(file, name, at, size, whole()):
         yield each
         at = each.start + each.size
-    file.seek(at)
-    yield from read_blocks(
-        stream, size=size, whole=whole(), lines_before=lambda: _count_lines(file.fileno(), extent.begin, at)
-    )
-    if file.tell() < extent.end:
+    stream.seek(at)
+    yield from read_blocks(stream, size=size, whole=whole(), lines_before=lambda: _count_lines(file, extent.begin, at))
+    if stream.tell() < extent.end:
         raise _shrunk(name)
 
 

@@ -1,9 +1,8 @@
-"""Numbers and angles as people write them: knows text, knows no document.
+"""Numbers, lengths and angles as people write them: knows text, knows no document.
 
 A number is what YAML 1.2 and JSON call one (`1e-3`, `-.5`, `5.`, `010` is ten); what YAML 1.1 would add (base 60,
-octal, hexadecimal, underscores) is refused with the reason.  An angle may also say its unit or a multiple of pi.
-
-Units in the names of columns and behind numbers: `x_mm`, `yaw [deg]`, `2cm`.
+octal, hexadecimal, underscores) is refused with the reason.  Units stand behind numbers and in the names of columns:
+`2cm`, `x_mm`, `yaw [deg]`; an angle may also be a multiple of pi.
 """
 
 from __future__ import annotations
@@ -102,7 +101,7 @@ def read_number_or_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT
 
 
 def _refusal(text: str, message: str) -> ValueInvalid:
-    """Make the error: what reads as a number and is none that can be used is told from what is no number."""
+    """Return NotFinite for nan, inf and what no double holds, ValueInvalid for anything else that is not a number."""
     return NotFinite(message) if _reason(text) == _NOT_FINITE else ValueInvalid(message)
 
 
@@ -170,15 +169,10 @@ def odd_characters(text: str) -> str:
 
     Returns "" where there is none.
     """
-    odd = next((c for c in text if ord(c) > 126 and (c in _ODD_MINUS or c.isdigit() or not _visible(c))), None)
+    odd = next((c for c in text if ord(c) > 126 and (c in _ODD_MINUS or c.isdigit() or not c.isprintable())), None)
     if odd is None:
         return ""
     from unicodedata import name
 
     kind = "a look-alike of '-'" if odd in _ODD_MINUS else "a digit of another script" if odd.isdigit() else "invisible"
     return f"{name(odd, 'a control character').lower()} (U+{ord(odd):04X}), {kind}"
-
-
-def _visible(character: str) -> bool:
-    """Say whether a person sees something where the character stands."""
-    return character.isprintable() and not character.isspace()

@@ -1,12 +1,9 @@
-"""Text to floats in bulk, every one rounded as Python's `float` rounds it.
+"""Text to floats in bulk, every one rounded as Python's `float` rounds it; and floats of seconds to nanoseconds.
 
 The common cell, a sign, up to eight digits, a point and up to 24 digits, is read in words of eight characters; blanks
 around it and an exponent cost a second look. Where the result is too near to the middle of two floats, where the cell
 is longer, or is no number, Python's own reader decides. Source of the exact division: Clinger 1990.
-
-Seconds in floats as whole nanoseconds: those of the decimal that the float prints as, not of its last bit.
-
-Knows no text: 1700000000.1 is 1700000000100000000 ns here as it is where it stands in a table.
+Seconds are those of the decimal that a float prints as, not of its last bit: 1700000000.1 is 1700000000100000000 ns.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
-"""Stretches of text inside one byte array, and joining many of them into one block.
+"""Stretches of text inside one byte array, and joining many of them into one block; the kinds of arrays of `text`.
 
 A span is a start and an end in `data`; columns of text are arrays of spans, so that text which only passes through is
 never decoded. Knows nothing of what the text means.
-
-Names for the kinds of arrays the text layer passes around, and how it walks long ones.
 """
 
 from __future__ import annotations
@@ -59,9 +57,10 @@ def join(columns: Sequence[Spans]) -> bytes:
     total = int(ends[-1, -1]) if ends.size else 0
     out = np.empty(total + MARGIN, np.uint8)
     places = ends - lengths
-    width = _width(lengths)
+    longest = int(lengths.max(initial=1))
+    width = min(-(-longest // 8) * 8, MARGIN)
     _copy_windows(out, places, parts, width)
-    if int(lengths.max(initial=0)) > width:
+    if longest > width:
         _copy_long(out, places, parts, width)
     return out[:total].tobytes()
 
@@ -69,11 +68,6 @@ def join(columns: Sequence[Spans]) -> bytes:
 def _as_columns(part: Spans) -> Spans:
     shape = (len(part.starts), -1) if part.starts.size else (0, 1)
     return Spans(part.data, part.starts.reshape(shape), part.ends.reshape(shape))
-
-
-def _width(lengths: Ints) -> int:
-    longest = int(lengths.max(initial=1))
-    return min(-(-longest // 8) * 8, MARGIN)
 
 
 def _copy_windows(out: Bytes, places: Ints, parts: Sequence[Spans], width: int) -> None:
@@ -100,16 +94,10 @@ def _copy_long(out: Bytes, places: Ints, parts: Sequence[Spans], width: int) -> 
         first += part.starts.shape[1]
 
 
-def _keep_heap() -> None:
-    """Let the C library keep freed memory instead of giving it back to the system after every block.
-
-    Freeing one large untouched allocation raises glibc's thresholds for that (mallopt(3), M_MMAP_THRESHOLD: dynamic).
-    Without it each temporary array is paid for in page faults: 119 instead of 28 ns a float were measured.
-    """
-    np.empty(1 << 24, np.uint8)
-
-
-_keep_heap()
+# Let the C library keep freed memory instead of giving it back to the system after every block: freeing one large
+# untouched allocation raises glibc's thresholds for that (mallopt(3), M_MMAP_THRESHOLD: dynamic).  Without it each
+# temporary array is paid for in page faults: 119 instead of 28 ns a float were measured.
+np.empty(1 << 24, np.uint8)
 
 
 Bytes: TypeAlias = NDArray[np.uint8]

@@ -1,8 +1,6 @@
-"""Floats to the shortest text that reads back to the same bits, in bulk, byte for byte as `repr` writes them.
+"""Floats to text in bulk: the shortest that reads back the same, or a fixed number of decimals.
 
-Floats of 32 bits to the shortest text that reads back to the same 32 bits.
-
-Floats to text with a fixed number of decimals, in bulk, byte for byte as `'%.{precision}f'` writes them.
+Byte for byte as `repr` and `'%.{precision}f'` write them; floats of 32 bits as the shortest that reads back to these.
 """
 
 from __future__ import annotations

@@ -118,11 +118,6 @@ class FrameScene:
         """Return the parent of a frame at the time; None for a root and where it is not known."""
         return self.tree.parent(name, self.at_ns)
 
-    def edge(self, name: str) -> Rigid | None:
-        """Return parent_from_child of a frame at the time; None for a root and where there are no data."""
-        track = self.tree.track(name)
-        return None if track is None else track.at(self.at_ns or 0)
-
     def poses(self) -> dict[str, Rigid]:
         """Return the pose in `fixed` of every chosen frame that is connected to it at the time, parents first."""
         now = Snapshot(self.tree, self.at_ns)

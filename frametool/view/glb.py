@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 import struct
-from array import array
 from operator import mul
 from typing import TYPE_CHECKING, Any
 
 from frametool import __version__
 from frametool.frames.stamps import BILLION
+from frametool.sim.turtle import single
 from frametool.view.frame_scene import can_be_drawn
 from frametool.view.projection import Projection, Size
 
@@ -98,15 +98,10 @@ def _add_axes(part: BinaryPart) -> None:
         for a, b, c, d in SIDES:
             faces += [first + corner for corner in (a, b, c, a, c, d)]
     low, high = [-THICK] * 3, [1.0] * 3
-    part.floats(places, "VEC3", target=VERTICES, min=[_single(value) for value in low], max=high)
+    part.floats(places, "VEC3", target=VERTICES, min=[single(value) for value in low], max=high)
     colours = b"".join(bytes(colour) * 8 for colour in COLOURS)
     part.add(colours, "VEC4", UBYTE, len(places), target=VERTICES, normalized=True)
     part.add(struct.pack(f"<{len(faces)}H", *faces), "SCALAR", USHORT, len(faces), target=INDICES)
-
-
-def _single(value: float) -> float:
-    """Round to float32, as the numbers in the buffer are."""
-    return array("f", (value,))[0]
 
 
 def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[list[dict[str, Any]], dict[str, int]]:
@@ -114,7 +109,8 @@ def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[lis
     nodes: list[dict[str, Any]] = [{"name": "z up", "rotation": Z_UP, "children": []}]
     index: dict[str, int] = {}
     for name, pose in poses.items():
-        parent, edge = scene.parent(name), scene.edge(name)
+        parent, track = scene.parent(name), scene.tree.track(name)
+        edge = None if track is None else track.at(scene.at_ns or 0)
         above, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
         index[name] = len(nodes)
         nodes[above]["children"].append(index[name])
@@ -146,7 +142,7 @@ def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence
     places: list[Sequence[float]] = []
     rotations: list[Sequence[float]] = []
     for stamp_ns, _, sample in track.walk():
-        second = _single((stamp_ns - first_ns) / BILLION)
+        second = single((stamp_ns - first_ns) / BILLION)
         if seconds and second <= seconds[-1]:
             continue
         rotation = sample[3:]

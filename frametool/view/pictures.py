@@ -245,7 +245,7 @@ def still_picture(
         PictureLine([flat.at(a)[:2], flat.at(b)[:2]], "zero" if zero else "faint") for a, b, zero in ground
     ]
     for link in flat.links:
-        points = [flat.origin(name)[:2] for name in link]
+        points = [flat.origins[name][:2] for name in link]
         shapes.append(PictureLine(points, "soft", alpha=0.7, dashes=(4.0, 3.0)))
     for frame, stretches in flat.trails:
         for stretch in stretches:
@@ -264,7 +264,7 @@ def still_picture(
 
 def _frame(flat: Projection, name: str) -> Iterator[Shape]:
     """Draw the axes of a frame, the nearest last."""
-    x, y, _ = flat.origin(name)
+    x, y, _ = flat.origins[name]
     tips = flat.tips(name)
     yield from (PictureLine([(x, y), tips[axis][:2]], AXES[axis], 2.0, title=name) for axis in flat.axis_order(name))
     yield PictureDot(x, y, 2.2, "ink", name)
@@ -275,7 +275,7 @@ def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
     x, y, _ = flat.at(pose[:3])
     for axis, tip in zip(AXES, axis_tips(pose, flat.axis), strict=True):
         yield PictureLine([(x, y), flat.at(tip)[:2]], axis, 2.0, 0.4, title=name)
-    yield PictureLine([flat.origin(name)[:2], (x, y)], "trail", 1.5)
+    yield PictureLine([flat.origins[name][:2], (x, y)], "trail", 1.5)
 
 
 def _label(label: Label) -> Iterator[Shape]:

@@ -85,6 +85,7 @@ class Projection:
     poses: of the drawn frames in `fixed`, by name
     trails: where the moving ones went
     links: (parent, child) where both are drawn
+    origins: where they are on the picture
     axis: metres of a drawn axis
     scale: pixels of a metre
     view: the directions right, up and toward the eye
@@ -109,7 +110,7 @@ class Projection:
             room[1] / max(up - down, LEAST),
             0.4 * min(size[:2]) / (AXIS_PART * usual),  # one frame alone is not blown up
         )
-        self._origins = {name: self.at(pose[:3]) for name, pose in self.poses.items()}
+        self.origins = {name: self.at(pose[:3]) for name, pose in self.poses.items()}
         least, most = (pixels / self.scale for pixels in size.axes)
         self.axis = min(max(AXIS_PART * usual, least), most)
 
@@ -137,17 +138,13 @@ class Projection:
         across = self.size.width / 2.0 + (right - self.middle[0]) * self.scale
         return Flat(across, self.size.height / 2.0 - (up - self.middle[1]) * self.scale, toward)
 
-    def origin(self, name: str) -> Flat:
-        """Return where a frame is on the picture."""
-        return self._origins[name]
-
     def tips(self, name: str, part: float = 1.0) -> list[Flat]:
         """Return where the axes x, y, z of a frame end, or a part of the way there."""
         return [self.at(tip) for tip in axis_tips(self.poses[name], part * self.axis)]
 
     def nearest_last(self) -> list[str]:
         """Return the frames from the farthest to the nearest to the eye."""
-        return sorted(self.poses, key=lambda name: self.origin(name).depth)
+        return sorted(self.poses, key=lambda name: self.origins[name].depth)
 
     def axis_order(self, name: str) -> list[int]:
         """Return the axes 0, 1, 2 of a frame from the farthest to the nearest."""
@@ -158,13 +155,13 @@ class Projection:
         """Gather the frames that lie within some pixels of one another, nearest to the eye first."""
         spots: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
         for name in reversed(self.nearest_last()):
-            place = self.origin(name)
+            place = self.origins[name]
             spots.setdefault((round(place.x / near), round(place.y / near)), (place, []))[1].append(name)
         return list(spots.values())
 
     def crowded(self) -> int:
         """Return how many frames lie in a small spot of the picture, where that is most of them; else 0."""
-        places = [self.origin(name) for name in self.poses]
+        places = self.origins.values()
         middle = [sorted(column)[len(places) // 2] for column in zip(*(place[:2] for place in places), strict=True)]
         reach = SPOT * min(self.size[:2])
         near = sum(math.dist(place[:2], middle) < reach for place in places)
@@ -265,7 +262,7 @@ def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box]
     for box in blocked:
         taken.add(box)
     for name in flat.poses:
-        x, y, _ = flat.origin(name)
+        x, y, _ = flat.origins[name]
         taken.add((x - 3.0, y - 3.0, x + 3.0, y + 3.0))
         for part in (0.4, 0.7, 1.0):
             for tip in flat.tips(name, part):

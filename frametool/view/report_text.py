@@ -7,11 +7,10 @@ from importlib import import_module
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import printable
+from frametool.errors import cells, printable
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS
 from frametool.frames.stamps import format_stamp
-from frametool.view.pose_text import in_width
-from frametool.view.tree_text import cells
+from frametool.view.pose_text import WIDTH, in_width
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -70,7 +69,6 @@ def _chain(entry: dict[str, Any]) -> str:
     return in_width(f"{entry['parents']}:", sentence)
 
 
-WIDTH = 80
 NUMBER = 11  # columns of each number
 LABEL = WIDTH - 4 * NUMBER
 
@@ -161,7 +159,6 @@ def short(name: str, width: int) -> str:
     return f"{name[:keep]}...{name[-keep:]}"
 
 
-LIST_WIDTH = 80
 LIST_LABEL = 15  # columns, the indent included
 CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH}
 
@@ -225,13 +222,13 @@ def example_of(name: str) -> list[str]:
     for module in filter(None, (FORMATS[name].reader, FORMATS[name].writer)):
         text = import_module(module).__doc__ or ""
         if lines := [line[4:] for line in text.split("\n") if line.startswith("    ")]:
-            return [line if len(line) <= LIST_WIDTH - 4 else f"{line[: LIST_WIDTH - 7].rstrip()} .." for line in lines]
+            return [line if len(line) <= WIDTH - 4 else f"{line[: WIDTH - 7].rstrip()} .." for line in lines]
     return []
 
 
 def _labelled(label: str, texts: Iterable[str | None]) -> str:
     """Return lines with a label before the first, folded."""
-    lines = [line for text in texts if text for line in wrap(text, LIST_WIDTH - LIST_LABEL, break_on_hyphens=False)]
+    lines = [line for text in texts if text for line in wrap(text, WIDTH - LIST_LABEL, break_on_hyphens=False)]
     first = f"  {label:{LIST_LABEL - 2}}"
     apart = "\n" + " " * LIST_LABEL
     return f"{first.rstrip() + apart if len(label) + 2 >= LIST_LABEL else first}{apart.join(lines)}\n"

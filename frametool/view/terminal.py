@@ -123,7 +123,7 @@ class TerminalPicture:
         """Draw the links, the trails and the axes."""
         flat = self._flat
         for parent, name in flat.links:
-            self._line(flat.origin(parent), flat.origin(name), "bright_black", LINK, 3)
+            self._line(flat.origins[parent], flat.origins[name], "bright_black", LINK, 3)
         for trail in flat.trails:
             for stretch in trail.stretches:
                 places = [flat.at(point) for point in stretch]
@@ -132,7 +132,7 @@ class TerminalPicture:
         for name in flat.nearest_last():
             tips = flat.tips(name)
             for axis in flat.axis_order(name):
-                self._line(flat.origin(name), tips[axis], AXES[axis], AXIS)
+                self._line(flat.origins[name], tips[axis], AXES[axis], AXIS)
 
     def _line(self, begin: Flat, end: Flat, colour: str, rank: int, gap: int = 1) -> None:
         """Set every dot, or every second, third, .. between two places."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid, printable
+from frametool.errors import ValueInvalid, cells, printable
 from frametool.geometry.transform import Transform
 from frametool.grammar.result import edge_label
 
@@ -80,7 +81,8 @@ def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
     poses = 2 + positions + max((sum(2 + cells(part) for part in label[1:]) for label in labels), default=0)
     names = _widest(lines)
     if names + poses > WIDEST:
-        lines = [line._replace(branch=_narrowed(line.branch)) for line in lines]
+        # each level takes two cells instead of four
+        lines = [line._replace(branch=re.sub("(.)..(.)", r"\1\2", line.branch)) for line in lines]
         names = _widest(lines)
     if names + poses > WIDEST:
         yield from ((line, "  " * bool(line.label)) for line in lines)
@@ -90,23 +92,9 @@ def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
         yield line._replace(label=label), " " * bool(label) * (names - len(line.branch) - cells(line.frame) + 2)
 
 
-def _narrowed(branch: str) -> str:
-    """Let each level take two cells instead of four."""
-    return "".join(branch[at] + branch[at + 3] for at in range(0, len(branch), 4))
-
-
 def _widest(lines: Sequence[DrawnFrame]) -> int:
     """Return how many cells the widest name takes, with the lines before it."""
     return max((len(line.branch) + cells(line.frame) for line in lines), default=0)
-
-
-def cells(text: str) -> int:
-    """Count the cells a text takes on a terminal: wide characters take two."""
-    if text.isascii():
-        return len(text)
-    from unicodedata import combining, east_asian_width
-
-    return sum(0 if combining(each) else 2 if east_asian_width(each) in "WF" else 1 for each in text)
 
 
 def _lines(tree: Frames, style: Style) -> Iterator[DrawnFrame]:

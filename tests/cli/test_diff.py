@@ -161,7 +161,7 @@ def test_a_report_goes_into_a_file_whose_suffix_says_its_form(run: Run, tmp_path
 
 @pytest.mark.parametrize("name", ["a" * 100, "\u6a5f\u68b0" * 30, "x\x1b[31m", "with blank " * 9])
 def test_the_report_fits_80_columns_and_steers_no_terminal(run: Run, name: str) -> None:
-    from frametool.view.tree_text import cells
+    from frametool.errors import cells
 
     one = f"frames: {{{json.dumps(name)}: {{{json.dumps(name + 'b')}: {{xyz: [0, 0, 1]}}, old: {{xyz: [1, 0, 0]}}}}}}"
     other = one.replace("0, 1]", "1000, 1]").replace("old", "new") + f"\n---\n{{name: {json.dumps(name)}, parent: top}}"

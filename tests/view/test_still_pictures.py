@@ -65,7 +65,7 @@ def test_everything_lies_inside_the_picture_and_no_name_over_another(name: str, 
     flat = Projection(FrameScene(frametool.load(ROOT / "examples" / name)), SIZE, EYES[eye])
     labels, _ = place_labels(flat)
     for frame in flat.poses:
-        x, y, _ = flat.origin(frame)
+        x, y, _ = flat.origins[frame]
         assert SIZE.margin - 1e-6 <= x <= WIDTH - SIZE.margin + 1e-6
         assert SIZE.margin - 1e-6 <= y <= HEIGHT - SIZE.margin + 1e-6
     for a, b in itertools.combinations([label.box for label in labels], 2):
@@ -74,7 +74,7 @@ def test_everything_lies_inside_the_picture_and_no_name_over_another(name: str, 
 
 def test_the_eye_in_front_sees_y_to_the_right_and_z_up() -> None:
     flat = Projection(FrameScene(star((0, 1, 0), (0, 0, 1), (1, 0, 0))), SIZE, EYES["front"])
-    middle, y, z, x = (flat.origin(name) for name in ("map", "f0", "f1", "f2"))
+    middle, y, z, x = (flat.origins[name] for name in ("map", "f0", "f1", "f2"))
     assert (y.x > middle.x, y.y == pytest.approx(middle.y)) == (True, True)
     assert (z.y < middle.y, z.x == pytest.approx(middle.x)) == (True, True)
     assert x.depth == pytest.approx(1.0)
@@ -82,7 +82,7 @@ def test_the_eye_in_front_sees_y_to_the_right_and_z_up() -> None:
 
 def test_the_eye_above_sees_x_to_the_right_and_y_up() -> None:
     flat = Projection(FrameScene(star((1, 0, 0), (0, 1, 0))), SIZE, EYES["top"])
-    middle, x, y = (flat.origin(name) for name in ("map", "f0", "f1"))
+    middle, x, y = (flat.origins[name] for name in ("map", "f0", "f1"))
     assert (x.x > middle.x, x.y == pytest.approx(middle.y)) == (True, True)
     assert (y.y < middle.y, y.x == pytest.approx(middle.x)) == (True, True)
 
