@@ -241,32 +241,27 @@ def _likely(name: str, known: list[str]) -> list[str]:
     if len(known) <= MOST_COMPARED:
         return known
     half = len(name) // 2
-    first, second = _beginning(known, name, half), _ending(known, name, half)
-    ways = (first, _beginning, half), (first, _ending, 0), (second, _beginning, 0), (second, _ending, half)
+    first, second = _sharing(known, name, half, ends=False), _sharing(known, name, half, ends=True)
+    ways = (first, False, half), (first, True, 0), (second, False, 0), (second, True, half)
     most = max(MOST_COMPARED // 4 * USUAL_NAME**2 // max(len(name), USUAL_NAME) ** 2, 4)
-    return [each for names, sharing, least in ways for each in _sharing_most(names, sharing, name, least)[:most]]
+    return [each for names, ends, least in ways for each in _sharing_most(names, name, least, ends=ends)[:most]]
 
 
-def _beginning(names: list[str], name: str, count: int) -> list[str]:
-    """Return the names that begin with the first characters of one."""
+def _sharing(names: list[str], name: str, count: int, *, ends: bool) -> list[str]:
+    """Return the names that begin with the first characters of one, or end with its last."""
+    if ends:
+        end = name[len(name) - count :]
+        return [each for each in names if each.endswith(end)]
     start = name[:count]
     return [each for each in names if each.startswith(start)]
 
 
-def _ending(names: list[str], name: str, count: int) -> list[str]:
-    """Return the names that end with the last characters of one."""
-    end = name[len(name) - count :]
-    return [each for each in names if each.endswith(end)]
-
-
-def _sharing_most(
-    names: list[str], sharing: Callable[[list[str], str, int], list[str]], name: str, least: int
-) -> list[str]:
+def _sharing_most(names: list[str], name: str, least: int, *, ends: bool) -> list[str]:
     """Return the names that share as many characters with one as any of them does; all share the `least`."""
     most = len(name)
     while least < most:
         middle = (least + most + 1) // 2
-        if some := sharing(names, name, middle):
+        if some := _sharing(names, name, middle, ends=ends):
             least, names = middle, some
         else:
             most = middle - 1

@@ -141,7 +141,9 @@ def _settle(values: list[Any], text: str) -> bool:
     for _ in range(DEEPEST + 1):
         if has_words:
             for outer in level:
-                _spell_words(outer)
+                pairs = outer.items() if type(outer) is dict else enumerate(outer)
+                for key in [key for key, value in pairs if value is True or value is False]:
+                    outer[key] = "true" if outer[key] else "false"
         level = [
             inner
             for outer in level
@@ -151,13 +153,6 @@ def _settle(values: list[Any], text: str) -> bool:
         if not level:
             return True
     return False
-
-
-def _spell_words(outer: Any) -> None:
-    """Turn the truth values in a container into text."""
-    pairs = outer.items() if type(outer) is dict else enumerate(outer)
-    for key in [key for key, value in pairs if value is True or value is False]:
-        outer[key] = "true" if outer[key] else "false"
 
 
 def json_events(text: str) -> Iterator[Event]:

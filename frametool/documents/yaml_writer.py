@@ -95,16 +95,12 @@ def _float(value: float, number: Callable[[float], str]) -> str:
 def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
     """Write a scalar, an empty or leaf list, or a small map of numbers; None for what needs a block."""
     if isinstance(value, dict):
-        if len(value) > _WIDEST_FLOW_MAP or not all(_fits_flow(*item) for item in value.items()):
+        fit = (isinstance(each, (int, float, Verbatim)) and len(key) <= _LONGEST_KEY for key, each in value.items())
+        if len(value) > _WIDEST_FLOW_MAP or not all(fit):
             return None
     elif isinstance(value, (list, tuple)) and any(isinstance(each, (dict, list, tuple)) for each in value):
         return None
     return flow(value, number)
-
-
-def _fits_flow(key: str, value: Any) -> bool:
-    """Say whether an entry may stand in a map on one line."""
-    return isinstance(value, (int, float, Verbatim)) and len(key) <= _LONGEST_KEY
 
 
 def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:

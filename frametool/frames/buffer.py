@@ -128,13 +128,6 @@ class TransformBuffer(Frames):
         track.authority = authority
         return replaced
 
-    def _put(self, track: Track) -> Track:
-        """Keep a track in the place of what was known of its frame."""
-        self._frames[track.child] = None
-        self._tracks[track.child] = track
-        self._queries.clear()
-        return track
-
     def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int, authority: str) -> bool:
         """Add a further sample of a frame that moves; returns whether it replaced another one."""
         if self.keep_ns is not None:

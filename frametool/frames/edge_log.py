@@ -17,8 +17,6 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack, Track
     from frametool.geometry.types import Rigid
@@ -175,12 +173,6 @@ def chain(logs: dict[str, EdgeLog], target: str, source: str) -> list[str]:
             raise UnknownFrame(frame, known=known)
     down, up = edges_between(target, source, lambda frame: logs[frame].parent if frame in logs else None)
     return [*reversed(down), *reversed(up)]
-
-
-def common_interval(logs: Iterable[EdgeLog]) -> tuple[int, int] | None:
-    """Return the first and last stamp that all moving edges cover; None if all stand still; empty if first > last."""
-    spans = [log.span for log in logs if log.moves]
-    return (max(first for first, _ in spans), min(last for _, last in spans)) if spans else None
 
 
 SHORTEST = 0.0001  # seconds: tf2 divides by no less

@@ -53,6 +53,13 @@ class Frames:
         """Make a frame known that has no parent (yet)."""
         self._frames[frame] = None
 
+    def _put(self, track: Track) -> Track:
+        """Keep a track in the place of what was known of its frame."""
+        self._frames[track.child] = None
+        self._tracks[track.child] = track
+        self._queries.clear()
+        return track
+
     # --- what there is ---
 
     @property
@@ -350,9 +357,7 @@ class FrameTree(Frames):
         if child in self._frames and self._root_of(parent) == child:
             raise BadTopology(cycle_message([*to_root(parent, self.parent), parent]), rule="cycle")
         self._frames[parent] = None
-        self._frames[child] = None
-        self._tracks[child] = StandingTrack(child, parent, components)
-        self._queries.clear()
+        self._put(StandingTrack(child, parent, components))
         self._upward[child] = parent
 
     def _root_of(self, frame: str) -> str:

@@ -116,4 +116,5 @@ def _further(seen: SeenPose, step: Rigid) -> SeenPose:
 
 
 def _size(pose: Rigid) -> float:
-    return max(map(abs, pose[:3]))
+    x, y, z = map(abs, pose[:3])
+    return float(max(x, y, z))

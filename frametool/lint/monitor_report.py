@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError
 from frametool.formats.load import refuse_unknown_joints
-from frametool.frames.edge_log import EdgeLog, chain, common_interval
+from frametool.frames.edge_log import EdgeLog, chain
 from frametool.frames.policy import frames_on
 from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import stop
@@ -75,12 +75,13 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
 
 def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, Any]:
     """Describe the edges between two frames together: their common interval, and their worst."""
-    interval = common_interval(logs)
+    spans = [log.span for log in logs if log.moves]
+    first = max((begin for begin, _ in spans), default=None)
+    last = min((end for _, end in spans), default=None)
     entries = [edge_entry(log) for log in logs]
     rates, gaps, delays = (
         [entry[key] for entry in entries if entry[key] is not None] for key in ("rate_hz", "gap_s", "delay_max_s")
     )
-    first, last = interval or (None, None)
     return {
         "kind": "chain",
         "parent": target,
@@ -98,5 +99,5 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
         "parents": " <- ".join(frames_on(target, source, logs)),
         "parent_changes": sum(log.changes for log in logs),
         "topics": "",
-        "overlap": None if interval is None else interval[0] <= interval[1],
+        "overlap": None if first is None or last is None else first <= last,
     }

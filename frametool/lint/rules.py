@@ -297,9 +297,8 @@ def _roots(children: dict[str, Child]) -> Iterator[Finding]:
     }
     if len(roots) > 1:
         names = sorted(roots)
-        seen = roots[names[1]]
         shown = ", ".join(map(repr, names[:10]))
-        yield seen.finding("several-roots", f"{len(roots)} roots: {shown}{' ..' if len(names) > 10 else ''}")
+        yield roots[names[1]].finding("several-roots", f"{len(roots)} roots: {shown}{' ..' if len(names) > 10 else ''}")
 
 
 def _at(seen: Statement) -> str:

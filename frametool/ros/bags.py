@@ -13,8 +13,7 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Note
-from frametool.ros.messages import STAMPS, body_of, stamp_problem
-from frametool.ros.messages import TYPES as POSES
+from frametool.ros.messages import POSES, STAMPS, body_of, stamp_problem
 from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:

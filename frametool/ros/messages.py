@@ -36,7 +36,6 @@ LISTS = ("transforms", "static_transforms")
 MESSAGE_KEYS = frozenset(("header", "linear", "force"))  # of messages that hold geometry
 MARKS = frozenset(("child_frame_id", *LISTS))
 STALE = "euler_angles_degree"  # Apollo writes it beside the quaternion and does not keep it up to date
-BESIDE_LIST = ("timestamp",)  # of a FrameTransforms message
 STALE_DEGREES = 0.1
 EPOCH = 719_163  # the day 1970-01-01, counted from year 1
 _DATE = (
@@ -72,7 +71,7 @@ def messages(value: dict[str, Any], path: Path) -> Iterator[tuple[dict[str, Any]
         return
     for key, entries in value.items():
         here = (*path, key)
-        if key in BESIDE_LIST:
+        if key == "timestamp":  # of a FrameTransforms message
             continue
         if key not in LISTS:
             raise Misfit(f"unknown key {shown(key)} beside transforms", here, key=True)
@@ -112,7 +111,7 @@ def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) ->
 
 
 HAS = "a message with a pose has header, pose"
-TYPES = frozenset(
+POSES = frozenset(
     ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry")
 )
 

@@ -42,7 +42,6 @@ _ROTATIONS = (
 _TRIPLE = rf"\[({NUMBER}(?:[ |]+{NUMBER}){{2}})\]"
 _GAZEBO = re.compile(rf"Pose \[ XYZ \(m\) \] \[ RPY \(rad\) \]:\s*{_TRIPLE}\s*{_TRIPLE}")
 _ARGS = re.compile(r"\bargs\s*[=:]\s*([\"'])(.*?)\1", re.DOTALL)
-_ROW = rf"{NUMBER}(?:[ \t]*,[ \t]*|[ \t]+){NUMBER}"
 _BEGIN = re.compile(
     rf"""(?x)\s*(?:
     (?:[A-Za-z_]\w*\s*=\s*)?                                # T =

@@ -70,7 +70,6 @@ class _Seen:
     def step(self, command: IssuedCommand, follow: Follow, number: int) -> FollowStep:
         """Return what a follower saw and did just now."""
         target = frame_of(follow.leader, follow.target)
-        hangs = target != follow.leader
         newest = {name: self.samples[name][-1].stamp_ns for name in (command.turtle, follow.leader, target)}
         own_ns = newest[command.turtle] if follow.delay_ns else min(newest.values())
         led_ns = command.t_ns - follow.delay_ns if follow.delay_ns else own_ns
@@ -78,7 +77,7 @@ class _Seen:
         return FollowStep(
             number, command.t_ns, command.turtle, follow.leader, target,
             self._at(command.turtle, own_ns), self._at(follow.leader, led_ns),
-            self._at(target, led_ns) if hangs else None,
+            self._at(target, led_ns) if target != follow.leader else None,
             (controller.gain_linear, controller.gain_angular), (controller.max_linear, controller.max_angular),
             ARRIVED, command.distance or 0.0, twist.linear_x, twist.angular_z,
         )  # fmt: skip

@@ -95,7 +95,9 @@ def tutorial(
     turtles = [SceneTurtle("turtle1", (CENTRE, CENTRE, 0.0), drive)]
     for count in range(followers):
         follow = Follow(turtles[-1].name, controller, target, nanoseconds("delay", delay))
-        turtles.append(SceneTurtle(f"turtle{count + 2}", _beside(spawn, count), follow))
+        x, y, theta = spawn
+        place = (x - count) % (2.0 * CENTRE) if count else x  # the first stands at `spawn`, wherever that is
+        turtles.append(SceneTurtle(f"turtle{count + 2}", (place, y, theta), follow))
     return Scene(turtles, (), duration_ns(duration), turtlesim, holonomic)
 
 
@@ -115,9 +117,3 @@ def nanoseconds(name: str, seconds: float) -> int:
     if not 0.0 <= seconds <= LONGEST:
         raise ValueInvalid(f"{name} must be 0 .. {LONGEST} s, found {seconds:g}")
     return round(seconds * BILLION)
-
-
-def _beside(spawn: Place, count: int) -> Place:
-    """Return the place of one of several followers; the first stands at `spawn` itself, wherever that is."""
-    x, y, theta = spawn
-    return (x, y, theta) if not count else ((x - count) % (2.0 * CENTRE), y, theta)

@@ -124,22 +124,18 @@ class FrameScene:
         root = now.roots[self.fixed]
         if root in now.without_data:
             return {self.fixed: IDENTITY} if self._is_chosen(self.fixed) else {}
-        in_root = now.seen_from(root)
+        names, in_root = self.names, now.seen_from(root)
+        if any(track.varies for track in self.tracks.values()):  # only changing parents can upset the order
+            names, _ = _in_order(self.tree, {name: self.parent(name) for name in names})
         back = rigid.inverse(*in_root[self.fixed].components)
         return {
             name: IDENTITY if name == self.fixed else rigid.compose(*back, *in_root[name].components)
-            for name in self._ordered_now()
+            for name in names
             if name in in_root and self._is_chosen(name)
         }
 
     def _is_chosen(self, name: str) -> bool:
         return self.chosen is None or name in self.chosen
-
-    def _ordered_now(self) -> Sequence[str]:
-        """Return the names with parents first at the time; only changing parents can upset their order."""
-        if not any(track.varies for track in self.tracks.values()):
-            return self.names
-        return _in_order(self.tree, {name: self.parent(name) for name in self.names})[0]
 
     @cached_property
     def trails(self) -> list[Trail]:

@@ -97,8 +97,7 @@ def _add_axes(part: BinaryPart) -> None:
             places.append(place)
         for a, b, c, d in SIDES:
             faces += [first + corner for corner in (a, b, c, a, c, d)]
-    low, high = [-THICK] * 3, [1.0] * 3
-    part.floats(places, "VEC3", target=VERTICES, min=[single(value) for value in low], max=high)
+    part.floats(places, "VEC3", target=VERTICES, min=[single(-THICK)] * 3, max=[1.0] * 3)
     colours = b"".join(bytes(colour) * 8 for colour in COLOURS)
     part.add(colours, "VEC4", UBYTE, len(places), target=VERTICES, normalized=True)
     part.add(struct.pack(f"<{len(faces)}H", *faces), "SCALAR", USHORT, len(faces), target=INDICES)

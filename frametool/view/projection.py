@@ -205,6 +205,7 @@ DISTANCES = (9.0, 16.0, 26.0, 40.0, 58.0, 80.0)  # pixels from a frame to its na
 SIDES = ((1.0, -0.6), (1.0, 0.6), (-1.0, -0.6), (-1.0, 0.6), (0.0, -1.3), (0.0, 1.3), (1.0, 0.0), (-1.0, 0.0))
 SAME = 3.0  # pixels within which frames share a name
 LONGEST = 60  # characters of a name
+FONT = 12.0  # pixels
 WIDE, THIN = "mwMW_@", "il.·tfjrI "
 
 
@@ -252,10 +253,10 @@ def _cells(box: Box) -> Iterator[tuple[int, int]]:
     return product(range(left, right + 1), range(top, bottom + 1))
 
 
-def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box] = ()) -> tuple[list[Label], int]:
+def place_labels(flat: Projection, *, blocked: Iterable[Box] = ()) -> tuple[list[Label], int]:
     """Place a name next to every group of frames that lie on one point, the nearest to the eye first.
 
-    font: its size in pixels.  blocked: what else stands on the picture.
+    blocked: what else stands on the picture.
     Returns the places, and how many names found none.
     """
     taken, axes = TakenBoxes(), TakenBoxes()
@@ -269,7 +270,7 @@ def place_labels(flat: Projection, *, font: float = 12.0, blocked: Iterable[Box]
                 axes.add((tip.x - 2.0, tip.y - 2.0, tip.x + 2.0, tip.y + 2.0))
     placed, hidden = [], 0
     for point, names in flat.groups(SAME):
-        spots = _spots(flat, words_of(names), point, font)
+        spots = _spots(flat, words_of(names), point)
         found = best_spot(spots, lambda spot: taken.meets(spot.box), lambda spot: axes.meets(spot.box))
         if found is None:
             hidden += len(names)
@@ -291,14 +292,15 @@ def best_spot(spots: Iterable[Spot], is_taken: Callable[[Spot], bool], on_axes: 
     return second
 
 
-def _spots(flat: Projection, words: str, point: Flat, font: float) -> Iterator[Label]:
+def _spots(flat: Projection, words: str, point: Flat) -> Iterator[Label]:
     """Yield where a name might stand inside the picture, the best first."""
-    wide = width_of(words, font)
+    # a little too much rather than too little
+    wide = FONT * sum(0.9 if letter in WIDE else 0.36 if letter in THIN else 0.62 for letter in words) + 2.0
     for away in DISTANCES:
         for dx, dy in SIDES:
             left = point.x + dx * away - (wide if dx < 0.0 else wide / 2.0 if dx == 0.0 else 0.0)
             middle = point.y + dy * away
-            box = left - 2.0, middle - 0.62 * font, left + wide + 2.0, middle + 0.62 * font
+            box = left - 2.0, middle - 0.62 * FONT, left + wide + 2.0, middle + 0.62 * FONT
             if box[0] > 2.0 and box[2] < flat.size.width - 2.0 and box[1] > 2.0 and box[3] < flat.size.height - 2.0:
                 yield Label(words, point, box, away)
 
@@ -308,8 +310,3 @@ def words_of(names: list[str], most: int = 2) -> str:
     shown_names = map(printable, names[:most])
     words = " · ".join(name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in shown_names)
     return words + (f" +{len(names) - most}" if len(names) > most else "")
-
-
-def width_of(words: str, font: float) -> float:
-    """Guess the width of a text in pixels; a little too much rather than too little."""
-    return font * sum(0.9 if letter in WIDE else 0.36 if letter in THIN else 0.62 for letter in words) + 2.0
