@@ -204,5 +204,4 @@ class CacheEntry:
 
 def cache_entries(tree: Frames) -> list[CacheEntry]:
     """Return what tf2 lists, in the order of first mention."""
-    tracks = (tree.track(frame) for frame in tree.frames)
-    return [CacheEntry(track) for track in tracks if track is not None]
+    return [CacheEntry(track) for frame in tree.frames if (track := tree.track(frame))]

@@ -115,8 +115,7 @@ def _joined(query: Query, times: Stamps) -> Rigid:
     """Return target_from_source at sorted times within every edge's samples."""
     found = query.compose(lambda track: track.at_many(times))
     assert found is not None  # noqa: S101 - all times are covered
-    tx, ty, tz, x, y, z, w = found
-    return tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)
+    return *found[:3], *quaternion.unit(*found[3:], arrays)
 
 
 class TrackTable:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadTopology, NoDataAt, NotConnected, ValueInvalid, shown, warn
 from frametool.frames.path import Query, cycle_message, edges_between, to_root
-from frametool.frames.policy import FRAMETOOL
+from frametool.frames.policy import FRAMETOOL, left_out
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.track import StandingTrack
 from frametool.geometry import rigid
@@ -99,8 +99,6 @@ class Frames:
 
     def tree_at(self, at_ns: int) -> FrameTree:
         """Return the tree as it stands at one time; edges without data then are left out, with a warning."""
-        from frametool.frames.policy import left_out
-
         tree = FrameTree(self.name)
         for frame in self._frames:
             tree.add_root(frame)

@@ -6,6 +6,7 @@ Every topic that holds transforms is read, with whatever namespace; what comes b
 from __future__ import annotations
 
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown
@@ -18,7 +19,6 @@ from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Tally
@@ -48,7 +48,6 @@ def opened_bag(path: str, tally: Tally) -> Iterator[Any]:
         from rosbags.highlevel import AnyReader
     except ImportError:
         raise FileProblem(f"{path}: bags are read with an extra; install it: pip install 'frametool[bag]'") from None
-    from pathlib import Path
 
     if path == "-":
         raise FileProblem("stdin: a bag cannot be read from a pipe; name its file")
@@ -67,8 +66,6 @@ def opened_bag(path: str, tally: Tally) -> Iterator[Any]:
 
 def _check_whole(path: str, tally: Tally) -> None:
     """Check what the library does not: the pages of sqlite3; tell if an MCAP file has no counts to compare with."""
-    from pathlib import Path
-
     for file in sorted(Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]:
         if file.suffix == ".db3":
             _check_database(file)

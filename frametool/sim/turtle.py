@@ -348,9 +348,8 @@ class World:
         receiver = self.turtle(str(values.pop("turtle"))) if "turtle" in values else self
         answer = getattr(receiver, service)(**values)
         if service == "spawn":
-            return f"Spawning turtle [{answer}] at " + ", ".join(
-                f"{name}=[{single(float(values[name])):f}]" for name in ("x", "y", "theta")
-            )
+            place = ", ".join(f"{name}=[{single(float(values[name])):f}]" for name in ("x", "y", "theta"))
+            return f"Spawning turtle [{answer}] at {place}"
         return {"reset": "Resetting turtlesim.", "clear": "Clearing turtlesim."}.get(service, "")
 
     def tick(self, now_ns: int) -> list[WallHit]:

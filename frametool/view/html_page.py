@@ -21,13 +21,14 @@ from frametool import __version__
 from frametool.formats.robots.model import JointValue
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import format_stamp
+from frametool.view.frame_scene import FrameScene
+from frametool.view.projection import EYES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frametool.formats.robots.model import Robot, Value
     from frametool.sim.simulate import SimulationStep
-    from frametool.view.frame_scene import FrameScene
 
 FOLDER = os.path.join(os.path.dirname(__file__), "page")
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
@@ -159,7 +160,4 @@ class RunPage:
 
     def content(self) -> str:
         """Return the page, seen from above."""
-        from frametool.view.frame_scene import FrameScene
-        from frametool.view.projection import EYES
-
         return write_page(FrameScene(self.buffer), title="turtles", file="tf.yaml", eye=EYES["top"])

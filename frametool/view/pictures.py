@@ -303,5 +303,4 @@ def _scale(flat: Projection, step: float) -> Iterator[Shape]:
     left, right, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0
     yield PictureLine([(left, base - 6.0), (left, base), (right, base), (right, base - 6.0)], "soft")
     yield PictureWords((left + right) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
-    words = f"in {flat.scene.fixed[:40]}, grid {step:g} m"
-    yield PictureWords(right, HEIGHT - 46.0, words, "soft", "end", 11.0)
+    yield PictureWords(right, HEIGHT - 46.0, f"in {flat.scene.fixed[:40]}, grid {step:g} m", "soft", "end", 11.0)

@@ -120,9 +120,8 @@ def _folded(text: str) -> Iterator[str]:
 
 def _table(start: str | None, found: Sequence[Difference]) -> str:
     """Return the table of the frames that moved, as far as they are seen from one frame."""
-    seen = f"seen from {start}" if start is not None else "seen from elsewhere"
     both = 2 * NUMBER
-    seen = short(seen, both - 2)
+    seen = short(f"seen from {start}" if start is not None else "seen from elsewhere", both - 2)
     head = f"{'moved':<{LABEL}}{'in its parent':>{both}}{' ' * (both - cells(seen))}{seen}\n"
     units = f"{'':{LABEL}}" + 2 * f"{'mm':>{NUMBER}}{'deg':>{NUMBER}}" + "\n"
     return head + units + "".join(map(_row, found))

@@ -17,6 +17,7 @@ from frametool.errors import printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE
 from frametool.view.projection import SLANTED, Flat, Projection, Size, best_spot, nice, words_of
+from frametool.view.tree_text import coloured_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -176,8 +177,6 @@ def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color:
     from os import get_terminal_size
     from sys import stdout
 
-    from frametool.view.tree_text import coloured_console
-
     columns, lines = get_terminal_size(stdout.fileno())
     coloured_console(color).print(_rich_text(TerminalPicture(scene, columns, lines - 1, eye)))
 
@@ -185,8 +184,6 @@ def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color:
 def play(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
     """Show a scene from its time on to the last stamp, a second a second, in the whole terminal."""
     from rich.live import Live
-
-    from frametool.view.tree_text import coloured_console
 
     begin_ns, (_, last_ns) = scene.at_ns or 0, scene.span_ns
     console, begin = coloured_console(color), monotonic()
