@@ -101,10 +101,6 @@ def test_no_imports_inside_a_room_run_in_a_circle(room: str) -> None:
     assert circles(room) == []
 
 
-ON_ITS_WAY = pytest.mark.xfail(strict=True, reason="the house is being made smaller")
-
-
-@ON_ITS_WAY
 def test_the_package_stays_as_small_as_it_can_be_read() -> None:
     """`python tests/count_code.py` says in which room the lines are."""
     files, lines = rooms()

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 STOP, SKIP, NULL = "stop", "skip", "null"
 ON_ERROR = (STOP, SKIP, NULL)
 MOST = 20
-DONE, BAD_DATA, ROWS_SKIPPED = 0, 1, 3
+DONE, ROWS_SKIPPED = 0, 3
 
 
 class Fault(NamedTuple):
