@@ -96,7 +96,7 @@ def circles(room: str) -> list[tuple[str, ...]]:
     return sorted({tuple(sorted(far for far in found if name in leads[far])) for name, found in leads.items() if name in found})
 
 
-@pytest.mark.parametrize("room", broken_in("frames", reason="modules of a room import each other"))
+@pytest.mark.parametrize("room", LAYERS)
 def test_no_imports_inside_a_room_run_in_a_circle(room: str) -> None:
     assert circles(room) == []
 

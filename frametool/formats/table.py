@@ -222,7 +222,7 @@ FORMATS = {
     "csv2": _read_tree(
         "CSV of `ros2 topic echo --csv`",
         _MESSAGES,
-        signs=(("line", r"-?\d{1,12},\d{1,10},[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){5}$"),),
+        signs=(("line", rf"-?\d{{1,12}},\d{{1,10}},(?!{_NUMBER},)[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){{5}}$"),),
     ),
     "calls": _read_tree(
         "static_transform_publisher calls",

@@ -8,16 +8,28 @@ from typing import TYPE_CHECKING
 from frametool.errors import BadTopology, ValueInvalid, shown, warn
 from frametool.frames.lookups import Frames
 from frametool.frames.path import cycle_message
-from frametool.frames.policy import FRAMETOOL, policy_named
+from frametool.frames.policy import FRAMETOOL
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
 from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StandingTrack
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.frames.policy import BufferPolicy
     from frametool.frames.track import Track
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Rigid
+
+
+def policy_named(name: str) -> BufferPolicy:
+    """Return the rules of `frametool`, `ros1` or `ros2`."""
+    if name == "frametool":
+        return FRAMETOOL
+    from frametool.frames.tf2 import TF2
+
+    if name not in TF2:
+        raise ValueInvalid(f"unknown policy {shown(name)}; expected frametool, {', '.join(TF2)}")
+    return TF2[name]
 
 
 class TransformBuffer(Frames):

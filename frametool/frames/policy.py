@@ -22,16 +22,6 @@ if TYPE_CHECKING:
     from frametool.frames.track import MovingTrack, StandingTrack, Track
     from frametool.geometry.types import Rigid
 
-def policy_named(name: str) -> BufferPolicy:
-    """Return the rules of `frametool`, `ros1` or `ros2`."""
-    if name == "frametool":
-        return FRAMETOOL
-    from frametool.frames.tf2 import TF2
-
-    if name not in TF2:
-        raise ValueInvalid(f"unknown policy {shown(name)}; expected frametool, {', '.join(TF2)}")
-    return TF2[name]
-
 
 class Refused(ValueInvalid):
     """A transform that tf2 would log and drop; `lines` are what it logs, with console_bridge's level."""

@@ -75,17 +75,10 @@ READERS: dict[str, tuple[Callable[[Run, str, str], tuple[Outcome, Any]], Any]] =
 }
 BY_ITSELF = ("relative --velocity", "convert -f tum", "convert -f json", "lookup in a tree of rows")
 UNKNOWN = pytest.mark.xfail(strict=True, reason="seam: stamps: a column in micro- or milliseconds is not taken for stamps, nor its unit named")
-ECHOED = pytest.mark.xfail(strict=True, reason="seam: stamps: a header in EuRoC's style is taken for the poses of ros2 topic echo --csv")
 
 
-@pytest.mark.parametrize(
-    ("reader", "name"),
-    [
-        pytest.param(reader, name, marks=ECHOED if (reader, name) == ("lookup in a tree of rows", HASHED) else [])
-        for reader in READERS
-        for name in (*NANOSECONDS, HASHED)
-    ],
-)
+@pytest.mark.parametrize("name", [*NANOSECONDS, HASHED])
+@pytest.mark.parametrize("reader", READERS)
 def test_nanoseconds_are_nanoseconds_however_they_are_spelt(run: Run, reader: str, name: str) -> None:
     read, wanted = READERS[reader]
     done, found = read(run, name, "500")
