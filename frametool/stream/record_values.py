@@ -12,7 +12,7 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import NOTHING, Node, parse_documents, parse_nodes, refuse_alias
-from frametool.documents.json import JSON_NUMBER
+from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import holds_arrays
@@ -111,24 +111,24 @@ def results(
     """
     own, memory = teller or Teller(), memory or Memory()
     nodes: list[Node] = []
-    found = False
-    for document in parse_documents(source.text, source.name):
-        found = True
+    spliced = _Spliced(source, request)
+    units: dict[Path, tuple[Document, list[Answer]]] = {}
+    documents = parse_documents(source.text, source.name)
+    for document in documents:
         entries = read_entries(document, request, source, partial(own.tell, source))
         answers = [each for entry in entries if (each := _answer(document, entry, request, source, memory)) is not None]
-        units: dict[Path, list[Answer]] = {}
         for each in answers:
-            units.setdefault(_unit(each.entry.record, document.value), []).append(each)
-        spliced = _Spliced(source, entries, answers, request)
-        for unit, ours in units.items():
-            if all(_says_no_more(each.entry.record, document, unit) for each in ours):
-                yield from _values(NOTHING, unit, ours, request, style, spliced)
-                continue
-            nodes = nodes or parse_nodes(source.text)
-            yield from _values(_at(nodes, unit), unit, ours, request, style, spliced)
+            units.setdefault(_unit(each.entry.record, document.value), (document, []))[1].append(each)
+        spliced.add(entries, answers)
+    for unit, (document, ours) in units.items():
+        if all(_says_no_more(each.entry.record, document, unit) for each in ours):
+            yield from _values(NOTHING, unit, ours, request, style, spliced)
+            continue
+        nodes = nodes or parse_nodes(source.text)
+        yield from _values(_at(nodes, unit), unit, ours, request, style, spliced)
     if teller is None:
         own.end(source.name)
-    if not found:
+    if not documents:
         raise FormatError("nothing in it", source=source.name)
 
 
@@ -156,17 +156,20 @@ def _answer(
 class _Spliced:
     """The text with the results in the place of what they come from, read again: records as streams write them."""
 
-    def __init__(
-        self, source: Source, entries: Sequence[Entry], answers: Sequence[Answer], request: Request
-    ) -> None:
+    def __init__(self, source: Source, request: Request) -> None:
         """Keep what is needed; nothing is done before something is asked for."""
         self.source = source
-        self.entries = entries
-        self.answers = answers
+        self.entries: list[Entry] = []
+        self.answers: dict[Path, Answer] = {}
         self.request = request._replace(notations=())
         # our numbers are written as numbers that nothing else in the text is, and found again by their ends
         self.mark = next(mark for mark in map("e{}".format, count(999_000)) if mark not in source.text)
         self.numbers: list[float] = []
+
+    def add(self, entries: Sequence[Entry], answers: Sequence[Answer]) -> None:
+        """Add the records of a document, and what became of them."""
+        self.entries += entries
+        self.answers |= {each.entry.record.path: each for each in answers}
 
     def at(self, path: Path) -> Any:
         """Return what stands at a path as a plain value, its numbers as floats."""
@@ -178,17 +181,24 @@ class _Spliced:
     @cached_property
     def _nodes(self) -> list[Node]:
         entries = [each._replace(target=target_of(each.record, self.request)) for each in self.entries]
-        made = {each.entry.record.path: each for each in self.answers}
         for entry in entries:
-            each = made.get(entry.record.path)
+            each = self.answers.get(entry.record.path)
             size = entry.target.size + COVARIANCE * entry.record.shape.covariance
             self.numbers += [0.0] * size if each is None else written(each._replace(entry=entry))
         text = self.source.text
         root = Node(0, len(text), parse_nodes(text))
-        edits = edits_of(text, entries, root, self.request, json=False)
+        edits = edits_of(text, entries, root, self.request, json=_is_json(self.source))
         stretches, pieces = cut(len(text), (), edits)
         marked = [f"{at}{self.mark}" for at in range(len(self.numbers))]
         return parse_nodes(filled(pieces, [text[slice(*each)] for each in stretches], marked))
+
+
+def _is_json(source: Source) -> bool:
+    """Tell whether a text is strict JSON, whose members have quotes."""
+    try:
+        return bool(strict_json(source))
+    except FormatError:
+        return False
 
 
 def _values(
