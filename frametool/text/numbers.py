@@ -26,6 +26,7 @@ BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 
 # float() reads more than a decimal number (blanks, underscores, nan, other scripts' digits), but nothing else of these
 _DECIMAL_CHARACTERS = "0123456789.-+eE"
+_strip = str.strip  # what is no text is a TypeError
 _INFINITE = float("inf")
 # possessive: digits are never shared out in another way, which would take time that grows with their square
 _DECIMAL = r"(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?+[0-9]++)?+"
@@ -49,7 +50,7 @@ def parse_number(text: str) -> float:
 
     Raises ValueInvalid with a message that quotes the text and says what is wrong with it.
     """
-    if not text.strip(_DECIMAL_CHARACTERS):
+    if not _strip(text, _DECIMAL_CHARACTERS):
         try:
             value = float(text)
         except ValueError:
@@ -67,7 +68,7 @@ def parse_angle(text: str) -> Angle:
     Multiples of pi come back in degrees: pi/2 is (90.0, "deg"), so that quarter turns stay exact.
     Raises ValueInvalid.
     """
-    if not text.strip(_DECIMAL_CHARACTERS):
+    if not _strip(text, _DECIMAL_CHARACTERS):
         return parse_number(text), None
     if match := re.fullmatch(_WITH_UNIT, text):
         return parse_number(match[1]), _UNITS[match[2]]
@@ -78,7 +79,7 @@ def parse_angle(text: str) -> Angle:
 
 def parse_length(text: str) -> float:
     """Read a length in metres: a number, or `2cm`, `20 mm`, `0.02m`, `20um`; raises ValueInvalid."""
-    if not text.strip(_DECIMAL_CHARACTERS):
+    if not _strip(text, _DECIMAL_CHARACTERS):
         return parse_number(text)
     if match := re.fullmatch(_LENGTH, text):
         return parse_number(match[1]) / LENGTHS[match[2]]  # dividing rounds once: 0.02 from 2cm

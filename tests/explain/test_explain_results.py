@@ -11,7 +11,7 @@ from recheck import recheck
 from written import HOSTILE, ROTATIONS, SPECS, rotation, seeded
 
 import frametool
-from frametool.explain import derive, operations
+from frametool.explain import derive, from_quaternion, operations
 from frametool.explain.derive import DerivationWrong
 from frametool.explain.from_quaternion import BLOCKS
 from frametool.geometry import euler
@@ -152,7 +152,7 @@ def test_a_derivation_that_leads_elsewhere_is_never_printed(monkeypatch: pytest.
 
 
 def test_a_representation_without_a_block_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch, run: Callable[..., Outcome]) -> None:
-    monkeypatch.delitem(BLOCKS, "mrp")
+    monkeypatch.setattr(from_quaternion, "BLOCKS", {name: block for name, block in BLOCKS.items() if name != "mrp"})
     outcome = run("convert", "--from", "mrp", "0.1", "0", "0", "--explain")
     assert (outcome.status, outcome.out) == (1, "")
     assert outcome.err.startswith("frametool: there is no derivation of 'mrp'; derived are quaternion, xyzw, wxyz, rpy")
