@@ -232,14 +232,14 @@ class Stream:
     def _as_poses(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
         """Write the results of rows, or of poses that no table holds, in another form."""
         from frametool.cli.trees import answers
-        from frametool.stream.as_poses import OtherForm
+        from frametool.stream.as_poses import FormatConverter
 
         keeps = "poses" in FORMATS[form].writes and not output.notations
         target = output.told or (form if keeps else "csv")
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         self._jobs(f"rows become {target} one after the other")
-        converted = OtherForm(form, request, output.style.in_form(target), self.name, answers())
+        converted = FormatConverter(form, request, output.style.in_form(target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.options["header"])
         return outcomes, lambda: ", " * bool(converted.tally.about) + converted.tally.about
 

@@ -52,8 +52,8 @@ class Step(NamedTuple):
     outcome: Outcome
 
 
-class OtherForm:
-    """A stream on its way into another form than its own."""
+class FormatConverter:
+    """Convert a stream of poses or points to another format, block by block."""
 
     def __init__(self, form: str, request: Request, style: Style, source: str, answers: Answers) -> None:
         """Take what is asked for; raises Misused for what only a table can hold."""

@@ -101,7 +101,7 @@ class Run:
     """
 
     def __init__(self, plan: Plan, block: Block, state: State) -> None:
-        """Do all of it."""
+        """Read, transform and check every row of the block."""
         self.plan = plan
         self.block = block
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)

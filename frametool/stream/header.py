@@ -174,8 +174,8 @@ for _word in sorted(WORDS):
     BY_TOKEN.setdefault(_word.split("_")[0], []).append(_word)
 
 
-def has_names_of_ours(names: Iterable[str]) -> bool:
-    """Tell whether one of some names is that of a column of ours."""
+def has_pose_column(names: Iterable[str]) -> bool:
+    """Tell whether one of some names is that of a column of a pose or a point."""
     return any(Header(list(names)).found.values())
 
 

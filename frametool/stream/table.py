@@ -18,7 +18,7 @@ from frametool.errors import FormatError, FrametoolError, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.geometry.representations import UPPER_ROWS, notation
 from frametool.grammar.names import in_nanoseconds, stamp_column
-from frametool.stream.header import Columns, PoseColumns, has_names_of_ours
+from frametool.stream.header import Columns, PoseColumns, has_pose_column
 from frametool.stream.layout import NAME, NAMED, PARENT, quoted
 from frametool.stream.rows import Block, Broken
 from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
@@ -303,7 +303,7 @@ def open_table(block: bytes, form: str, *, header: bool, source: str) -> tuple[T
         raise FormatError("no rows in it", source=source)
     numeric = [_is_number(_unquoted(cell)) for cell in cells]
     own = header and not (all(numeric) if delimiter else any(numeric))
-    if named is not None and not (own and has_names_of_ours(map(_unquoted, cells))):
+    if named is not None and not (own and has_pose_column(map(_unquoted, cells))):
         head, titles, title, end = named
         return Table(delimiter, _names(titles, source), len(titles), mark + head, titles, title, end), rest
     if not own:
@@ -340,7 +340,7 @@ def _named_comment(
     text = lines[-1].rstrip(b"\r\n")
     words = text.lstrip(b"# \t")
     cells = _cells(words, delimiter)
-    if not cells or (width and len(cells) != width) or not has_names_of_ours(map(_unquoted, cells)):
+    if not cells or (width and len(cells) != width) or not has_pose_column(map(_unquoted, cells)):
         return None
     before = comments[: start + len(text) - len(words)]
     return before, tuple(cells), words, comments[start + len(text) :]

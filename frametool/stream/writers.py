@@ -17,7 +17,17 @@ from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows.column_file import STAMP_NS, Made, OutColumn, not_finite
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, Lost, Numbers, RowForm, field, image_name, is_turned, turned
+from frametool.formats.rows.pose_rows import (
+    IMAGE,
+    NUMBER,
+    DroppedFields,
+    Numbers,
+    RowForm,
+    field,
+    image_name,
+    is_turned,
+    turned,
+)
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion
@@ -74,7 +84,7 @@ class TextWriter:
         self.fixed: RowForm | None = getattr(module, "ROWS", None)
         name = "write_poses" if kind == POSE else "write_points"
         self.write: Callable[[Sequence[Any], Style], str] = getattr(module, name, _no_text)
-        self.lost = None if self.fixed is None else Lost(self.fixed, style)
+        self.dropped_fields = None if self.fixed is None else DroppedFields(self.fixed, style)
         self.extras = tuple(extras)
         self.placed = placed
         self.target = target_in(style, kind, placed=placed)
@@ -95,28 +105,28 @@ class TextWriter:
 
     def end(self) -> bytes:
         """Return what comes behind the last pose, and tell what was left out."""
-        if self.fixed is None or self.lost is None:
+        if self.fixed is None or self.dropped_fields is None:
             if self.dropped:
                 warn(f"{self.style.form}: other columns left out")
             return b""
-        self.lost.tell()
+        self.dropped_fields.tell()
         return self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
 
     # --- forms that say what a row is ---
 
     def _fixed(self, form: RowForm, block: RowPoses) -> bytes:
-        lost = self.lost
-        if lost is not None:
+        dropped = self.dropped_fields
+        if dropped is not None:
             there = [name for names in (block.parents, block.names) for name in names if name]
             images = block.extras.get(IMAGE)
-            lost.add(
+            dropped.record(
                 frames=bool(there),
                 stamps=block.stamps_ns is not None and NUMBER not in block.extras,
                 extras=bool(self.extras or block.extras.keys() - {IMAGE, NUMBER}),
             )
-            lost.counted |= "stamps" in form.holds and block.stamps_ns is None
-            lost.by_stamp |= IMAGE in form.row and images is None
-            lost.turned = is_turned(form, self.style)
+            dropped.counted |= "stamps" in form.holds and block.stamps_ns is None
+            dropped.by_stamp |= IMAGE in form.row and images is None
+            dropped.turned = is_turned(form, self.style)
         pose = self._canonical(block)
         return self._joined(form, np.array(form.numbers(*turned(form, self.style, pose))).T, block)
 

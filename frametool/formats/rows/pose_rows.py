@@ -57,7 +57,7 @@ class RowForm(NamedTuple):
     beside: str = ""
 
 
-class Lost:
+class DroppedFields:
     """What a form cannot hold of the poses that are written: collected, and told at the end."""
 
     def __init__(self, form: RowForm, style: Style) -> None:
@@ -71,8 +71,8 @@ class Lost:
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.form} writes rotations in its own way; leave --to out")
 
-    def add(self, *, frames: bool, stamps: bool, extras: bool) -> None:
-        """Take down what a pose has beside its numbers."""
+    def record(self, *, frames: bool, stamps: bool, extras: bool) -> None:
+        """Note fields of poses that the format cannot store."""
         said = {"frames": frames, "stamps": stamps, "extras": extras}
         self.found |= {what for what, there in said.items() if there and what not in self.form.holds}
 
