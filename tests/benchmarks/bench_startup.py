@@ -19,9 +19,9 @@ RUNS = 20
 POSE = '{"xyz": [1, 2, 3], "rpy_deg": [0, 0, 90]}'
 FLOW = "{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
 CASES = [
-    ("--help", ["--help"], "import click", 1.25),
-    ("--version", ["--version"], "import click", 1.25),
-    ("convert, numbers", ["convert", "--from", "rpy_deg", "0", "0", "90"], "import click", 1.35),
+    ("--help", ["--help"], "import click", 1.2),
+    ("--version", ["--version"], "import click", 1.1),
+    ("convert, numbers", ["convert", "--from", "rpy_deg", "0", "0", "90"], "import click", 1.25),
     ("convert, JSON", ["convert", POSE], "import click", 1.35),
     ("compose, JSON", ["compose", POSE, POSE], "import click", 1.35),
     ("invert, JSON", ["invert", POSE], "import click", 1.35),
