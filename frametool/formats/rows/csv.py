@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
+HALVES = ("linear", "angular", "force", "torque")
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
@@ -55,11 +56,11 @@ def _pose_row(result: Result, style: Style) -> dict[str, Any]:
 
 
 def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the cells of a record: three of each vector; what else is no scalar is one cell of JSON."""
     for key, value in record.items():
-        if isinstance(value, dict):
-            yield from value.items()
-        elif isinstance(value, list):
-            yield from zip("xyz" if key in PLAIN else [f"{key}_{axis}" for axis in "xyz"], value, strict=False)
+        if key in (*PLAIN, *HALVES) and isinstance(value, (dict, list)):
+            numbers = value.values() if isinstance(value, dict) else value
+            yield from zip("xyz" if key in PLAIN else [f"{key}_{axis}" for axis in "xyz"], numbers, strict=False)
         else:
             yield key, value
 
@@ -81,4 +82,8 @@ def _cell(value: Any, style: Style) -> str:
     """Write one cell, quoted where a reader would split it."""
     if isinstance(value, float):
         return style.number(value)
+    if isinstance(value, (dict, list)):
+        from frametool.documents.json import dump
+
+        return quoted(dump(value, style.number))
     return quoted("" if value is None else str(value))
