@@ -101,8 +101,7 @@ class Output:
         writer = (ArrayWriter if self._holds_arrays else TextWriter)(self.style, POSE)
         while batch := list(islice(results, BLOCK)):
             yield bytes(writer.of_block(block_of(batch)))
-        ended = writer.end()
-        yield from (ended,) if isinstance(ended, bytes) else ended
+        yield from writer.end()
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""

@@ -92,9 +92,7 @@ class FormatConverter:
         if writer is None and self.request.gathered is None:
             raise FormatError("nothing in it", source=self.source)
         if writer is not None:
-            ended = writer.end()
-            for piece in (ended,) if isinstance(ended, bytes) else ended:
-                yield Outcome(piece)
+            yield from map(Outcome, writer.end())
         for told in self.tally.told():
             warn(f"{self.source}:{told.line}: {told.message}")
 

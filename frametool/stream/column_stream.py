@@ -413,9 +413,7 @@ def run_columns(
         )  # fmt: skip
         rows.mended = 0
     if writer is not None:
-        ended = writer.end()
-        for piece in (ended,) if isinstance(ended, bytes) else ended:
-            yield Outcome(piece)
+        yield from map(Outcome, writer.end())
 
 
 class _InOtherForm:

@@ -133,21 +133,13 @@ class Operation(NamedTuple):
     @property
     def changes_nothing(self) -> bool:
         """Tell whether rows only change their notation."""
-        return self._is_bare and not self.inverse
+        changed = self.left or self.right or self.of or self.moves or self.mirrors or self.before
+        return not (changed or self.inverse)
 
     @property
     def keeps_position(self) -> bool:
         """Tell whether positions stay as they are written."""
         return self.changes_nothing or (self.turns and self.left is None and not self.mirrors)
-
-    @property
-    def only_inverts(self) -> bool:
-        """Tell whether rows are turned around and nothing else."""
-        return self._is_bare and self.inverse
-
-    @property
-    def _is_bare(self) -> bool:
-        return not (self.left or self.right or self.of or self.moves or self.mirrors or self.before)
 
     def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
         """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""

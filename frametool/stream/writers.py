@@ -103,14 +103,14 @@ class TextWriter:
         self.count += len(block.numbers)
         return text
 
-    def end(self) -> bytes:
-        """Return what comes behind the last pose, and tell what was left out."""
+    def end(self) -> Iterator[bytes]:
+        """Yield what comes behind the last pose, and tell what was left out."""
         if self.fixed is None or self.dropped_fields is None:
             if self.dropped:
                 warn(f"{self.style.form}: other columns left out")
-            return b""
+            return
         self.dropped_fields.tell()
-        return self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
+        yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
 
     # --- forms that say what a row is ---
 
@@ -292,7 +292,7 @@ def _no_text(_results: Sequence[Any], _style: Style) -> str:
 def write_poses(results: Iterable[Result], style: Style) -> str:
     """Return the text of single poses in a form that says what its rows are."""
     writer = TextWriter(style)
-    return (writer.of_block(block_of(list(results))) + writer.end()).decode()
+    return b"".join((writer.of_block(block_of(list(results))), *writer.end())).decode()
 
 
 def _vary(block: RowPoses) -> bool:
@@ -362,8 +362,7 @@ class ArrayWriter:
         if self.writer is None:
             self._begin({name: Made(np.empty(0)) for name in self._numbers()})
         assert self.writer is not None  # noqa: S101 - for the types
-        ended = self.writer.end()
-        yield from (ended,) if isinstance(ended, bytes) else ended
+        yield from self.writer.end()
         if self.left_out:
             warn(f"{self.style.form}: {listing(self.left_out)} left out: it holds numbers")
 
