@@ -8,6 +8,7 @@ import re
 import select
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,11 +64,18 @@ class Talk:
         return self.read()
 
     def interrupt(self) -> str:
-        """Press Ctrl-C; where it falls between Python's look for signals and its wait for keys, a key wakes it up."""
+        """Press Ctrl-C once the prompt waits for keys: CPython's readline looks for signals only where one ends that wait."""
+        while self._state() not in "S?":
+            time.sleep(0.01)
         os.write(self.terminal, b"\x03")
-        if not select.select([self.terminal], [], [], 2)[0]:
-            os.write(self.terminal, b" ")
         return self.read()
+
+    def _state(self) -> str:
+        """Return the state of the process, S where it sleeps, ? where the system has no /proc."""
+        try:
+            return Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return "?"
 
     def until(self, keys: str, expected: str) -> None:
         """Type without ending the line, and wait for what the terminal then shows."""
