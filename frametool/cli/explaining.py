@@ -63,9 +63,9 @@ class PoseTask:
         """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
         return not is_pasted(argument, self.stream.given) and self.stream.takes_rows(argument)
 
-    def answer(self, argument: str, request: Request) -> int:
+    def answer(self, argument: str | Source, request: Request) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command."""
-        if self.stream.is_wanted(argument) or self.has_table(argument):
+        if isinstance(argument, str) and (self.stream.is_wanted(argument) or self.has_table(argument)):
             return self.stream.run(request, self.output)
         self.output.values(values_of([argument], request, self.output))
         return 0

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.documents.source import Source, decode, read_text
-from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.errors import FormatError, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
 from frametool.grammar.rotation_spelling import read_spelled, rotation_of, spelled
@@ -275,22 +275,82 @@ def _factor(text: str, *, is_inverse: bool) -> Factor:
     return Factor(bare if bare != text.strip() else text, is_inverse)
 
 
-def combinations(arguments: Sequence[str | Factor], request: Request) -> list[tuple[Pose, ...]]:
-    """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
-    factors = [Factor(each) if isinstance(each, str) else each for each in arguments]
-    if [each.argument for each in factors].count("-") > 1:
+class Given(NamedTuple):
+    """What an argument holds: its poses, the keys that stand beside any of them, and what was odd in it."""
+
+    source: Source
+    poses: list[Pose]
+    beside: set[str]
+    odd: list[tuple[Any, ...]]
+
+    def only_poses(self) -> list[Pose]:
+        """Return the poses alone; tell what was odd, and what else stood there."""
+        for message, rule, kind in self.odd:
+            warn(message, rule=rule, kind=kind)
+        if self.beside:
+            warn(f"{self.source.name}: {', '.join(map(shown, sorted(self.beside)))} left out: only its pose is used")
+        return self.poses
+
+
+def _given(argument: str, request: Request) -> Given:
+    """Read all poses of one argument; warnings are kept, not told."""
+    from frametool.stream.record_values import read_given
+
+    odd: list[tuple[Any, ...]] = []
+    with heard_by(lambda *said: odd.append(said)):
+        read = partial(read_given, degrees=request.degrees, normalize=request.normalize)
+        found: list[Given] = [*_read(argument, request, lambda source: [Given(source, *read(source), odd)])]
+    return found[0]
+
+
+def _several(given: Sequence[Given | None]) -> list[int]:
+    """Return where the argument that holds several poses stands; raise ValueInvalid if another one does too."""
+    found = [at for at, each in enumerate(given) if each and len(each.poses) > 1]
+    if len(found) > 1:
+        named = " and ".join(f"{each.source.name} ({len(each.poses)})" for each in given if each and each.poses[1:])
+        raise ValueInvalid(f"only one argument may hold several poses, found {named}")
+    return found
+
+
+class Rows(NamedTuple):
+    """Which argument holds the records that make the results, one each; and the one pose of each other argument."""
+
+    at: int
+    argument: str | Source
+    before: list[Pose]
+    behind: list[Pose]
+
+
+def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[str], bool]) -> Rows:
+    """Choose them: standard input, a table, what holds several poses, or the last that says more than a pose."""
+    if arguments.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
-    read = [list(map(each.of, poses_from(each.argument, request))) for each in factors]
-    several = [f"{factor.argument} ({len(poses)})" for factor, poses in zip(factors, read, strict=True) if poses[1:]]
-    if len(several) > 1:
-        raise ValueInvalid(f"only one argument may hold several poses, found {' and '.join(several)}")
-    most = max(map(len, read))
+    stream = next((at for at, each in enumerate(arguments) if each == "-" or has_table(each)), None)
+    given = [None if at == stream else _given(each, request) for at, each in enumerate(arguments)]
+    says_more = [at for at, each in enumerate(given) if each and each.beside]
+    at = [0, *says_more, *_several(given)][-1] if stream is None else stream
+    sides = [
+        [_only(each.only_poses(), each.source) for each in side if each] for side in (given[:at], given[at + 1 :])
+    ]
+    rows = given[at]
+    return Rows(at, rows.source if rows else "-", *sides)
+
+
+def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:
+    """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
+    given = [_given(each, request) for each in arguments]
+    several = _several(given)
+    read = [each.only_poses() for each in given]
+    most = len(read[several[0]]) if several else 1
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 
 
 def one_pose(argument: str | Source, request: Request) -> Pose:
     """Read the one pose of an argument."""
-    poses = poses_from(argument, request)
+    return _only(poses_from(argument, request), argument)
+
+
+def _only(poses: list[Pose], argument: str | Source) -> Pose:
     if len(poses) != 1:
         name = argument if isinstance(argument, str) else argument.name
         raise click.UsageError(f"one pose is wanted here, {name} holds {len(poses)}")

@@ -51,11 +51,25 @@ def read_poses(source: Source, *, degrees: bool = False, normalize: bool = False
     degrees: the unit of bare angles.  normalize: accept any non-zero quaternion and any matrix near a rotation.
     Raises FormatError with the place.
     """
+    return read_given(source, degrees=degrees, normalize=normalize)[0]
+
+
+def read_given(source: Source, *, degrees: bool = False, normalize: bool = False) -> tuple[list[Pose], set[str]]:
+    """Return every pose of a text as `read_poses` does, and the keys that stand beside any of them."""
     request = Request(kind=POSE, degrees=degrees, normalize=normalize)
-    poses = [pose_of(record, request) for _, records in documents(source, request) for record in records]
+    poses: list[Pose] = []
+    beside: set[str] = set()
+    nodes: list[Node] = []
+    for document, records in documents(source, request):
+        for record in records:
+            poses.append(pose_of(record, request))
+            unit = _unit(record, document.value)
+            if not _says_no_more(record, document, unit):
+                nodes = nodes or parse_nodes(source.text)
+                beside.update(_header_stamp(record), _rest(_at(nodes, unit), unit, record))
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
-    return poses
+    return poses, beside
 
 
 def pose_of(record: Record, request: Request) -> Pose:

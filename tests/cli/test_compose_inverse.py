@@ -41,3 +41,25 @@ def test_what_has_no_inverse_is_said(arguments: list[str], status: int, told: st
     done = run("compose", *arguments)
     assert done.status == status
     assert told in done.err
+
+
+STAMPED = "{xyz: [1, 0, 0], stamp: 1.5, label: a}"
+LATER = "{xyz: [0, 2, 0], stamp: 2.5}"
+
+
+def test_a_result_says_what_the_last_argument_says_and_what_the_others_say_is_told(run: Callable[..., Any]) -> None:
+    done = run("compose", STAMPED, LATER, "-f", "json")
+    assert done.out == '{"xyz": [1.0, 2.0, 0.0], "quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, "stamp": 2.5}\n'
+    assert done.err == "frametool: warning: argument: 'label', 'stamp' left out: only its pose is used\n"
+    alone = run("relative", STAMPED, "{xyz: [0, 2, 0]}", "-f", "json")
+    assert (json.loads(alone.out)["stamp"], json.loads(alone.out)["label"], alone.err) == (1.5, "a", "")
+    between = run("interpolate", STAMPED, "{xyz: [0, 2, 0]}", "0.5")
+    assert between.err == done.err
+
+
+def test_a_table_among_the_arguments_is_what_input_would_be(run: Callable[..., Any]) -> None:
+    rows = "id,x,y,z,qx,qy,qz,qw\n7,1,2,3,0,0,0,1\n8,4,5,6,0,0,0,1\n"
+    fixed = "{xyz: [1, 0, 0]}"
+    for arguments in (("compose", fixed, "rows.csv"), ("compose", "inv(rows.csv)", fixed), ("relative", "rows.csv", fixed)):
+        piped = [{"rows.csv": "-", "inv(rows.csv)": "inv(-)"}.get(each, each) for each in arguments]
+        assert run(*arguments, files={"rows.csv": rows}) == run(*piped, stdin=rows)

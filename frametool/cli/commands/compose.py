@@ -9,10 +9,9 @@ import click
 
 from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
 from frametool.cli.options import TEXT, Command, pose_result_options
-from frametool.cli.poses import combinations, factors_of, one_pose
+from frametool.cli.poses import factors_of, rows_among
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
-from frametool.grammar.result import Result
 
 
 @click.command(cls=Command, name="compose")
@@ -42,27 +41,21 @@ def command(poses: tuple[str, ...], **options: Any) -> int:
         written = [task.written(each) for each in given]
         turned = [each.turned() if factor.is_inverse else each for each, factor in zip(written, factors, strict=True)]
         return task.write(derive.compose(plan, *turned))
-    if "-" not in given:
-        if task.stream.path:
-            raise click.UsageError("-i FILE is read where - stands among the poses")
-        task.output.poses([Result(reduce(product, each)) for each in combinations(factors, task.request())])
-        return 0
-    if given.count("-") > 1:
-        raise click.UsageError("standard input can be read once; only one argument may be -")
-    at = given.index("-")
-    rows = factors[at]
+    if task.stream.path and "-" not in given:
+        raise click.UsageError("-i FILE is read where - stands among the poses")
     request = task.request()
-    left, right = (
-        [each.of(one_pose(each.argument, request)) for each in side] for side in (factors[:at], factors[at + 1 :])
-    )
+    rows = rows_among(given, request, task.has_table)
+    left = [factor.of(pose) for factor, pose in zip(factors, rows.before, strict=False)]
+    right = [factor.of(pose) for factor, pose in zip(factors[rows.at + 1 :], rows.behind, strict=True)]
+    row = factors[rows.at]
     from frametool.stream.request import Operation
 
     before = reduce(product, left) if left else None
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
-        result = reduce(product, [*filter(None, [before]), rows.of(Pose(name=name, parent=parent)), *right])
+        result = reduce(product, [*filter(None, [before]), row.of(Pose(name=name, parent=parent)), *right])
         return result.parent, result.name
 
     behind = tuple(each.components for each in right)
-    operation = Operation(before and before.components, behind, inverse=rows.is_inverse)
-    return task.stream.run(request._replace(operation=operation, rename=rename), task.output)
+    operation = Operation(before and before.components, behind, inverse=row.is_inverse)
+    return task.answer(rows.argument, request._replace(operation=operation, rename=rename))

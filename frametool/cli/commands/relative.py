@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options, one_argument, pose_stream_options
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
-from frametool.cli.poses import combinations, one_pose
+from frametool.cli.poses import rows_among
 from frametool.grammar.pose import Pose
-from frametool.grammar.pose_algebra import relative, relative_names
-
-if TYPE_CHECKING:
-    from frametool.stream.request import Request
+from frametool.grammar.pose_algebra import relative_names
 
 
 @click.command(cls=Command, name="relative")
@@ -72,42 +69,33 @@ def command(
         raise click.UsageError("--velocity is that from one row to the next; give --consecutive too")
     if time_column is not None and not velocity:
         raise click.UsageError("--time-column is for --velocity")
+    from frametool.stream.request import PREVIOUS, START, Operation
+
     given = [each for each in (a, b) if each is not None]
     if consecutive or first:
         if (consecutive and first) or len(given) > 1:
             one = "--consecutive and --first are two questions" if consecutive and first else "leave A and B out"
             raise click.UsageError(f"rows are compared with one of themselves; {one}")
-        from frametool.stream.request import PREVIOUS, START, Operation
-
         # a row is seen from another one of the same stream, which is the same thing at another moment
         operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
         beside = (time_column or "") if velocity else None
         request = task.request(operation=operation, extra_column=beside, rename=lambda _parent, name: (name, name))
         return task.answer(a or "-", request)
-    if len(given) < 2 or "-" in given:
-        return task.stream.run(_with_rows(a, b, task.request()), task.output)
-    if task.stream.path:
-        raise click.UsageError("-i FILE is read where - stands for A or B")
-    task.output.poses([relative(*pair) for pair in combinations(given, task.request())])
-    return 0
-
-
-def _with_rows(a: str | None, b: str | None, plain: Request) -> Request:
-    """Compare a stream's rows with a fixed A or B, or with the row's own second pose."""
-    from frametool.stream.request import Operation
-
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
-        return plain._replace(operation=Operation(of="pair"), poses=2)
-    if a == b == "-":
+        return task.answer("-", task.request(operation=Operation(of="pair"), poses=2))
+    if given == ["-", "-"]:
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
-    first = a != "-"
-    fixed = one_pose(str(a if first else b), plain)
+    if task.stream.path and "-" not in given:
+        raise click.UsageError("-i FILE is read where - stands for A or B")
+    request = task.request()
+    rows = rows_among(given, request, task.has_table)
+    fixed = [*rows.before, *rows.behind][0]
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         own = Pose(name=name, parent=parent)
-        return relative_names(*((fixed, own) if first else (own, fixed)))
+        return relative_names(*((fixed, own) if rows.at else (own, fixed)))
 
-    operation = Operation(of="first" if first else "second", fixed=fixed.components)
-    return plain._replace(operation=operation, rename=rename)
+    operation = Operation(of="first" if rows.at else "second", fixed=fixed.components)
+    return task.answer(rows.argument, request._replace(operation=operation, rename=rename))
