@@ -1,0 +1,101 @@
+"""The transform, and the scale, that bring an estimate onto its reference.
+
+    point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.errors import ValueInvalid
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from frametool.frames.trajectory import Trajectory
+    from frametool.geometry.types import Array
+
+ALIGNMENTS = ("none", "origin", "yaw", "se3", "sim3")
+LEAST = 3  # pairs
+STILL = 1e-9  # rms, of 1 + the largest coordinate: what rounding moves
+THIN = 1e-5  # of the second axis over the first: a line
+
+
+class Unaligned(ValueInvalid):
+    """What pairs do not determine; `other` names the alignments that they do."""
+
+
+class Fit(NamedTuple):
+    """An alignment: ref_from_est, and the scale that comes before it."""
+
+    transform: Transform
+    scale: float = 1.0
+
+    def moved(self, est: Trajectory) -> Trajectory:
+        """Return an estimate as the fit places it."""
+        rotation, shift = self.transform.rotation, self.transform.xyz
+        xyz = self.scale * rotation.apply(est.xyz) + shift
+        if est.rotation is None:
+            return est._replace(xyz=xyz)
+        return est._replace(xyz=xyz, xyzw=np.stack((rotation @ est.rotation).components, -1))
+
+
+def fitted(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Fit:
+    """Fit paired poses; raises Unaligned where they do not determine the alignment."""
+    if kind == "none":
+        return Fit(Transform.identity())
+    if kind == "origin":
+        return _origin(ref, est)
+    if kind == "yaw":
+        return _yaw(ref.xyz, est.xyz, up)
+    for name, each in (("the reference", ref), ("the estimate", est)):
+        _require_plane(kind, each.xyz, name)
+    return _umeyama(ref.xyz, est.xyz, with_scale=kind == "sim3")
+
+
+def principal_axes(xyz: Array) -> Array:
+    """Return the rms of positions along their principal axes, the largest first."""
+    spread: Array = np.linalg.svd(xyz - xyz.mean(0), compute_uv=False) / np.sqrt(len(xyz))
+    return spread
+
+
+def _require_plane(kind: str, xyz: Array, name: str) -> None:
+    if len(xyz) < LEAST:
+        raise Unaligned(f"{len(xyz)} pairs; {kind} needs {LEAST}; align by origin or none")
+    first, second, _ = principal_axes(xyz)
+    if first < STILL * (1 + np.abs(xyz).max()):
+        raise Unaligned(f"{name} does not move; align by none")
+    if second < THIN * first:
+        raise Unaligned(f"{name} lies on a line: the turn about it is free; align by yaw, origin or none")
+
+
+def _umeyama(ref: Array, est: Array, *, with_scale: bool) -> Fit:
+    """Minimise the sum of |c R e + t - r|^2; source: Umeyama 1991, equations 38 to 43."""
+    ref_mean, est_mean = ref.mean(0), est.mean(0)
+    u, d, v = np.linalg.svd((ref - ref_mean).T @ (est - est_mean) / len(ref))
+    s = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(v))])
+    scale = float(d @ s / (est - est_mean).var(0).sum()) if with_scale else 1.0
+    rotation = Rotation.from_matrix(u * s @ v, normalize=True)
+    return Fit(Transform(rotation, ref_mean - scale * rotation.apply(est_mean)), scale)
+
+
+def _yaw(ref: Array, est: Array, up: Array) -> Fit:
+    """Minimise the same over turns about `up` alone."""
+    ref_mean, est_mean = ref.mean(0), est.mean(0)
+    r, e = ref - ref_mean, est - est_mean
+    across = [each - np.outer(each @ up, up) for each in (r, e)]
+    for name, each, whole in (("the reference", across[0], ref), ("the estimate", across[1], est)):
+        if np.sqrt((each**2).sum(1).mean()) < STILL * (1 + np.abs(whole).max()):
+            raise Unaligned(f"{name} has no motion across up: yaw is free; align by origin or none")
+    sine = (np.cross(across[1], across[0]) @ up).sum()
+    rotation = Rotation.from_axis_angle(up, float(np.arctan2(sine, (across[1] * across[0]).sum())))
+    return Fit(Transform(rotation, ref_mean - rotation.apply(est_mean)))
+
+
+def _origin(ref: Trajectory, est: Trajectory) -> Fit:
+    """Put the first pose of the estimate onto that of the reference: ref_0 inv(est_0)."""
+    if ref.xyzw is None or est.xyzw is None:
+        raise Unaligned("origin needs rotations of both; align by se3, yaw or none")
+    return Fit(ref.poses[0] @ est.poses[0].inverse())

@@ -1,0 +1,122 @@
+"""How far two clocks are apart, from the motion that both trajectories show: t_ref = t_est + offset."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.fit.alignment import Unaligned, fitted
+from frametool.fit.pairs import between
+
+if TYPE_CHECKING:
+    from frametool.frames.trajectory import Trajectory
+    from frametool.geometry.types import Array
+
+LIMIT_S = 10.0
+REFINED_S = 1e-7
+STEPS = 8
+TINY = 1e-12
+
+
+class ClockOffset(NamedTuple):
+    """The offset in seconds, and how well speeds agree there: 1 is perfectly."""
+
+    seconds: float
+    score: float
+
+
+def clock_offset(
+    ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, kind: str = "se3", refine: bool = True
+) -> ClockOffset:
+    """Find the lag at which angular speeds, or else speeds, correlate best; then refine it by least squares.
+
+    Where the two spans do not meet, their first stamps are put together and every lag is tried.
+    """
+    first = int(ref.stamps_ns[0])
+    shift = 0
+    if est.stamps_ns[0] > ref.stamps_ns[-1] or est.stamps_ns[-1] < ref.stamps_ns[0]:
+        shift, limit_s = first - int(est.stamps_ns[0]), np.inf
+    times = [(ref.stamps_ns - first) / 1e9, (est.stamps_ns + shift - first) / 1e9]
+    step = min(float(np.median(np.diff(each))) for each in times) / 2
+    best = ClockOffset(0.0, -1.0)
+    for turning in (True, False):
+        speeds = [_speeds(each, at, turning=turning) for each, at in zip((ref, est), times, strict=True)]
+        if all(each is not None for each in speeds):
+            best = max(best, _best_lag(speeds[0], speeds[1], step, limit_s), key=lambda found: found.score)
+    seconds = best.seconds
+    if refine and best.score > 0:
+        seconds = _refined(ref, est, shift, seconds, step, "sim3" if kind == "sim3" else "se3")
+    return ClockOffset(seconds + shift / 1e9, best.score)
+
+
+def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Array] | None:
+    """Return the times between poses and the angular speed or speed there; None where there is none to speak of."""
+    if each.size < 3 or (turning and each.rotation is None):  # noqa: PLR2004 - two speeds make the least course
+        return None
+    if turning:
+        rotation = each.rotation
+        moved = rotation[:-1].distance(rotation[1:])  # type: ignore[index,union-attr]
+    else:
+        moved = np.linalg.norm(np.diff(each.xyz, axis=0), axis=1)
+    speed = moved / np.diff(times)
+    return None if np.std(speed) < 1e-6 * max(TINY, np.max(speed)) else ((times[1:] + times[:-1]) / 2, speed)
+
+
+def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit_s: float) -> ClockOffset:
+    """Return the lag of the highest correlation, normalised over what overlaps at it; between samples by a parabola.
+
+    At least half of the shorter course overlaps.  All sums are correlations of courses, masks and squares: by FFT.
+    """
+    low, high = min(a[0][0], b[0][0]), max(a[0][-1], b[0][-1])
+    grid = low + step * np.arange(int((high - low) / step) + 1)
+    size = 1 << (2 * len(grid) - 1).bit_length()
+    masks = [((grid >= at[0]) & (grid <= at[-1])).astype(float) for at, _ in (a, b)]
+    courses = [np.interp(grid, at, speed) * mask for (at, speed), mask in zip((a, b), masks, strict=True)]
+    courses = [course - mask * (course.sum() / mask.sum()) for course, mask in zip(courses, masks, strict=True)]
+
+    def correlated(x: Array, y: Array) -> Array:
+        found: Array = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return found
+
+    count = np.maximum(correlated(*masks), 1e-9)
+    sums = correlated(courses[0], masks[1]), correlated(masks[0], courses[1])
+    squares = correlated(courses[0] ** 2, masks[1]), correlated(masks[0], courses[1] ** 2)
+    covariance = correlated(*courses) - sums[0] * sums[1] / count
+    spread = [np.maximum(square - total**2 / count, TINY) for square, total in zip(squares, sums, strict=True)]
+    lags = np.arange(size)
+    lags[size // 2 :] -= size
+    shortest = min(at[-1] - at[0] for at, _ in (a, b))
+    tried = (np.abs(lags * step) <= limit_s) & (count * step >= shortest / 2)
+    score = np.where(tried, covariance / np.sqrt(spread[0] * spread[1]), -1.0)
+    at = int(np.argmax(score))
+    before, here, after = score[at - 1], score[at], score[(at + 1) % size]
+    bend = before - 2 * here + after
+    part = 0.5 * (before - after) / bend if bend < 0 and min(before, after) > -1 else 0.0
+    return ClockOffset(float((lags[at] + part) * step), float(here))
+
+
+def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
+    """Let what is left along the velocity after the fit be time: Gauss-Newton on one number."""
+    up = np.array([0.0, 0.0, 1.0])
+    plain = ref._replace(xyzw=None)
+    half = round(step * 1e9)
+    for _ in range(STEPS):
+        at = est.stamps_ns + shift + round(seconds * 1e9)
+        inside = (at > ref.stamps_ns[0] + half) & (at < ref.stamps_ns[-1] - half)
+        at, own = at[inside], est.at(inside)._replace(xyzw=None)
+        here, later, sooner = (between(plain, at + lag, np.inf)[0].xyz for lag in (0, half, -half))
+        velocity = (later - sooner) / (2e-9 * half)
+        try:
+            fit = fitted(kind, plain._replace(xyz=here), own, up)
+        except Unaligned:
+            break
+        left = fit.moved(own).xyz - here
+        turning = ((velocity - velocity.mean(0)) ** 2).sum()
+        if turning == 0.0:
+            break
+        change = float(np.clip((left * velocity).sum() / turning, -step, step))
+        seconds += change
+        if abs(change) < REFINED_S:
+            break
+    return seconds

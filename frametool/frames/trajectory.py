@@ -1,0 +1,76 @@
+"""Where one frame was over time: the type that trajectories are read into, compared as, and written from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.errors import ValueInvalid
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from frametool.geometry.types import Array
+
+
+class Trajectory(NamedTuple):
+    """Poses of `body` in `world`, or its positions alone.
+
+    stamps_ns: integers of shape (n,), or None where poses are counted; xyz: (n, 3), metres
+    xyzw: unit quaternions (n, 4), or None where there are positions alone
+    """
+
+    stamps_ns: Any
+    xyz: Any
+    xyzw: Any = None
+    world: str = "world"
+    body: str = "body"
+
+    @property
+    def size(self) -> int:
+        """How many poses there are."""
+        return len(self.xyz)
+
+    @property
+    def rotation(self) -> Rotation | None:
+        """The rotations, if there are any."""
+        return None if self.xyzw is None else Rotation.of(*columns(self.xyzw))
+
+    @property
+    def poses(self) -> Transform:
+        """The poses; raises ValueInvalid where there are positions alone."""
+        if self.xyzw is None:
+            raise ValueInvalid("positions alone are no poses: rotations are needed here")
+        return Transform.of(*columns(self.xyz), *columns(self.xyzw))
+
+    def with_poses(self, poses: Transform) -> Trajectory:
+        """Return it at other poses."""
+        return self._replace(xyz=np.stack(poses.components[:3], -1), xyzw=np.stack(poses.components[3:], -1))
+
+    def at(self, index: Any) -> Trajectory:
+        """Choose poses as numpy does."""
+        stamps = None if self.stamps_ns is None else self.stamps_ns[index]
+        return self._replace(
+            stamps_ns=stamps, xyz=self.xyz[index], xyzw=None if self.xyzw is None else self.xyzw[index]
+        )
+
+    def in_order(self) -> Trajectory:
+        """Return it sorted by its stamps, of equal ones the last."""
+        if self.stamps_ns is None or not np.any(np.diff(self.stamps_ns) <= 0):
+            return self
+        order = np.argsort(self.stamps_ns, kind="stable")
+        last = np.append(np.diff(self.stamps_ns[order]) > 0, True)
+        return self.at(order[last])
+
+
+def columns(rows: Array) -> list[Array]:
+    """Return the columns of rows, each of them contiguous."""
+    return list(np.ascontiguousarray(np.asarray(rows, np.float64).T))
+
+
+def way(xyz: Array) -> Array:
+    """Return the path in metres up to each position."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(xyz, axis=0), axis=1)))
