@@ -1,6 +1,6 @@
 """The transform, and the scale, that bring an estimate onto its reference.
 
-    point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
+point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.fit.alignment import Unaligned, fitted
-from frametool.fit.pairs import between
+from frametool.fit.pairs import GAP, between, interval
 
 if TYPE_CHECKING:
     from frametool.frames.trajectory import Trajectory
@@ -26,10 +26,8 @@ class ClockOffset(NamedTuple):
     score: float
 
 
-def clock_offset(
-    ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, kind: str = "se3", refine: bool = True
-) -> ClockOffset:
-    """Find the lag at which angular speeds, or else speeds, correlate best; then refine it by least squares.
+def clock_offset(ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S) -> ClockOffset:
+    """Find the lag at which angular speeds, or else speeds, correlate best; refine it by least squares with a scale.
 
     Where the two spans do not meet, their first stamps are put together and every lag is tried.
     """
@@ -42,21 +40,22 @@ def clock_offset(
     best = ClockOffset(0.0, -1.0)
     for turning in (True, False):
         speeds = [_speeds(each, at, turning=turning) for each, at in zip((ref, est), times, strict=True)]
-        if all(each is not None for each in speeds):
-            best = max(best, _best_lag(speeds[0], speeds[1], step, limit_s), key=lambda found: found.score)
+        courses = [each for each in speeds if each is not None]
+        if len(courses) > 1:
+            best = max(best, _best_lag(courses[0], courses[1], step, limit_s), key=lambda found: found.score)
     seconds = best.seconds
-    if refine and best.score > 0:
-        seconds = _refined(ref, est, shift, seconds, step, "sim3" if kind == "sim3" else "se3")
+    if best.score > 0:
+        seconds = _refined(ref, est, shift, seconds, step)
     return ClockOffset(seconds + shift / 1e9, best.score)
 
 
 def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Array] | None:
     """Return the times between poses and the angular speed or speed there; None where there is none to speak of."""
-    if each.size < 3 or (turning and each.rotation is None):  # noqa: PLR2004 - two speeds make the least course
+    if each.size < 3 or (turning and each.rotation is None):
         return None
     if turning:
         rotation = each.rotation
-        moved = rotation[:-1].distance(rotation[1:])  # type: ignore[index,union-attr]
+        moved = rotation[:-1].distance(rotation[1:])  # type: ignore[index]
     else:
         moved = np.linalg.norm(np.diff(each.xyz, axis=0), axis=1)
     speed = moved / np.diff(times)
@@ -96,26 +95,24 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     return ClockOffset(float((lags[at] + part) * step), float(here))
 
 
-def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
+def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float) -> float:
     """Let what is left along the velocity after the fit be time: Gauss-Newton on one number."""
     up = np.array([0.0, 0.0, 1.0])
     plain = ref._replace(xyzw=None)
-    half = round(step * 1e9)
+    half, gap_ns = round(step * 1e9), GAP * interval(ref.stamps_ns)
     for _ in range(STEPS):
         at = est.stamps_ns + shift + round(seconds * 1e9)
-        inside = (at > ref.stamps_ns[0] + half) & (at < ref.stamps_ns[-1] - half)
-        at, own = at[inside], est.at(inside)._replace(xyzw=None)
-        here, later, sooner = (between(plain, at + lag, np.inf)[0].xyz for lag in (0, half, -half))
+        inside = np.logical_and.reduce([between(plain, at + lag, gap_ns)[1] for lag in (-half, 0, half)])
+        own = est.at(inside)._replace(xyzw=None)
+        sooner, here, later = (between(plain, at[inside] + lag, gap_ns)[0].xyz for lag in (-half, 0, half))
         velocity = (later - sooner) / (2e-9 * half)
         try:
-            fit = fitted(kind, plain._replace(xyz=here), own, up)
+            fit = fitted("sim3", plain._replace(xyz=here), own, up)
         except Unaligned:
             break
         left = fit.moved(own).xyz - here
-        turning = ((velocity - velocity.mean(0)) ** 2).sum()
-        if turning == 0.0:
-            break
-        change = float(np.clip((left * velocity).sum() / turning, -step, step))
+        turning = ((velocity - velocity.mean(0)) ** 2).sum()  # a constant velocity is a shift, which the fit takes
+        change = float(np.clip((left * velocity).sum() / max(turning, TINY), -step, step))
         seconds += change
         if abs(change) < REFINED_S:
             break

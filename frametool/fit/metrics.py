@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.frames.trajectory import Trajectory
-    from frametool.geometry.types import Array
+    from frametool.geometry.types import Array, Indices
 
 CHORD = 0.1  # metres of path before and behind a pose that say which way it goes
 ROUNDING = 1e-9  # of a delta
@@ -93,14 +93,14 @@ class RelativeErrors(NamedTuple):
     m and rad are None without rotations of both.
     """
 
-    start: Array
-    end: Array
+    start: Indices
+    end: Indices
     m: Array | None
     rad: Array | None
     distance: Array
 
 
-def relative_errors(ref: Trajectory, est: Trajectory, start: Array, end: Array) -> RelativeErrors:
+def relative_errors(ref: Trajectory, est: Trajectory, start: Indices, end: Indices) -> RelativeErrors:
     """Compare the ways from pose to pose: E = inv(inv(ref_i) ref_j) inv(est_i) est_j."""
     covered = [np.linalg.norm(each.xyz[end] - each.xyz[start], axis=1) for each in (ref, est)]
     distance = np.abs(covered[1] - covered[0])
@@ -111,7 +111,7 @@ def relative_errors(ref: Trajectory, est: Trajectory, start: Array, end: Array) 
     return RelativeErrors(start, end, np.linalg.norm(error.xyz, axis=1), error.rotation.angle(), distance)
 
 
-def chained(along: Array, delta: float) -> tuple[Array, Array]:
+def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
     """Return pairs (i, j), each from the end of the one before: j is the first that is delta further along."""
     following = np.searchsorted(along, along + delta * (1 - ROUNDING)).tolist()
     found = [0]
@@ -121,7 +121,7 @@ def chained(along: Array, delta: float) -> tuple[Array, Array]:
     return chain[:-1], chain[1:]
 
 
-def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Array, Array]:
+def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:
     """Return for each i the j whose way from there is the nearest to delta, within a share of it."""
     wanted = along + delta
     after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
@@ -134,8 +134,8 @@ def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Array, Arra
 class SegmentErrors(NamedTuple):
     """Errors over stretches of path of some lengths: each one's ends, length, and errors a metre of it."""
 
-    start: Array
-    end: Array
+    start: Indices
+    end: Indices
     length: Array
     share: Array
     rad_per_m: Array

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-
 if TYPE_CHECKING:
     from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array

@@ -11,6 +11,7 @@ import pytest
 
 from frametool.fit.alignment import ALIGNMENTS, Unaligned, fitted
 from frametool.fit.clock import clock_offset
+from frametool.fit.comparison import parse_delta
 from frametool.fit.metrics import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
 from frametool.fit.mounting import lever_arm
 from frametool.fit.pairs import Pairs, by_number, interpolated, nearest
@@ -97,8 +98,8 @@ def along(trajectory: Trajectory, unit: str) -> np.ndarray[Any, Any]:
 
 
 def delta_of(text: str) -> tuple[float, str]:
-    number = text.rstrip("framesdgm")
-    return float(number), text[len(number) :]
+    delta = parse_delta(text)
+    return delta.amount, delta.unit
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -156,7 +157,7 @@ def test_a_clock_that_is_late_is_found_to_a_millisecond() -> None:
         ref, est = read(case["ref"]).in_order(), read(case["est"]).in_order()
         if ref.stamps_ns is None or name == "line":
             continue
-        found = clock_offset(ref, est, kind="sim3" if name == "mono" else "se3")
+        found = clock_offset(ref, est)
         assert found.seconds == pytest.approx(case.get("offset", 0.0), abs=1e-3 if name == "clock" else 0.02), name
 
 

@@ -1,0 +1,318 @@
+"""A trajectory against a reference: paired, put on one clock, mounted, aligned, and how far it is off then."""
+
+from __future__ import annotations
+
+import re
+from math import radians
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.errors import ValueInvalid, shown
+from frametool.fit import pairs as pairing
+from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, fitted, principal_axes
+from frametool.fit.clock import LIMIT_S, clock_offset
+from frametool.fit.metrics import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
+from frametool.fit.mounting import lever_arm
+from frametool.frames.stamps import format_stamp
+from frametool.frames.trajectory import way
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.fit.metrics import AbsoluteErrors, RelativeErrors, SegmentErrors
+    from frametool.fit.pairs import Pairs
+    from frametool.frames.trajectory import Trajectory
+    from frametool.geometry.types import Array
+
+AUTO = "auto"
+CLEAR = 0.5  # score of a clock offset that can be relied on
+SURE = 0.8  # of one that is told without having been asked for
+MOST_TRIED = 20_000  # points of its grid then
+FEW = 0.5  # of the possible pairs
+APART = radians(2.0)  # a turn between bodies that is told, where it is also
+STEADY = 5.0  # times as large as its spread
+NEAR_A_LINE = 3.0  # residuals that the second axis of positions must exceed
+SEGMENTS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
+
+
+class Delta(NamedTuple):
+    """How far two poses are apart: metres, seconds, degrees of turning, or frames."""
+
+    amount: float
+    unit: str
+
+    def __str__(self) -> str:
+        """Write it as it is read."""
+        return f"{self.amount:g}{self.unit}"
+
+    def along(self, each: Trajectory) -> Array | None:
+        """Return how far each pose of a trajectory is along it, in the unit; None where nothing says so."""
+        if self.unit == "frames":
+            return np.arange(each.size, dtype=float)
+        if self.unit == "m":
+            return way(each.xyz)
+        if self.unit == "s":
+            return None if each.stamps_ns is None else (each.stamps_ns - each.stamps_ns[0]) / 1e9
+        rotation = each.rotation
+        return None if rotation is None else np.degrees(np.append(0.0, np.cumsum(rotation[:-1].distance(rotation[1:]))))
+
+
+def parse_delta(text: str, units: Sequence[str] = ("m", "s", "deg", "frames")) -> Delta:
+    """Read `1m`, `10frames`, `1s`, `5deg`; raises ValueInvalid."""
+    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-z]+)", text.strip())
+    if not found or found[2] not in units or not float(found[1]) > 0:
+        raise ValueInvalid(f"{shown(text)} is no distance between poses; write a number with {', '.join(units)}")
+    if found[2] == "frames" and not float(found[1]).is_integer():
+        raise ValueInvalid(f"{shown(text)}: frames are counted whole")
+    return Delta(float(found[1]), found[2])
+
+
+class Settings(NamedTuple):
+    """What a comparison does.
+
+    match: "interpolate" or "nearest"; max_gap_ns, max_diff_ns, min_match (a share): what counts as a partner
+    offset: nanoseconds that EST's clock is behind, or "auto" within offset_limit_s; None: none, but one may be told of
+    align, up: one of ALIGNMENTS, and the axis of yaw; align_first: the fit takes the pairs so far only
+    mount: REF's body in EST's, or "auto"
+    deltas: None for 1m, 10m and 100m as far as the path is long; all_pairs, tolerance, pairs_from: which poses
+    segments: of KITTI, in metres, from every segment_step-th pair
+    start, end: (True, nanoseconds) after the first pair, or (False, a stamp on REF's clock)
+    evo: what evo does where nothing else is said, and its two more numbers
+    """
+
+    match: str = "interpolate"
+    max_gap_ns: float | None = None
+    max_diff_ns: float = 10_000_000
+    min_match: float = 0.1
+    offset: int | str | None = None
+    offset_limit_s: float = LIMIT_S
+    align: str = "se3"
+    align_first: Delta | None = None
+    mount: Transform | str | None = None
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    deltas: tuple[Delta, ...] | None = None
+    all_pairs: bool = False
+    tolerance: float = 0.1
+    pairs_from: str = "reference"
+    segments: tuple[float, ...] = SEGMENTS
+    segment_step: int = 10
+    start: tuple[bool, int] | None = None
+    end: tuple[bool, int] | None = None
+    evo: bool = False
+
+
+EVO = Settings(match="nearest", align="none", deltas=(Delta(1.0, "frames"),), pairs_from="estimate", offset=0, evo=True)
+DELTAS = (Delta(1.0, "m"), Delta(10.0, "m"), Delta(100.0, "m"))
+
+
+class Comparison(NamedTuple):
+    """How far an estimate is from its reference.
+
+    pairs: as they were compared, in their own worlds; moved: the estimate's side of them as the fit places it
+    ate_by_alignment: the rmse under each of ALIGNMENTS, None where it is not determined
+    relative: errors of the way for each delta; segments: KITTI's, None without rotations
+    hints: what a person should know
+    """
+
+    names: tuple[str, str]
+    sizes: tuple[int, int]
+    settings: Settings
+    pairs: Pairs
+    moved: Trajectory
+    offset_ns: int
+    offset_score: float | None
+    mount: Transform | None
+    fit: Fit
+    ate_by_alignment: dict[str, float | None]
+    ate: AbsoluteErrors
+    relative: list[tuple[Delta, RelativeErrors]]
+    segments: SegmentErrors | None
+    hints: list[str]
+
+
+def compare(
+    ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[str, str] = ("ref", "est")
+) -> Comparison:
+    """Compare an estimate with its reference.
+
+    Raises ValueInvalid where they have no stamps in common, or what is asked is not determined.
+    """
+    hints: list[str] = []
+    sizes = (ref.size, est.size)
+    if not settings.evo:
+        ref, est = (_in_order(each, name, hints) for each, name in zip((ref, est), names, strict=True))
+    pairs, offset_ns, score = _paired(ref, est, settings, names, hints)
+    pairs, mount = _mounted(_cut(pairs, settings), settings)
+    up = np.array(settings.up)
+    first = pairs.at(slice(_first(pairs, settings.align_first)))
+    fit = fitted(settings.align, first.ref, first.est, up)
+    moved = fit.moved(pairs.est)
+    ate = absolute_errors(pairs.ref, moved, up)
+    if settings.mount is None and not settings.evo:
+        _tell_of_bodies(pairs.ref, moved, hints)
+    if settings.align in ("se3", "sim3") and principal_axes(first.ref.xyz)[1] < NEAR_A_LINE * statistics(ate.m).rmse:
+        hints.append("positions lie nearly on a line: the turn about it rests on noise")
+    walked = pairs.ref if settings.pairs_from == "reference" else moved
+    return Comparison(
+        names, sizes, settings, pairs, moved, offset_ns, score, mount, fit, _by_alignment(pairs, first, up), ate,
+        list(_relative(pairs.ref, moved, walked, settings, hints)),
+        segment_errors(pairs.ref, moved, settings.segments, settings.segment_step), hints,
+    )  # fmt: skip
+
+
+def _in_order(each: Trajectory, name: str, hints: list[str]) -> Trajectory:
+    if each.stamps_ns is None:
+        return each
+    steps = np.diff(each.stamps_ns)
+    if (steps < 0).any():
+        hints.append(f"{name}: stamps are out of order; sorted")
+    found = each.in_order()
+    if found.size < each.size:
+        hints.append(f"{name}: {each.size - found.size} poses have the stamp of another; the last counts")
+    return found
+
+
+def _paired(
+    ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[str, str], hints: list[str]
+) -> tuple[Pairs, int, float | None]:
+    """Return the pairs, and the offset of the clocks with its score if it was looked for."""
+    if ref.stamps_ns is None or est.stamps_ns is None:
+        if (ref.stamps_ns is None) != (est.stamps_ns is None):
+            raise ValueInvalid(f"{names[ref.stamps_ns is not None]} has no stamps; give them with --stamps FILE")
+        if settings.offset:
+            raise ValueInvalid("poses that are counted have no clock; leave the offset out")
+        return pairing.by_number(ref, est), 0, None
+    offset_ns, score = 0, None
+    if settings.offset == AUTO:
+        found = clock_offset(ref, est, limit_s=settings.offset_limit_s)
+        if found.score < CLEAR:
+            raise ValueInvalid(f"no clear clock offset (score {found.score:.2f}); give one: --offset T")
+        offset_ns, score = round(found.seconds * 1e9), found.score
+    elif settings.offset is not None:
+        offset_ns = int(settings.offset)
+    shifted = est._replace(stamps_ns=est.stamps_ns + offset_ns)
+    if settings.match == "nearest":
+        pairs = pairing.nearest(ref, shifted, settings.max_diff_ns)
+    else:
+        pairs = pairing.interpolated(ref, shifted, settings.max_gap_ns)
+    share = pairs.ref.size / max(pairs.possible, 1)
+    walked = names[pairs.interpolated != "ref"]
+    counted = f"{pairs.ref.size} of {pairs.possible} poses have a partner in {names[pairs.interpolated == 'est']}"
+    if not pairs.ref.size or share < settings.min_match:
+        spans = ", ".join(_span(each, name) for each, name in zip((ref, shifted), names, strict=True))
+        more = f"try --offset auto, {'--max-diff' if settings.match == 'nearest' else '--max-gap'}, --min-match 0"
+        raise ValueInvalid(f"{walked}: {counted} ({100 * share:.1f} %): {spans}; {more}")
+    if share < FEW:
+        hints.append(f"{walked}: only {counted} ({100 * share:.1f} %)")
+    if pairs.shared:
+        hints.append(f"{pairs.shared} poses have more than one partner")
+    if settings.offset is None:
+        _tell_of_clock(ref, est, names[1], hints)
+    return pairs, offset_ns, score
+
+
+def _span(each: Trajectory, name: str) -> str:
+    first, last = (format_stamp(int(each.stamps_ns[at]))[:-6] for at in (0, -1))
+    return f"{name} {first} .. {last} s"
+
+
+def _tell_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
+    """Tell of an offset that is larger than half an interval and clear, where looking for it costs little."""
+    intervals = [pairing.interval(each.stamps_ns) for each in (ref, est)]
+    span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
+    if not span / (min(intervals) / 2) <= MOST_TRIED:
+        return
+    found = clock_offset(ref, est)
+    if abs(found.seconds) * 1e9 > max(intervals) / 2 and found.score > SURE:
+        side = "behind" if found.seconds > 0 else "ahead"
+        by = f"{abs(found.seconds):.3f} s {side} (score {found.score:.3f})"
+        hints.append(f"the clock of {name} seems {by}; --offset auto")
+
+
+def _cut(pairs: Pairs, settings: Settings) -> Pairs:
+    """Keep the pairs from the start to the end that are asked for, both inclusive."""
+    if settings.start is None and settings.end is None:
+        return pairs
+    stamps = pairs.ref.stamps_ns
+    if stamps is None:
+        raise ValueInvalid("poses that are counted have no times; leave --start and --end out")
+    begin, end = (
+        default if limit is None else limit[1] + limit[0] * int(stamps[0])
+        for limit, default in ((settings.start, stamps[0]), (settings.end, stamps[-1]))
+    )
+    found = pairs.at((begin <= stamps) & (stamps <= end))
+    if not found.ref.size:
+        asked = f"{format_stamp(int(begin))} to {format_stamp(int(end))} s"
+        raise ValueInvalid(f"no pair from {asked}; there are some in{_span(pairs.ref, '')}")
+    return found
+
+
+def _mounted(pairs: Pairs, settings: Settings) -> tuple[Pairs, Transform | None]:
+    """Put REF's body in the place of EST's: est_i X."""
+    mount = settings.mount
+    if mount is None:
+        return pairs, None
+    est = pairs.est
+    if est.rotation is None:
+        raise ValueInvalid("a mount needs rotations of the estimate")
+    if isinstance(mount, str):
+        arm = lever_arm(settings.align, pairs.ref, est, np.array(settings.up))
+        mount = Transform(Rotation.identity(), arm)
+    return pairs._replace(est=est.with_poses(est.poses @ mount)), mount
+
+
+def _first(pairs: Pairs, limit: Delta | None) -> int | None:
+    """Count the first pairs that are within a limit."""
+    if limit is None:
+        return None
+    if limit.unit == "frames":
+        return int(limit.amount)
+    along = limit.along(pairs.ref)
+    if along is None:
+        raise ValueInvalid(f"poses that are counted have no times; the first {limit} cannot be told")
+    return int(np.searchsorted(along, limit.amount, "right"))
+
+
+def _by_alignment(pairs: Pairs, first: Pairs, up: Array) -> dict[str, float | None]:
+    """Return the rmse of positions under every alignment."""
+    found: dict[str, float | None] = {}
+    for kind in ALIGNMENTS:
+        try:
+            gap = fitted(kind, first.ref, first.est, up).moved(pairs.est).xyz - pairs.ref.xyz
+            found[kind] = float(np.sqrt((gap**2).sum() / len(gap)))
+        except Unaligned:
+            found[kind] = None
+    return found
+
+
+def _tell_of_bodies(ref: Trajectory, moved: Trajectory, hints: list[str]) -> None:
+    """Tell of a turn between the two bodies that is the same all the way."""
+    if ref.rotation is None or moved.rotation is None:
+        return
+    turns = ref.rotation.inverse() @ moved.rotation
+    shared = turns.mean()
+    spread = float(np.sqrt((turns.distance(shared) ** 2).mean()))
+    if (angle := float(shared.angle())) > max(APART, STEADY * spread):
+        rpy = ", ".join(f"{number:.4g}" for number in np.degrees(shared.inverse().as_rpy()))
+        hints.append(f"the bodies are {np.degrees(angle):.1f} deg apart; --mount '{{rpy_deg: [{rpy}]}}'")
+
+
+def _relative(
+    ref: Trajectory, est: Trajectory, walked: Trajectory, settings: Settings, hints: list[str]
+) -> Iterator[tuple[Delta, RelativeErrors]]:
+    """Yield the errors of the way for every delta that the path is long enough for."""
+    for delta in settings.deltas or DELTAS:
+        along = delta.along(walked)
+        if along is None:
+            why = "there are no rotations" if delta.unit == "deg" else "there are no stamps"
+        else:
+            of_all = settings.all_pairs
+            ends = all_pairs(along, delta.amount, settings.tolerance) if of_all else chained(along, delta.amount)
+            why = "" if len(ends[0]) else "no two poses are so far apart"
+        if not why:
+            yield delta, relative_errors(ref, est, *ends)
+        elif settings.deltas:
+            hints.append(f"rpe {delta} is left out: {why}")
