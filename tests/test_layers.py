@@ -16,7 +16,7 @@ import frametool
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
-    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "explain", "calc",
+    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "fit", "explain", "calc",
     "sim", "view", "cli",
 ]  # fmt: skip
 HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}

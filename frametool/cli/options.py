@@ -44,11 +44,13 @@ class Command(WithHelp, Reused):
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Shield negative numbers (-j is an option where joints are), give a bare --explain its form, then parse."""
+        """Shield negative numbers (-j is an option where joints are), give bare options their values, then parse."""
         if any(map(NEGATIVE.match, args)):
             options = {name for each in self.get_params(ctx) for name in each.opts}
             args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
-        return super().parse_args(ctx, _with_form(args) if "--explain" in args else args)
+        for option in {*OPTIONAL}.intersection(args):
+            args = _with_value(args, option, *OPTIONAL[option])
+        return super().parse_args(ctx, args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """End every help with the exit codes, those of most commands unless its epilog says others."""
@@ -56,13 +58,17 @@ class Command(WithHelp, Reused):
         formatter.write_text(self.epilog or EXIT_CODES)
 
 
-def _with_form(args: list[str]) -> list[str]:
-    """Join --explain with the form behind it, or with `text`: click would take any argument there for its value."""
-    forms, joined = ("text", "markdown", "latex"), []
+# options that may stand bare, and their values: the first is what they mean then
+OPTIONAL = {"--explain": ("text", "markdown", "latex"), "--rows": ("ate", "rpe", "kitti")}
+
+
+def _with_value(args: list[str], option: str, *values: str) -> list[str]:
+    """Join an option with the value behind it, or its usual one: click would take any argument there for its value."""
+    joined = []
     for before, each, behind in zip(["", *args], args, [*args[1:], ""], strict=False):
-        if each == "--explain":
-            joined.append(f"--explain={behind if behind in forms else 'text'}")
-        elif before != "--explain" or each not in forms:
+        if each == option:
+            joined.append(f"{option}={behind if behind in values else values[0]}")
+        elif before != option or each not in values:
             joined.append(each)
     return joined
 

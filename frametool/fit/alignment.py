@@ -42,15 +42,15 @@ class Fit(NamedTuple):
         return est._replace(xyz=xyz, xyzw=np.stack((rotation @ est.rotation).components, -1))
 
 
-def fitted(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Fit:
-    """Fit paired poses; raises Unaligned where they do not determine the alignment."""
+def fitted(kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[str, str] = ("ref", "est")) -> Fit:
+    """Fit paired poses; raises Unaligned, with the name of the side, where they do not determine the alignment."""
     if kind == "none":
         return Fit(Transform.identity())
     if kind == "origin":
         return _origin(ref, est)
     if kind == "yaw":
-        return _yaw(ref.xyz, est.xyz, up)
-    for name, each in (("the reference", ref), ("the estimate", est)):
+        return _yaw(ref.xyz, est.xyz, up, names)
+    for name, each in zip(names, (ref, est), strict=True):
         _require_plane(kind, each.xyz, name)
     return _umeyama(ref.xyz, est.xyz, with_scale=kind == "sim3")
 
@@ -63,12 +63,12 @@ def principal_axes(xyz: Array) -> Array:
 
 def _require_plane(kind: str, xyz: Array, name: str) -> None:
     if len(xyz) < LEAST:
-        raise Unaligned(f"{len(xyz)} pairs; {kind} needs {LEAST}; align by origin or none")
+        raise Unaligned(f"{len(xyz)} pairs; {kind} needs {LEAST}; --align origin or none")
     first, second, _ = principal_axes(xyz)
     if first < STILL * (1 + np.abs(xyz).max()):
-        raise Unaligned(f"{name} does not move; align by none")
+        raise Unaligned(f"{name} does not move; --align none")
     if second < THIN * first:
-        raise Unaligned(f"{name} lies on a line: the turn about it is free; align by yaw, origin or none")
+        raise Unaligned(f"{name} lies on a line: the turn about it is free; --align yaw, origin or none")
 
 
 def _umeyama(ref: Array, est: Array, *, with_scale: bool) -> Fit:
@@ -81,14 +81,14 @@ def _umeyama(ref: Array, est: Array, *, with_scale: bool) -> Fit:
     return Fit(Transform(rotation, ref_mean - scale * rotation.apply(est_mean)), scale)
 
 
-def _yaw(ref: Array, est: Array, up: Array) -> Fit:
+def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str]) -> Fit:
     """Minimise the same over turns about `up` alone."""
     ref_mean, est_mean = ref.mean(0), est.mean(0)
     r, e = ref - ref_mean, est - est_mean
     across = [each - np.outer(each @ up, up) for each in (r, e)]
-    for name, each, whole in (("the reference", across[0], ref), ("the estimate", across[1], est)):
+    for name, each, whole in zip(names, across, (ref, est), strict=True):
         if np.sqrt((each**2).sum(1).mean()) < STILL * (1 + np.abs(whole).max()):
-            raise Unaligned(f"{name} has no motion across up: yaw is free; align by origin or none")
+            raise Unaligned(f"{name} has no motion across up: yaw is free; --align origin or none")
     sine = (np.cross(across[1], across[0]) @ up).sum()
     rotation = Rotation.from_axis_angle(up, float(np.arctan2(sine, (across[1] * across[0]).sum())))
     return Fit(Transform(rotation, ref_mean - rotation.apply(est_mean)))
@@ -97,5 +97,5 @@ def _yaw(ref: Array, est: Array, up: Array) -> Fit:
 def _origin(ref: Trajectory, est: Trajectory) -> Fit:
     """Put the first pose of the estimate onto that of the reference: ref_0 inv(est_0)."""
     if ref.xyzw is None or est.xyzw is None:
-        raise Unaligned("origin needs rotations of both; align by se3, yaw or none")
+        raise Unaligned("origin needs rotations of both; --align se3, yaw or none")
     return Fit(ref.poses[0] @ est.poses[0].inverse())

@@ -111,6 +111,7 @@ DELTAS = (Delta(1.0, "m"), Delta(10.0, "m"), Delta(100.0, "m"))
 class Comparison(NamedTuple):
     """How far an estimate is from its reference.
 
+    names, sizes: of the two; ref_duration_ns: 0 where poses are counted
     pairs: as they were compared, in their own worlds; moved: the estimate's side of them as the fit places it
     ate_by_alignment: the rmse under each of ALIGNMENTS, None where it is not determined
     relative: errors of the way for each delta; segments: KITTI's, None without rotations
@@ -119,6 +120,7 @@ class Comparison(NamedTuple):
 
     names: tuple[str, str]
     sizes: tuple[int, int]
+    ref_duration_ns: int
     settings: Settings
     pairs: Pairs
     moved: Trajectory
@@ -148,7 +150,7 @@ def compare(
     pairs, mount = _mounted(_cut(pairs, settings), settings)
     up = np.array(settings.up)
     first = pairs.at(slice(_first(pairs, settings.align_first)))
-    fit = fitted(settings.align, first.ref, first.est, up)
+    fit = fitted(settings.align, first.ref, first.est, up, names)
     moved = fit.moved(pairs.est)
     ate = absolute_errors(pairs.ref, moved, up)
     if settings.mount is None and not settings.evo:
@@ -157,7 +159,7 @@ def compare(
         hints.append("positions lie nearly on a line: the turn about it rests on noise")
     walked = pairs.ref if settings.pairs_from == "reference" else moved
     return Comparison(
-        names, sizes, settings, pairs, moved, offset_ns, score, mount, fit, _by_alignment(pairs, first, up), ate,
+        names, sizes, 0 if ref.stamps_ns is None else int(np.ptp(ref.stamps_ns)), settings, pairs, moved, offset_ns, score, mount, fit, _by_alignment(pairs, first, up), ate,
         list(_relative(pairs.ref, moved, walked, settings, hints)),
         segment_errors(pairs.ref, moved, settings.segments, settings.segment_step), hints,
     )  # fmt: skip
@@ -199,14 +201,13 @@ def _paired(
     else:
         pairs = pairing.interpolated(ref, shifted, settings.max_gap_ns)
     share = pairs.ref.size / max(pairs.possible, 1)
-    walked = names[pairs.interpolated != "ref"]
-    counted = f"{pairs.ref.size} of {pairs.possible} poses have a partner in {names[pairs.interpolated == 'est']}"
+    counted = f"{pairs.ref.size} of {pairs.possible} poses have a partner in {names[0]}"
     if not pairs.ref.size or share < settings.min_match:
         spans = ", ".join(_span(each, name) for each, name in zip((ref, shifted), names, strict=True))
         more = f"try --offset auto, {'--max-diff' if settings.match == 'nearest' else '--max-gap'}, --min-match 0"
-        raise ValueInvalid(f"{walked}: {counted} ({100 * share:.1f} %): {spans}; {more}")
+        raise ValueInvalid(f"{names[1]}: {counted} ({100 * share:.1f} %): {spans}; {more}")
     if share < FEW:
-        hints.append(f"{walked}: only {counted} ({100 * share:.1f} %)")
+        hints.append(f"{names[1]}: only {counted} ({100 * share:.1f} %)")
     if pairs.shared:
         hints.append(f"{pairs.shared} poses have more than one partner")
     if settings.offset is None:

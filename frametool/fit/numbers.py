@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array
 
 SQRT8 = 8**0.5
-SHORT = {
-    "ate": "ate.m.rmse", "max": "ate.m.max", "deg": "ate.deg.rmse", "along": "ate.along_m.rmse",
-    "across": "ate.across_m.rmse", "up": "ate.up_m.rmse", "kitti": "kitti.percent", "scale": "transform.scale",
-}  # fmt: skip
 
 
 def numbers(found: Comparison) -> dict[str, Any]:
@@ -35,6 +31,7 @@ def numbers(found: Comparison) -> dict[str, Any]:
             "ref": found.sizes[0], "est": found.sizes[1], "possible": pairs.possible, "paired": pairs.ref.size,
             "shared": pairs.shared,
         },
+        "ref_duration_s": None if stamps is None else found.ref_duration_ns / 1e9,
         "duration_s": None if stamps is None else int(stamps[-1] - stamps[0]) / 1e9,
         "path_m": {"ref": float(way(pairs.ref.xyz)[-1]), "est": float(way(found.moved.xyz)[-1])},
         "offset_s": found.offset_ns / 1e9,

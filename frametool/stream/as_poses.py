@@ -74,12 +74,7 @@ class FormatConverter:
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
         writer: TextWriter | ArrayWriter | None = None
-        if self.is_table:
-            steps = self._rows(stream, header=header)
-        else:
-            steps = self._columns(stream) if "arrays" in FORMATS[self.form].reads else self._listed(stream)
-        for step in steps:
-            poses, outcome = step
+        for poses, outcome in self.steps(stream, header=header):
             if self.request.gathered is not None:
                 yield outcome
                 continue
@@ -95,6 +90,12 @@ class FormatConverter:
             yield from map(Outcome, writer.end())
         for told in self.tally.told():
             warn(f"{self.source}:{told.line}: {told.message}")
+
+    def steps(self, stream: BufferedReader, *, header: bool = True) -> Iterator[Step]:
+        """Yield the results of one block after the other."""
+        if self.is_table:
+            return self._rows(stream, header=header)
+        return self._columns(stream) if "arrays" in FORMATS[self.form].reads else self._listed(stream)
 
     def _writer(self) -> TextWriter | ArrayWriter:
         """Choose what writes the results, by what they are."""

@@ -1,0 +1,94 @@
+"""`frametool compare`: how far trajectories are from a reference."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.comparing import comparisons, error_options, pairing_options, trajectory_options
+from frametool.cli.options import OPTIONAL, TEXT, Command, Parsed, list_options, reading_options
+from frametool.cli.output import Output
+from frametool.cli.stderr import say
+from frametool.errors import FrametoolError
+from frametool.stream.faults import ROWS_SKIPPED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.fit.limits import Limit
+
+PASSED, TROUBLE = 1, 2
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; --fail: 0 holds, 1 passed, 2 trouble."
+TABLES = ("csv", "markdown", "latex")
+
+
+def _read_limits(text: str) -> list[Limit]:
+    from frametool.fit.limits import parse_limits
+
+    return parse_limits(text)
+
+
+@click.command(cls=Command, name="compare", epilog=EXIT_CODES)
+@click.argument("ref", type=TEXT)
+@click.argument("est", nargs=-1, required=True, type=TEXT, metavar="EST..")
+@pairing_options
+@error_options
+@click.option("--rows", type=click.Choice(OPTIONAL["--rows"]), metavar="[=ate|rpe|kitti]",
+              help="one a pair, step or stretch of path: CSV, JSON")  # fmt: skip
+@click.option("--fail", "limits", type=Parsed("limits", _read_limits), metavar="LIMIT,..",
+              help="end with 1 where a number passes one: ate>5cm")  # fmt: skip
+@trajectory_options
+@reading_options(streams=True)
+@list_options("markdown", "latex")
+def command(ref: str, est: Sequence[str], rows: str | None, limits: list[Limit] | None, **options: Any) -> int:
+    """Compare trajectories with a reference: pairs, the fit, errors in place and along the way.
+
+    \b
+      frametool compare truth.tum odometry.tum
+      frametool compare truth.tum a.tum b.tum --align yaw -f markdown
+      frametool compare truth.csv run.mcap:map:base_link --offset auto --mount auto
+      frametool compare truth.tum odometry.tum --fail 'ate>5cm,rpe:10m>1%,paired<90%'
+
+    REF and EST are trajectories in any form, tables of positions, recordings as FILE:TOPIC or FILE:TARGET:SOURCE, or -.
+    ate is the distance in place after the fit, and its parts along, across and above the path; rpe that of the way
+    between two poses a delta apart; kitti the mean error of stretches of path, in percent of their length.
+    """
+    output = Output("report", **_of_output(options), otherwise="text")
+    try:
+        found, skipped = comparisons(ref, est, options)
+        from frametool.fit.numbers import numbers
+
+        every = [numbers(each) for each in found]
+        passed = [(each, limit) for each in every for limit in limits or () if limit.passed(each) is not None]
+        _write(output, found, every, rows)
+    except (FrametoolError, click.UsageError) as error:
+        if limits:
+            error.exit_code = TROUBLE
+        raise
+    for each, limit in passed:
+        say(f"limit passed: {each['est']}: {limit.name} is {limit.passed(each):.6g}, {limit.text}")
+    return PASSED if passed else ROWS_SKIPPED if skipped and not limits else TROUBLE if skipped else 0
+
+
+def _of_output(options: dict[str, Any]) -> dict[str, Any]:
+    return {name: options.pop(name) for name in ("format_name", "output", "force")}
+
+
+def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
+    """Write rows, a table, or each comparison by itself."""
+    from frametool.fit.numbers import rows as rows_of
+    from frametool.view.comparison_text import write_comparison, write_table
+
+    form = output.style.form
+    if rows:
+        several = len(found) > 1
+        records = [{"est": each.names[1]} | row if several else row for each in found for row in rows_of(each, rows)]
+        output.style = output.style.in_form("csv" if form == "text" else form)
+        output.report(records)
+    elif form in TABLES or (form == "text" and len(every) > 1):
+        output.text(write_table(every, form))
+    elif form == "text":
+        output.text(write_comparison(every[0]))
+    else:
+        output.report(every)

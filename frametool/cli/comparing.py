@@ -1,0 +1,229 @@
+"""What `compare` and `align` share: trajectories from the command line, and the options that say how they are compared."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.group import settings
+from frametool.cli.options import TEXT, Parsed, in_option, together
+from frametool.cli.stderr import say_error
+from frametool.cli.trees import answers
+from frametool.errors import ValueInvalid, shown, warn
+from frametool.stream.faults import MOST, STOP
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.fit.comparison import Comparison, Delta, Settings
+    from frametool.frames.trajectory import Trajectory
+    from frametool.stream.faults import BadRows
+
+NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9, "": 1e9}
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def read_time(text: str) -> int:
+    """Read `10ms`, `0.25`, `-3s` as nanoseconds."""
+    found = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(ns|us|ms|s|)", text.strip())
+    if found is None:
+        raise ValueInvalid(f"{shown(text)} is not a time; write seconds, or a number with ms, us or ns")
+    return round(float(found[1]) * NANOSECONDS[found[2]])
+
+
+def _read_span(text: str) -> int:
+    """Read a time that is not negative."""
+    found = read_time(text)
+    if found < 0:
+        raise ValueInvalid(f"{shown(text)} is less than 0")
+    return found
+
+
+def _read_share(text: str) -> float:
+    """Read `10%`, or a part of 1."""
+    found = re.fullmatch(r"(\d+\.?\d*|\.\d+)\s*(%?)", text.strip())
+    share = float(found[1]) / (100 if found[2] else 1) if found else 2.0
+    if share > 1.0:
+        raise ValueInvalid(f"{shown(text)} is no share; write 10%, or 0.1")
+    return share
+
+
+def _read_offset(text: str) -> tuple[int | str, float | None]:
+    word, colon, limit = text.partition(":")
+    if word != "auto":
+        return read_time(text), None
+    seconds = read_time(limit) / 1e9 if colon else None
+    if seconds is not None and seconds <= 0:
+        raise ValueInvalid(f"{shown(text)}: how far is looked behind auto: is more than 0 s")
+    return "auto", seconds
+
+
+def _read_limit(text: str) -> tuple[bool, int]:
+    """Read `12.5` on the reference's clock, or `+5s` after the first pair."""
+    if text.startswith("+"):
+        return True, _read_span(text[1:])
+    from frametool.frames.stamps import parse_stamp
+
+    return False, parse_stamp(text)
+
+
+def _read_up(text: str) -> tuple[float, float, float]:
+    sign, name = (-1.0, text[1:]) if text.startswith("-") else (1.0, text.removeprefix("+"))
+    if name not in AXES:
+        raise ValueInvalid(f"{shown(text)} is no axis; write x, y, z, -x, -y or -z")
+    x, y, z = (sign * part + 0.0 for part in AXES[name])
+    return x, y, z
+
+
+def _read_deltas(text: str) -> tuple[Delta, ...]:
+    from frametool.fit.comparison import parse_delta
+
+    return tuple(map(parse_delta, text.split(",")))
+
+
+def _read_first(text: str) -> Delta:
+    from frametool.fit.comparison import parse_delta
+
+    return parse_delta(f"{text}frames" if text.isdigit() else text, ("frames", "s", "m"))
+
+
+def _read_lengths(text: str) -> tuple[float, ...]:
+    try:
+        lengths = tuple(float(each.strip().removesuffix("m")) for each in text.split(","))
+    except ValueError:
+        lengths = ()
+    if not lengths or min(lengths) <= 0:
+        raise ValueInvalid(f"{shown(text)} are no lengths; write metres with commas: 100,200,400")
+    return lengths
+
+
+ALIGN = ("se3", "sim3", "yaw", "origin", "none")
+pairing_options = together(
+    click.option("--match", type=click.Choice(("interpolate", "nearest")), metavar="HOW",
+                 help="interpolate or nearest  [default: interpolate]"),
+    click.option("--max-gap", "max_gap_ns", type=Parsed("time", _read_span), metavar="TIME",
+                 help="that is interpolated  [default: 3 median intervals]"),
+    click.option("--max-diff", "max_diff_ns", type=Parsed("time", _read_span), metavar="TIME",
+                 help="of nearest stamps  [default: 10ms]"),
+    click.option("--min-match", type=Parsed("share", _read_share), metavar="SHARE",
+                 help="fewer partners are an error  [default: 10%]"),
+    click.option("--start", type=Parsed("time", _read_limit), metavar="TIME",
+                 help="first pair, a stamp of REF; +5s is after the first"),
+    click.option("--end", type=Parsed("time", _read_limit), metavar="TIME", help="last pair"),
+    click.option("--offset", type=Parsed("offset", _read_offset), metavar="TIME|auto",
+                 help="what EST's clock is behind; auto:LIMIT finds it"),
+    click.option("--mount", type=TEXT, metavar="POSE|auto",
+                 help="REF's body in EST's; also FILE:BODY:POINT"),
+    click.option("--align", type=click.Choice(ALIGN), metavar="FIT",
+                 help=f"{', '.join(ALIGN)}  [default: se3]"),
+    click.option("--align-first", type=Parsed("length", _read_first), metavar="N|10s|5m",
+                 help="fit by the first pairs alone"),
+    click.option("--up", type=Parsed("axis", _read_up), metavar="AXIS",
+                 help="of REF's world: z, -y ..  [default: z]"),
+)  # fmt: skip
+error_options = together(
+    click.option("--delta", "deltas", type=Parsed("deltas", _read_deltas), metavar="1m,5deg,..",
+                 help="of rpe: m, s, deg, frames  [default: 1m,10m,100m]"),
+    click.option("--all-pairs", is_flag=True, help="rpe from every pose, not in a chain"),
+    click.option("--tolerance", type=Parsed("share", _read_share), metavar="SHARE",
+                 help="of the delta of all pairs  [default: 10%]"),
+    click.option("--pairs-from", type=click.Choice(("reference", "estimate")), metavar="WHICH",
+                 help="reference or estimate  [default: reference]"),
+    click.option("--segments", type=Parsed("lengths", _read_lengths), metavar="100,200,..",
+                 help="of kitti, metres  [default: 100,200,..,800]"),
+    click.option("--segment-step", type=click.IntRange(1), metavar="N",
+                 help="one from every N-th pair  [default: 10]"),
+    click.option("--as", "like", type=click.Choice(("evo",)), help="what evo does where nothing else is said"),
+)  # fmt: skip
+trajectory_options = together(
+    in_option,
+    click.option("--on-error", type=click.Choice((STOP, "skip")), default=STOP, show_default=True, help="bad rows"),
+)  # fmt: skip
+
+
+def trajectory(argument: str, on_error: str, form: str = "") -> tuple[Trajectory, str, bool]:
+    """Read a trajectory of the command line; return it with what it is called, and whether rows were skipped."""
+    from os.path import basename
+
+    from frametool.stream.faults import BadRows
+    from frametool.stream.trajectories import read_trajectory
+
+    made: list[BadRows] = []
+
+    def policy(name: str) -> BadRows:
+        made.append(BadRows(name, on_error, most=MOST, tell=partial(say_error, in_json=False)))
+        return made[-1]
+
+    found = read_trajectory(argument, form=form, topics=settings().topics, answers=answers(), policy=policy)
+    return found, "stdin" if argument == "-" else basename(argument), any(bad.count for bad in made)
+
+
+def comparisons(ref: str, ests: Sequence[str], options: dict[str, Any]) -> tuple[list[Comparison], bool]:
+    """Compare estimates with a reference as the options say; tell what is worth it. Also: whether rows were skipped."""
+    from frametool.fit.comparison import compare
+
+    if [ref, *ests].count("-") > 1:
+        raise click.UsageError("standard input can be read once; only one trajectory may be -")
+    on_error = options.pop("on_error")
+    forms = list(settings().input_forms)
+    if len(forms) > 1 + len(ests):
+        raise click.UsageError(f"--in is given {len(forms)} times for {1 + len(ests)} files")
+    forms += forms[-1:] * (1 + len(ests) - len(forms)) or [""] * (1 + len(ests))
+    chosen = _settings(options)
+    reference, ref_name, skipped = trajectory(ref, on_error, forms[0])
+    found = []
+    for argument, form in zip(ests, forms[1:], strict=True):
+        estimate, name, some = trajectory(argument, on_error, form)
+        skipped |= some
+        if (reference.stamps_ns is None) != (estimate.stamps_ns is None):
+            lacking = ref_name if reference.stamps_ns is None else name
+            raise click.UsageError(f"{lacking} has no stamps, the other has; give them with --stamps FILE")
+        found.append(compare(reference, estimate, chosen, (ref_name, name)))
+        for hint in found[-1].hints:
+            warn(hint)
+    return found, skipped
+
+
+def _settings(options: dict[str, Any]) -> Settings:
+    """Take what the options say; those not given are as evo has them, or as we do."""
+    from frametool.fit.comparison import EVO, Settings
+
+    given = {name: options.pop(name) for name in Settings._fields if options.get(name) is not None}
+    for name in Settings._fields:
+        options.pop(name, None)
+    if "offset" in given:
+        given["offset"], limit = given["offset"]
+        given |= {} if limit is None else {"offset_limit_s": limit}
+    if "mount" in given:
+        given["mount"] = _mount(given["mount"])
+    if not given.get("all_pairs") and "tolerance" in given:
+        raise click.UsageError("--tolerance is of --all-pairs: how near to the delta two poses are")
+    base = EVO if options.pop("like", None) else Settings()
+    chosen = base._replace(**given)
+    if "max_diff_ns" in given and chosen.match != "nearest":
+        raise click.UsageError("--max-diff is of --match nearest; --max-gap is of interpolation")
+    if "max_gap_ns" in given and chosen.match == "nearest":
+        raise click.UsageError("--max-gap is of --match interpolate; --max-diff is of nearest")
+    return chosen
+
+
+def _mount(text: str) -> Any:
+    """Read the mount: auto, a pose, or FILE:BODY:POINT, the pose of a point on a body of a tree."""
+    if text == "auto":
+        return text
+    from frametool.cli.poses import is_inline, one_pose
+    from frametool.geometry.transform import Transform
+    from frametool.stream.request import Request
+
+    if is_inline(text):
+        return Transform.of(*one_pose(text, Request()).components)
+    from frametool.cli.trees import load_tree
+    from frametool.stream.trajectories import split_name
+
+    file, names = split_name(text)
+    if len(names) != 2:  # noqa: PLR2004 - BODY and POINT
+        raise click.UsageError(f"--mount {shown(text)}: a pose, auto, or FILE:BODY:POINT")
+    return load_tree(file).lookup(*names)

@@ -1,0 +1,160 @@
+"""Trajectories of any form as arrays: rows of poses or positions, files that list poses, what moves in a recording.
+
+walk.tum        rows.csv        run.mcap:/odom        run.mcap:map:base_link
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from frametool.documents.source import InputFile
+from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
+from frametool.formats.detect import detect
+from frametool.formats.load import Recording, load_sources, opened_together
+from frametool.formats.table import FORMATS
+from frametool.frames.trajectory import Trajectory
+from frametool.grammar.edges import Answers
+from frametool.grammar.pose_algebra import sample_stamps
+from frametool.grammar.result import Style
+from frametool.stream.as_poses import FormatConverter
+from frametool.stream.faults import BadRows
+from frametool.stream.request import Operation, Request
+from frametool.stream.run import Outcome, run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from io import BufferedReader
+    from os import PathLike
+
+    from frametool.frames.buffer import TransformBuffer
+
+POSITION = 3  # numbers
+
+
+def load_trajectory(
+    path: str | PathLike[str],
+    *,
+    format: str | None = None,  # noqa: A002 - what it is
+    topic: str | None = None,
+    frames: Sequence[str] = (),
+    **answers: Any,
+) -> Trajectory:
+    """Read a trajectory: a file of poses or positions over time, in any form that holds such.
+
+    path: a file, `-` for standard input, `FILE:TOPIC`, or `FILE:TARGET:SOURCE` for what moves in a tree or recording.
+    format, topic, frames, answers: as `frametool.load` has them.
+    Raises FormatError with the line of what cannot be read, ValueInvalid where there is not one trajectory.
+    """
+    known = Answers(tuple(frames), **answers)
+    return read_trajectory(str(path), form=format or "", topics=[topic] if topic else [], answers=known)
+
+
+def stop_at_first(name: str) -> BadRows:
+    """Raise the first bad row of a file."""
+    return BadRows(name, tell=lambda error: warn(str(error)))
+
+
+def read_trajectory(
+    text: str,
+    *,
+    form: str = "",
+    topics: Sequence[str] = (),
+    answers: Answers = Answers(),  # noqa: B008 - it is frozen
+    policy: Callable[[str], BadRows] = stop_at_first,
+) -> Trajectory:
+    """Read what an argument names; otherwise as `load_trajectory`.
+
+    policy: makes of a file's name what reports the rows that are none, and says whether they are skipped
+    """
+    name, inside = split_name(text)
+    if len(inside) == 1:
+        topics, inside = inside, []
+    if os.path.isdir(name) or inside or topics:
+        return _of_tree(name, form, topics, answers, inside)
+    file = InputFile(name)
+    if not form:
+        form = detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)[0]
+    if {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
+        return _of_tree(name, form, topics, answers, inside, file)
+    try:
+        return _of_rows(file, form, answers, policy(file.name))
+    finally:
+        file.close()
+
+
+def split_name(text: str) -> tuple[str, list[str]]:
+    """Take FILE:TOPIC or FILE:TARGET:SOURCE apart; the file is the longest beginning that is one.
+
+    Names with a colon stand in quotes.  Raises FileProblem.
+    """
+    ends = [len(text), *(found.start() for found in reversed([*re.finditer(":", text)]))]
+    end = next((end for end in ends if text[:end] == "-" or os.path.exists(text[:end])), None)
+    if end is None:
+        raise FileProblem(f"{text}: no such file or directory")
+    rest = re.findall(r':(?:"([^"]*)"|\'([^\']*)\'|([^:]*))', text[end:])
+    names = ["".join(each) for each in rest]
+    if len(names) > 2 or not all(names):  # noqa: PLR2004 - TARGET and SOURCE
+        raise ValueInvalid(f"{shown(text)}: behind the file stand a topic, or TARGET:SOURCE; quote names with a colon")
+    return text[:end], names
+
+
+def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Trajectory:
+    """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
+    row = FORMATS[form].poses
+    counts = row is not None and bool(row.counted)
+    own = answers if counts or form == "csv" else answers._replace(stamps="")
+    converter = FormatConverter(form, Request(Operation(moves=True), on_error=bad.on_error), Style("tum"), file.name, own)
+    numbers, stamps, named = [], [], set()
+
+    def gathered() -> Iterator[Outcome]:
+        for poses, outcome in converter.steps(cast("BufferedReader", file.stream)):
+            if len(poses.numbers):
+                numbers.append(poses.numbers)
+                stamps.append(poses.stamps_ns)
+                named.update(zip(_all(poses.parents, poses.names), _all(poses.names, poses.parents), strict=True))
+            yield outcome
+
+    run(gathered(), lambda _: None, bad, lambda *_: None)
+    if not numbers:
+        raise FormatError("no poses in it", source=file.name)
+    if len(named) > 1:
+        some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])
+        raise ValueInvalid(f"{file.name}: poses of several frames ({some} ..); name one: {file.name}:TARGET:SOURCE")
+    columns = np.concatenate(numbers)
+    if columns.shape[1] not in (POSITION, 7):
+        raise FormatError("rotations without positions are no trajectory", source=file.name)
+    world, body = own.names(*(row.frames if row else ("world", "body")))
+    parent, name = named.pop()
+    times = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
+    turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
+    return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body)
+
+
+def _all(names: Sequence[str | None], others: Sequence[str | None]) -> Sequence[str | None]:
+    return names if len(names) == len(others) else [*names] * len(others)
+
+
+def _of_tree(
+    name: str, form: str, topics: Sequence[str], answers: Answers, frames: Sequence[str], file: InputFile | None = None
+) -> Trajectory:
+    """Take the samples of a way through a tree that moves; of the only edge that does where none is named."""
+    recording = Recording(name, file and file.stream, form or None, topics, answers)
+    tree = cast("TransformBuffer", load_sources(opened_together([recording])))
+    if not tree.moves:
+        raise ValueInvalid(f"{recording.name}: nothing moves in it")
+    if not frames:
+        moving = [(track.parent, track.child) for track in tree.tracks() if not track.standing]
+        if len(moving) != 1:
+            some = ", ".join(f"{parent}:{child}" for parent, child in moving[:3])
+            raise ValueInvalid(f"{recording.name}: {len(moving)} frames move ({some} ..); name one: {name}:TARGET:SOURCE")
+        frames = moving[0]
+    target, source = frames
+    stamps = sample_stamps(tree, target, source)
+    found = tree.lookup_many(target, source, stamps)
+    return Trajectory(np.array(stamps, np.int64), found.xyz, np.stack(found.components[3:], -1), target, source)
+
+

@@ -1,0 +1,135 @@
+"""Comparisons of trajectories for people: one with its statistics, several as a table; the same table for papers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+LABEL, CELL, NAME = 16, 10, 18  # characters
+COLUMNS = ("rmse", "mean", "median", "p95", "max")
+TITLES = ("est", "ate", "max", "deg", "along", "across", "up", "rpe", "kitti", "scale", "paired")
+CSV_TITLES = (
+    "est", "ate_m", "max_m", "ate_deg", "along_m", "across_m", "up_m", "rpe_percent", "kitti_percent", "scale", "paired",
+)  # fmt: skip
+LARGE = 1e5
+
+
+def write_comparison(found: dict[str, Any]) -> str:
+    """Write the numbers of one comparison: the pairs first, then the fit, then the errors."""
+    poses, settings = found["poses"], found["settings"]
+    width = max(NAME, *(len(found[side]) + 2 for side in ("ref", "est")))
+    duration = "" if found["ref_duration_s"] is None else f", {found['ref_duration_s']:.3f} s"
+    share = 100 * poses["paired"] / max(poses["possible"], 1)
+    how = {
+        "interpolate": f", {found.get(settings['interpolated'] or '')} interpolated",
+        "nearest": f", nearest within {1e3 * (settings['max_diff_s'] or 0):g} ms",
+        "number": ", by number",
+    }[settings["match"]]
+    lines = [
+        f"{found['ref']:<{width}}reference: {poses['ref']} poses{duration}, {found['path_m']['ref']:.3f} m",
+        f"{found['est']:<{width}}{poses['paired']} of {poses['possible']} poses paired ({share:.0f} %){how}",
+    ]
+    if found["offset_s"]:
+        side = "behind" if found["offset_s"] > 0 else "ahead"
+        lines.append(f"{'clock':<{width}}{abs(found['offset_s']):.6f} s {side}, corrected")
+    if settings["mount"]:
+        lines.append(f"{'mount':<{width}}{', '.join(f'{number:.6f}' for number in settings['mount']['xyz'])} m")
+    each = "  ".join(f"{kind} {_short(value)}" for kind, value in found["ate_by_alignment"].items())
+    lines += [f"{'fit ' + settings['align'] + '; ate m':<{width}}{each}"]
+    lines.append(" " * LABEL + "".join(f"{title:>{CELL}}" for title in COLUMNS))
+    ate = found["ate"]
+    for label, key in (("ate m", "m"), ("ate deg", "deg"), ("ate rot", "rot"), ("ate full", "full"),
+                       ("  along m", "along_m"), ("  across m", "across_m"), ("  up m", "up_m")):  # fmt: skip
+        if key in ate:
+            lines.append(_row(label, ate[key]))
+    for row in found["rpe"]:
+        share_of_delta = "" if row["percent"] is None else f"{row['percent']:>8.2f} %"
+        lines.append(_row(f"rpe {row['delta']} m", row["m"]) + share_of_delta)
+        if row["deg"] is not None:
+            lines.append(_row(f"rpe {row['delta']} deg", row["deg"]))
+        else:
+            lines.append(_row("  distance m", row["distance_m"]))
+    return "\n".join([*lines, _kitti(found), ""])
+
+
+def _row(label: str, summed: dict[str, float] | None) -> str:
+    return f"{label:<{LABEL}}" + "".join(f"{_exact(summed and summed[key]):>{CELL}}" for key in COLUMNS)
+
+
+def _kitti(found: dict[str, Any]) -> str:
+    kitti = found["kitti"]
+    if kitti:
+        said = f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
+    else:
+        asked = min(found["settings"]["segments_m"])
+        said = f"-  ({found['path_m']['ref']:.1f} m of path, {asked:g} m asked)"
+    return f"{'kitti':<{NAME}}{said}"
+
+
+def _exact(value: float | None) -> str:
+    if value is None:
+        return "-"
+    whole = len(str(int(abs(value)))) + (value < 0)
+    return f"{value:.{min(6, CELL - 2 - whole)}f}" if abs(value) < LARGE else f"{value:.3e}"
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}" if abs(value) < LARGE else f"{value:.3e}"
+
+
+def cells(found: dict[str, Any]) -> list[Any]:
+    """Return the numbers of a comparison that stand in a table, behind the name of the estimate."""
+    ate, last = found["ate"], found["rpe"][-1] if found["rpe"] else None
+    rmse = [(ate[key] or {}).get("rmse") for key in ("m", "deg", "along_m", "across_m", "up_m")]
+    return [
+        found["est"], rmse[0], ate["m"]["max"], *rmse[1:], last and last["percent"],
+        found["kitti"] and found["kitti"]["percent"], found["transform"].get("scale"), found["poses"]["paired"],
+    ]  # fmt: skip
+
+
+def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
+    """Write one row for each comparison: `text` or `markdown` or `latex` with the best of a column marked, or `csv`."""
+    rows = [cells(each) for each in found]
+    if form == "csv":
+        from frametool.text.csv_line import quoted
+
+        return "".join(f"{','.join(quoted('' if cell is None else str(cell)) for cell in row)}\n" for row in (CSV_TITLES, *rows))
+    best = [_best([row[at] for row in rows]) if TITLES[at] not in ("est", "scale", "paired") else None for at in range(len(TITLES))]
+    marks: dict[str, Callable[[str], str]] = {
+        "text": lambda text: f"{text}*",
+        "markdown": lambda text: f"**{text}**",
+        "latex": lambda text: f"\\textbf{{{text}}}",
+    }
+    shown = [
+        [marks[form](_cell(cell)) if cell is not None and cell == best[at] else _cell(cell) for at, cell in enumerate(row)]
+        for row in rows
+    ]
+    if form == "markdown":
+        lines = [TITLES, ["---", *["---:"] * (len(TITLES) - 1)], *([cell.replace("|", "\\|") for cell in row] for row in shown)]
+        return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    if form == "latex":
+        body = "".join(f"{' & '.join(line)} \\\\\n" for line in (TITLES, *map(_in_latex, shown)))
+        return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
+    widths = [max(len(line[at]) for line in (TITLES, *shown)) for at in range(len(TITLES))]
+    return "".join(
+        "  ".join([f"{line[0]:<{widths[0]}}", *(f"{cell:>{width}}" for cell, width in zip(line[1:], widths[1:], strict=True))]).rstrip() + "\n"
+        for line in (TITLES, *shown)
+    )
+
+
+def _best(column: Sequence[Any]) -> float | None:
+    """Return the least of several numbers; one alone is no best."""
+    there = [cell for cell in column if cell is not None]
+    return min(there) if len(column) > 1 and there else None
+
+
+def _cell(cell: Any) -> str:
+    return cell if isinstance(cell, str) else str(cell) if isinstance(cell, int) else _short(cell)
+
+
+def _in_latex(line: Sequence[str]) -> list[str]:
+    escaped = {"_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}",
+               "^": r"\textasciicircum{}", "\\": r"\textbackslash{}"}  # fmt: skip
+    return ["".join(escaped.get(letter, letter) for letter in line[0]), *line[1:]]
