@@ -21,11 +21,15 @@ if TYPE_CHECKING:
     from frametool.calc.api import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.explain.api import explain as explain
+    from frametool.fit.api import align as align
+    from frametool.fit.api import compare as compare
+    from frametool.fit.api import resample as resample
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
     from frametool.formats.table import FORMATS as FORMATS
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.lookups import FrameTree as FrameTree
+    from frametool.frames.trajectory import Trajectory as Trajectory
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
@@ -39,6 +43,7 @@ if TYPE_CHECKING:
     from frametool.stream.engines import apply_arrow as apply_arrow
     from frametool.stream.engines import polars_exprs as polars_exprs
     from frametool.stream.engines import sql as sql
+    from frametool.stream.trajectories import load_trajectory as load_trajectory
 
 __version__ = "0.2.0"
 
@@ -49,17 +54,22 @@ _HOMES = {
     "FrameTree": "frametool.frames.lookups",
     "FrametoolError": "frametool.errors",
     "Rotation": "frametool.geometry.rotation",
+    "Trajectory": "frametool.frames.trajectory",
     "Transform": "frametool.geometry.transform",
     "TransformBuffer": "frametool.frames.buffer",
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
+    "align": "frametool.fit.api",
     "apply_arrow": "frametool.stream.engines",
+    "compare": "frametool.fit.api",
     "diff": "frametool.lint.tree_diff",
     "explain": "frametool.explain",
     "follow_steps": "frametool.sim.followed",
     "load": "frametool.formats.load",
     "load_robot": "frametool.formats.robots.urdf",
+    "load_trajectory": "frametool.stream.trajectories",
     "polars_exprs": "frametool.stream.engines",
+    "resample": "frametool.fit.api",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
     "sql": "frametool.stream.engines",
@@ -71,19 +81,24 @@ __all__ = [
     "FrameTree",
     "FrametoolError",
     "Rotation",
+    "Trajectory",
     "Transform",
     "TransformBuffer",
     "Turtle",
     "Twist",
     "__version__",
+    "align",
     "apply_arrow",
     "calc",
+    "compare",
     "diff",
     "explain",
     "follow_steps",
     "load",
     "load_robot",
+    "load_trajectory",
     "polars_exprs",
+    "resample",
     "simulate",
     "simulate_many",
     "sql",

@@ -1,4 +1,4 @@
-"""What `compare` and `align` share: trajectories from the command line, and the options that say how they are compared."""
+"""What `compare` and `align` share: trajectories from the command line, the options that say how they are compared."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from frametool.stream.faults import MOST, STOP
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.output import Output
     from frametool.fit.comparison import Comparison, Delta, Settings
     from frametool.frames.trajectory import Trajectory
     from frametool.stream.faults import BadRows
@@ -34,7 +35,7 @@ def read_time(text: str) -> int:
     return round(float(found[1]) * NANOSECONDS[found[2]])
 
 
-def _read_span(text: str) -> int:
+def read_span(text: str) -> int:
     """Read a time that is not negative."""
     found = read_time(text)
     if found < 0:
@@ -64,7 +65,7 @@ def _read_offset(text: str) -> tuple[int | str, float | None]:
 def _read_limit(text: str) -> tuple[bool, int]:
     """Read `12.5` on the reference's clock, or `+5s` after the first pair."""
     if text.startswith("+"):
-        return True, _read_span(text[1:])
+        return True, read_span(text[1:])
     from frametool.frames.stamps import parse_stamp
 
     return False, parse_stamp(text)
@@ -82,6 +83,13 @@ def _read_deltas(text: str) -> tuple[Delta, ...]:
     from frametool.fit.comparison import parse_delta
 
     return tuple(map(parse_delta, text.split(",")))
+
+
+def parse_every(text: str) -> Delta:
+    """Read a step of the path or of its turning."""
+    from frametool.fit.comparison import parse_delta
+
+    return parse_delta(text, ("m", "deg"))
 
 
 def _read_first(text: str) -> Delta:
@@ -104,9 +112,9 @@ ALIGN = ("se3", "sim3", "yaw", "origin", "none")
 pairing_options = together(
     click.option("--match", type=click.Choice(("interpolate", "nearest")), metavar="HOW",
                  help="interpolate or nearest  [default: interpolate]"),
-    click.option("--max-gap", "max_gap_ns", type=Parsed("time", _read_span), metavar="TIME",
+    click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
                  help="that is interpolated  [default: 3 median intervals]"),
-    click.option("--max-diff", "max_diff_ns", type=Parsed("time", _read_span), metavar="TIME",
+    click.option("--max-diff", "max_diff_ns", type=Parsed("time", read_span), metavar="TIME",
                  help="of nearest stamps  [default: 10ms]"),
     click.option("--min-match", type=Parsed("share", _read_share), metavar="SHARE",
                  help="fewer partners are an error  [default: 10%]"),
@@ -224,6 +232,26 @@ def _mount(text: str) -> Any:
     from frametool.stream.trajectories import split_name
 
     file, names = split_name(text)
-    if len(names) != 2:  # noqa: PLR2004 - BODY and POINT
+    if len(names) != 2:
         raise click.UsageError(f"--mount {shown(text)}: a pose, auto, or FILE:BODY:POINT")
-    return load_tree(file).lookup(*names)
+    return load_tree(file).lookup(names[0], names[1])
+
+
+def write_trajectory(output: Output, found: Trajectory) -> None:
+    """Write poses, or positions, in any form that holds them; frames are named if somebody called them something."""
+    from frametool.frames.trajectory import BODY, WORLD
+
+    world, body = (found.world, found.body) if (found.world, found.body) != (WORLD, BODY) else (None, None)
+    stamps = [None] * found.size if found.stamps_ns is None else found.stamps_ns.tolist()
+    if found.xyzw is not None:
+        from frametool.grammar.pose_algebra import result_at
+
+        columns = zip(*(part.tolist() for part in found.poses.components), strict=True)
+        rows = zip(columns, stamps, strict=True)
+        output.poses_as_they_come(result_at(row, world, body, at) for row, at in rows)
+        return
+    points = zip(found.xyz.tolist(), stamps, strict=True)
+    output.points(
+        ({} if at is None else {"stamp_ns": at}) | ({} if world is None else {"frame": world}) | {"point": xyz}
+        for xyz, at in points
+    )

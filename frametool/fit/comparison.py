@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from math import radians
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -112,7 +112,8 @@ class Comparison(NamedTuple):
     """How far an estimate is from its reference.
 
     names, sizes: of the two; ref_duration_ns: 0 where poses are counted
-    pairs: as they were compared, in their own worlds; moved: the estimate's side of them as the fit places it
+    est: all of it, in order; pairs: as they were compared, in their own worlds
+    moved: the estimate's side of them as the fit places it
     ate_by_alignment: the rmse under each of ALIGNMENTS, None where it is not determined
     relative: errors of the way for each delta; segments: KITTI's, None without rotations
     hints: what a person should know
@@ -122,6 +123,7 @@ class Comparison(NamedTuple):
     sizes: tuple[int, int]
     ref_duration_ns: int
     settings: Settings
+    est: Trajectory
     pairs: Pairs
     moved: Trajectory
     offset_ns: int
@@ -133,6 +135,12 @@ class Comparison(NamedTuple):
     relative: list[tuple[Delta, RelativeErrors]]
     segments: SegmentErrors | None
     hints: list[str]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return every setting and number, as `frametool compare -f json` prints them."""
+        from frametool.fit.numbers import numbers
+
+        return numbers(self)
 
 
 def compare(
@@ -159,7 +167,8 @@ def compare(
         hints.append("positions lie nearly on a line: the turn about it rests on noise")
     walked = pairs.ref if settings.pairs_from == "reference" else moved
     return Comparison(
-        names, sizes, 0 if ref.stamps_ns is None else int(np.ptp(ref.stamps_ns)), settings, pairs, moved, offset_ns, score, mount, fit, _by_alignment(pairs, first, up), ate,
+        names, sizes, 0 if ref.stamps_ns is None else int(np.ptp(ref.stamps_ns)), settings, est, pairs, moved,
+        offset_ns, score, mount, fit, _by_alignment(pairs, first, up), ate,
         list(_relative(pairs.ref, moved, walked, settings, hints)),
         segment_errors(pairs.ref, moved, settings.segments, settings.segment_step), hints,
     )  # fmt: skip

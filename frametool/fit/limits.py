@@ -34,7 +34,10 @@ class Limit(NamedTuple):
     unit: str
 
     def passed(self, found: dict[str, Any]) -> float | None:
-        """Return the number of a comparison that passes the limit, None where it holds; raises ValueInvalid without it."""
+        """Return the number of a comparison that passes the limit, None where it holds.
+
+        Raises ValueInvalid where there is no such number.
+        """
         value = self._value(found)
         return value if SIGNS[self.sign](value, self.bound) else None
 
@@ -62,7 +65,7 @@ def parse_limits(text: str) -> list[Limit]:
     for part in filter(None, map(str.strip, text.split(","))):
         match = re.fullmatch(_LIMIT, part)
         if match is None or match[4] not in UNITS:
-            raise ValueInvalid(f"{shown(part)} is no limit; write a number's name, > or <, and a bound: ate>5cm, paired<90%")
+            raise ValueInvalid(f"{shown(part)} is no limit; write a name, > or <, and a bound: ate>5cm, paired<90%")
         name = match[1]
         if ":" in name and not name.startswith("rpe:"):
             raise ValueInvalid(f"{shown(name)} is no number of a comparison; rpe has a delta behind a colon: rpe:10m")

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.fit.comparison import Comparison
+    from frametool.frames.trajectory import Trajectory
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array
 
@@ -51,11 +52,23 @@ def numbers(found: Comparison) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def worlds(found: Comparison) -> tuple[str, str]:
+    """Name the worlds of the reference and of the estimate; what is called alike is `ref` and `est`."""
+    ref, est = found.pairs.ref.world, found.pairs.est.world
+    return ("ref", "est") if ref == est else (ref, est)
+
+
+def whole_estimate(found: Comparison) -> Trajectory:
+    """Return all of the estimate as it was compared: on the reference's clock, mounted and moved."""
+    est = found.est
+    if est.stamps_ns is not None:
+        est = est._replace(stamps_ns=est.stamps_ns + found.offset_ns)
+    return found.fit.moved(est if found.mount is None else est.with_poses(est.poses @ found.mount))
+
+
 def transform_entry(found: Comparison) -> dict[str, Any]:
     """Return the alignment as an entry of a tree, EST's world in REF's; its scale only where one was fitted."""
-    name, parent = found.moved.world, found.pairs.ref.world
-    if name == parent:
-        name, parent = "est", "ref"
+    parent, name = worlds(found)
     entry = _pose(found.fit.transform) | ({"scale": found.fit.scale} if found.settings.align == "sim3" else {})
     return {"name": name, "parent": parent, **entry}
 

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array
 
+WORLD, BODY = "world", "body"  # where nobody says how they are called
+
 
 class Trajectory(NamedTuple):
     """Poses of `body` in `world`, or its positions alone.
@@ -26,8 +28,8 @@ class Trajectory(NamedTuple):
     stamps_ns: Any
     xyz: Any
     xyzw: Any = None
-    world: str = "world"
-    body: str = "body"
+    world: str = WORLD
+    body: str = BODY
 
     @property
     def size(self) -> int:
@@ -56,6 +58,10 @@ class Trajectory(NamedTuple):
         return self._replace(
             stamps_ns=stamps, xyz=self.xyz[index], xyzw=None if self.xyzw is None else self.xyzw[index]
         )
+
+    def numbered(self) -> Trajectory:
+        """Return it with the numbers of its poses as seconds."""
+        return self._replace(stamps_ns=np.arange(self.size, dtype=np.int64) * 1_000_000_000)
 
     def in_order(self) -> Trajectory:
         """Return it sorted by its stamps, of equal ones the last."""

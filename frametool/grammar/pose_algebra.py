@@ -103,7 +103,7 @@ def _refuse_two_parents(a: Pose, b: Pose) -> None:
 BLOCK = 1 << 14  # times
 
 
-def result_at(components: Rigid, target: str, source: str, at_ns: int | None) -> Result:
+def result_at(components: Rigid, target: str | None, source: str | None, at_ns: int | None) -> Result:
     """Return target_from_source as a result; a time of None did not matter."""
     return Result(Pose.of(components, source, target), {} if at_ns is None else {"stamp_ns": at_ns})
 

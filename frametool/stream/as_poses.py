@@ -74,7 +74,8 @@ class FormatConverter:
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
         writer: TextWriter | ArrayWriter | None = None
-        for poses, outcome in self.steps(stream, header=header):
+        for step in self.steps(stream, header=header):
+            poses, outcome = step
             if self.request.gathered is not None:
                 yield outcome
                 continue

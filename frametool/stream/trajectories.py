@@ -16,7 +16,7 @@ from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
 from frametool.formats.detect import detect
 from frametool.formats.load import Recording, load_sources, opened_together
 from frametool.formats.table import FORMATS
-from frametool.frames.trajectory import Trajectory
+from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.grammar.edges import Answers
 from frametool.grammar.pose_algebra import sample_stamps
 from frametool.grammar.result import Style
@@ -97,7 +97,7 @@ def split_name(text: str) -> tuple[str, list[str]]:
         raise FileProblem(f"{text}: no such file or directory")
     rest = re.findall(r':(?:"([^"]*)"|\'([^\']*)\'|([^:]*))', text[end:])
     names = ["".join(each) for each in rest]
-    if len(names) > 2 or not all(names):  # noqa: PLR2004 - TARGET and SOURCE
+    if len(names) > 2 or not all(names):
         raise ValueInvalid(f"{shown(text)}: behind the file stand a topic, or TARGET:SOURCE; quote names with a colon")
     return text[:end], names
 
@@ -107,8 +107,11 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Traj
     row = FORMATS[form].poses
     counts = row is not None and bool(row.counted)
     own = answers if counts or form == "csv" else answers._replace(stamps="")
-    converter = FormatConverter(form, Request(Operation(moves=True), on_error=bad.on_error), Style("tum"), file.name, own)
-    numbers, stamps, named = [], [], set()
+    request = Request(Operation(moves=True), on_error=bad.on_error)
+    converter = FormatConverter(form, request, Style("tum"), file.name, own)
+    numbers: list[Any] = []
+    stamps: list[Any] = []
+    named: set[tuple[str | None, str | None]] = set()
 
     def gathered() -> Iterator[Outcome]:
         for poses, outcome in converter.steps(cast("BufferedReader", file.stream)):
@@ -127,9 +130,9 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Traj
     columns = np.concatenate(numbers)
     if columns.shape[1] not in (POSITION, 7):
         raise FormatError("rotations without positions are no trajectory", source=file.name)
-    world, body = own.names(*(row.frames if row else ("world", "body")))
+    world, body = own.names(WORLD, BODY)
     parent, name = named.pop()
-    times = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
+    times: Any = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
     turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
     return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body)
 
@@ -142,7 +145,7 @@ def _of_tree(
     name: str, form: str, topics: Sequence[str], answers: Answers, frames: Sequence[str], file: InputFile | None = None
 ) -> Trajectory:
     """Take the samples of a way through a tree that moves; of the only edge that does where none is named."""
-    recording = Recording(name, file and file.stream, form or None, topics, answers)
+    recording = Recording(name, None if file is None else file.stream, form or None, topics, answers)
     tree = cast("TransformBuffer", load_sources(opened_together([recording])))
     if not tree.moves:
         raise ValueInvalid(f"{recording.name}: nothing moves in it")
@@ -150,7 +153,8 @@ def _of_tree(
         moving = [(track.parent, track.child) for track in tree.tracks() if not track.standing]
         if len(moving) != 1:
             some = ", ".join(f"{parent}:{child}" for parent, child in moving[:3])
-            raise ValueInvalid(f"{recording.name}: {len(moving)} frames move ({some} ..); name one: {name}:TARGET:SOURCE")
+            what = f"{len(moving)} frames move ({some} ..)"
+            raise ValueInvalid(f"{recording.name}: {what}; name one: {name}:TARGET:SOURCE")
         frames = moving[0]
     target, source = frames
     stamps = sample_stamps(tree, target, source)

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from frametool.text.csv_line import quoted
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
 LABEL, CELL, NAME = 16, 10, 18  # characters
 COLUMNS = ("rmse", "mean", "median", "p95", "max")
 TITLES = ("est", "ate", "max", "deg", "along", "across", "up", "rpe", "kitti", "scale", "paired")
 CSV_TITLES = (
-    "est", "ate_m", "max_m", "ate_deg", "along_m", "across_m", "up_m", "rpe_percent", "kitti_percent", "scale", "paired",
+    "est", "ate_m", "max_m", "ate_deg", "along_m", "across_m", "up_m", "rpe_percent", "kitti_percent", "scale",
+    "paired",
 )  # fmt: skip
+RANKED = range(1, TITLES.index("scale"))
 LARGE = 1e5
 
 
@@ -68,7 +72,7 @@ def _kitti(found: dict[str, Any]) -> str:
     return f"{'kitti':<{NAME}}{said}"
 
 
-def _exact(value: float | None) -> str:
+def _exact(value: Any) -> str:
     if value is None:
         return "-"
     whole = len(str(int(abs(value)))) + (value < 0)
@@ -93,35 +97,31 @@ def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
     """Write one row for each comparison: `text` or `markdown` or `latex` with the best of a column marked, or `csv`."""
     rows = [cells(each) for each in found]
     if form == "csv":
-        from frametool.text.csv_line import quoted
-
-        return "".join(f"{','.join(quoted('' if cell is None else str(cell)) for cell in row)}\n" for row in (CSV_TITLES, *rows))
-    best = [_best([row[at] for row in rows]) if TITLES[at] not in ("est", "scale", "paired") else None for at in range(len(TITLES))]
-    marks: dict[str, Callable[[str], str]] = {
-        "text": lambda text: f"{text}*",
-        "markdown": lambda text: f"**{text}**",
-        "latex": lambda text: f"\\textbf{{{text}}}",
-    }
-    shown = [
-        [marks[form](_cell(cell)) if cell is not None and cell == best[at] else _cell(cell) for at, cell in enumerate(row)]
-        for row in rows
-    ]
+        lines = [CSV_TITLES, *(["" if cell is None else str(cell) for cell in row] for row in rows)]
+        return "".join(f"{','.join(map(quoted, line))}\n" for line in lines)
+    best = [_best(column) for column in zip(*rows, strict=True)]
+    marked = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[form]
+    shown = []
+    for row in rows:
+        texts = map(_cell, row)
+        if form == "latex":
+            texts = map(_in_latex, texts)
+        is_best = (at in RANKED and cell is not None and cell == best[at] for at, cell in enumerate(row))
+        shown.append([marked.format(text) if best else text for text, best in zip(texts, is_best, strict=True)])
     if form == "markdown":
-        lines = [TITLES, ["---", *["---:"] * (len(TITLES) - 1)], *([cell.replace("|", "\\|") for cell in row] for row in shown)]
-        return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+        lines = [TITLES, ["---", *["---:"] * (len(TITLES) - 1)], *shown]
+        return "".join(f"| {' | '.join(cell.replace('|', '&#124;') for cell in line)} |\n" for line in lines)
     if form == "latex":
-        body = "".join(f"{' & '.join(line)} \\\\\n" for line in (TITLES, *map(_in_latex, shown)))
+        body = "".join(f"{' & '.join(line)} \\\\\n" for line in (TITLES, *shown))
         return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
-    widths = [max(len(line[at]) for line in (TITLES, *shown)) for at in range(len(TITLES))]
-    return "".join(
-        "  ".join([f"{line[0]:<{widths[0]}}", *(f"{cell:>{width}}" for cell, width in zip(line[1:], widths[1:], strict=True))]).rstrip() + "\n"
-        for line in (TITLES, *shown)
-    )
+    widths = [max(map(len, column)) for column in zip(TITLES, *shown, strict=True)]
+    aligned = ([f"{line[0]:<{widths[0]}}", *map(str.rjust, line[1:], widths[1:])] for line in (TITLES, *shown))
+    return "".join(f"{'  '.join(line).rstrip()}\n" for line in aligned)
 
 
 def _best(column: Sequence[Any]) -> float | None:
     """Return the least of several numbers; one alone is no best."""
-    there = [cell for cell in column if cell is not None]
+    there = [cell for cell in column if isinstance(cell, float)]
     return min(there) if len(column) > 1 and there else None
 
 
@@ -129,7 +129,9 @@ def _cell(cell: Any) -> str:
     return cell if isinstance(cell, str) else str(cell) if isinstance(cell, int) else _short(cell)
 
 
-def _in_latex(line: Sequence[str]) -> list[str]:
-    escaped = {"_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}",
-               "^": r"\textasciicircum{}", "\\": r"\textbackslash{}"}  # fmt: skip
-    return ["".join(escaped.get(letter, letter) for letter in line[0]), *line[1:]]
+_LATEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+_LATEX |= {letter: "\\" + letter for letter in "_%&#${}"}
+
+
+def _in_latex(text: str) -> str:
+    return "".join(_LATEX.get(letter, letter) for letter in text)

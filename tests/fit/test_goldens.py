@@ -11,7 +11,7 @@ import pytest
 
 from frametool.fit.alignment import ALIGNMENTS, Unaligned, fitted
 from frametool.fit.clock import clock_offset
-from frametool.fit.comparison import parse_delta
+from frametool.fit.comparison import Delta, parse_delta
 from frametool.fit.metrics import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
 from frametool.fit.mounting import lever_arm
 from frametool.fit.pairs import Pairs, by_number, interpolated, nearest
@@ -85,21 +85,10 @@ def test_pairs_alignments_and_absolute_errors(name: str) -> None:
     assert way(est.xyz)[-1] == pytest.approx(ours["path_m"]["est"], rel=1e-9)
 
 
-def along(trajectory: Trajectory, unit: str) -> np.ndarray[Any, Any]:
-    if unit == "frames":
-        return np.arange(trajectory.size, dtype=float)
-    if unit == "m":
-        return way(trajectory.xyz)
-    if unit == "s":
-        return (trajectory.stamps_ns - trajectory.stamps_ns[0]) / 1e9
-    rotation = trajectory.rotation
-    assert rotation is not None
-    return np.degrees(np.append(0.0, np.cumsum(rotation[:-1].distance(rotation[1:]))))
-
-
-def delta_of(text: str) -> tuple[float, str]:
-    delta = parse_delta(text)
-    return delta.amount, delta.unit
+def along(trajectory: Trajectory, delta: Delta) -> Any:
+    found = delta.along(trajectory)
+    assert found is not None
+    return found
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -109,8 +98,8 @@ def test_relative_errors_and_segments(name: str) -> None:
     est = fitted(ours["align"], pairs.ref, pairs.est, UP).moved(pairs.est)
     exact = 1e-5 if name == "kitti" else 1e-9
     for row in ours["rpe"]:
-        delta, unit = delta_of(row["delta"])
-        found = relative_errors(pairs.ref, est, *chained(along(pairs.ref, unit), delta))
+        delta = parse_delta(row["delta"])
+        found = relative_errors(pairs.ref, est, *chained(along(pairs.ref, delta), delta.amount))
         assert len(found.start) == row["pairs"]
         close(statistics(found.distance), row["distance_m"], exact)
         if found.m is not None and found.rad is not None:
@@ -138,17 +127,17 @@ def test_evo_gives_the_same_numbers() -> None:
                 continue
             first = slice(row.get("first"))
             fit = fitted(row["align"], pairs.ref.at(first), pairs.est.at(first), UP)
-            found = absolute_errors(pairs.ref, fit.moved(pairs.est), UP)
-            close(statistics(found.m), row["trans_part"], exact)
-            close(statistics(np.degrees(found.rad)), row["angle_deg"], max(exact, 1e-7))
+            errors = absolute_errors(pairs.ref, fit.moved(pairs.est), UP)
+            assert errors.rad is not None
+            close(statistics(errors.m), row["trans_part"], exact)
+            close(statistics(np.degrees(errors.rad)), row["angle_deg"], max(exact, 1e-7))
         for row in case["evo"]["rpe"]:
-            delta, unit = delta_of(row["delta"])
-            path = along(pairs.ref if row["pairs_from"] == "reference" else pairs.est, unit)
-            ends = chained(path, delta)
-            if row["all"]:
-                ends = all_pairs(path, delta, 0.1)
+            delta = parse_delta(row["delta"])
+            path = along(pairs.ref if row["pairs_from"] == "reference" else pairs.est, delta)
+            ends = all_pairs(path, delta.amount, 0.1) if row["all"] else chained(path, delta.amount)
             found = relative_errors(pairs.ref, pairs.est, *ends)
             assert len(found.start) == row["count"], (name, row["delta"], row["all"])
+            assert found.m is not None
             close(statistics(found.m), row["trans_part"], exact)
 
 

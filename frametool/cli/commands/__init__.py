@@ -12,6 +12,8 @@ COMMANDS = {
     "lookup": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
     "compare": ("frametool.cli.commands.compare", "how far trajectories are from a reference"),
+    "align": ("frametool.cli.commands.align", "the transform that brings a trajectory onto its reference"),
+    "resample": ("frametool.cli.commands.resample", "a trajectory at other moments"),
     "fk": ("frametool.cli.commands.fk", "where TIP of a robot is seen from BASE, for rows of joint values"),
     "tree": ("frametool.cli.commands.tree", "the tree of frames, drawn or written in another form"),
     "view": ("frametool.cli.commands.view", "the frames seen: in the terminal, as a page that turns, as a picture"),

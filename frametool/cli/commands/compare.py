@@ -62,9 +62,9 @@ def command(ref: str, est: Sequence[str], rows: str | None, limits: list[Limit] 
         every = [numbers(each) for each in found]
         passed = [(each, limit) for each in every for limit in limits or () if limit.passed(each) is not None]
         _write(output, found, every, rows)
-    except (FrametoolError, click.UsageError) as error:
+    except FrametoolError as error:
         if limits:
-            error.exit_code = TROUBLE
+            error.exit_code = TROUBLE  # type: ignore[misc]
         raise
     for each, limit in passed:
         say(f"limit passed: {each['est']}: {limit.name} is {limit.passed(each):.6g}, {limit.text}")

@@ -1,0 +1,64 @@
+"""`frametool align`: the transform that brings a trajectory onto its reference."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from frametool.cli.comparing import comparisons, pairing_options, trajectory_options, write_trajectory
+from frametool.cli.options import TEXT, Command, reading_options, result_options, rotation_options
+from frametool.cli.output import Output
+from frametool.stream.faults import ROWS_SKIPPED
+
+SHAPING = ("format_name", "precision", "output", "force", "notations", "keep_sign")
+
+
+@click.command(cls=Command, name="align")
+@click.argument("ref", type=TEXT)
+@click.argument("est", type=TEXT)
+@pairing_options
+@click.option("--names", type=TEXT, metavar="REF,EST", help="names of the two worlds  [default: as they are called]")
+@trajectory_options
+@reading_options(streams=True)
+@rotation_options
+@result_options("poses")
+def command(ref: str, est: str, names: str | None, deg: bool, **options: Any) -> int:
+    """Print where EST's world is in REF's: the fit that `compare` makes, as an entry of a tree.
+
+    \b
+      frametool align truth.tum odometry.tum
+      frametool align truth.tum odometry.tum -o aligned.tum
+      frametool align truth.csv slam.tum --align sim3 --to matrix
+
+    -o FILE takes all of EST as it was compared: on REF's clock, mounted and moved, in the form of its suffix or of -f.
+    The scale of sim3 is beside the pose: p' = scale R p + t; such an entry is no part of a tree.
+    """
+    shaping = {name: options.pop(name) for name in SHAPING}
+    into = Output("poses", **shaping, deg=deg) if shaping["output"] else None
+    form = {"format_name": None if into else shaping["format_name"], "output": None, "force": False}
+    entry = Output("poses", **(shaping | form), deg=deg)
+    (found,), skipped = comparisons(ref, [est], options)
+    from frametool.fit.numbers import whole_estimate, worlds
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result
+
+    named = _names(names) or worlds(found)
+    extras = {"scale": found.fit.scale} if found.settings.align == "sim3" else {}
+    whole = whole_estimate(found)._replace(world=found.pairs.ref.world)
+    if into is not None:
+        write_trajectory(into, whole)
+    if into is None and entry.is_trajectory:
+        write_trajectory(entry, whole)
+    else:
+        entry.poses([Result(Pose.of(found.fit.transform.components, named[1], named[0]), extras)])
+    return ROWS_SKIPPED if skipped else 0
+
+
+def _names(text: str | None) -> tuple[str, str] | None:
+    if text is None:
+        return None
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != 2 or not all(names):
+        raise click.UsageError("--names takes two names: REF,EST")
+    return names[0], names[1]

@@ -1,0 +1,95 @@
+"""`frametool resample`: a trajectory at other moments."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.comparing import parse_every, read_span, trajectory, trajectory_options, write_trajectory
+from frametool.cli.group import settings
+from frametool.cli.options import (
+    TEXT,
+    Command,
+    Number,
+    Parsed,
+    read_times,
+    reading_options,
+    result_options,
+    rotation_options,
+)
+from frametool.cli.output import Output
+from frametool.cli.stderr import say
+from frametool.errors import FormatError
+from frametool.formats.table import by_name, writers
+from frametool.grammar.edges import stop
+from frametool.stream.faults import ROWS_SKIPPED
+
+if TYPE_CHECKING:
+    from frametool.fit.comparison import Delta
+    from frametool.frames.trajectory import Trajectory
+
+
+@click.command(cls=Command, name="resample")
+@click.argument("path", type=TEXT, metavar="TRAJ")
+@click.option("--rate", type=Number(), metavar="HZ", help="so many poses a second, from the first on")
+@click.option("--at", "times", type=TEXT, metavar="FILE|TIMES",
+              help="at the stamps of a file; T,T,.., START:STOP:STEP")  # fmt: skip
+@click.option("--every", type=Parsed("step", parse_every), metavar="1m|5deg",
+              help="at even steps of the path, or of its turning")  # fmt: skip
+@click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
+              help="that is interpolated  [default: 3 median intervals]")  # fmt: skip
+@trajectory_options
+@reading_options(streams=True)
+@rotation_options
+@result_options("poses")
+def command(
+    path: str, rate: float | None, times: str | None, every: Delta | None, max_gap_ns: int | None, on_error: str,
+    deg: bool, **options: Any,
+) -> int:  # fmt: skip
+    """Interpolate a trajectory at other moments: positions along the line, rotations by slerp.
+
+    \b
+      frametool resample walk.tum --rate 10
+      frametool resample odometry.tum --at truth.tum -o same_stamps.tum
+      frametool resample walk.tum --every 0.5m -f csv
+
+    TRAJ is a trajectory as `compare` takes it. Nothing is made beyond its ends, nor where its poses are more than
+    --max-gap apart; how many moments have none is told.
+    """
+    if sum(each is not None for each in (rate, times, every)) != 1:
+        raise click.UsageError("give one of --rate, --at and --every")
+    if rate is not None and rate <= 0:
+        raise click.UsageError("--rate is more than 0")
+    output = Output("poses", **options, deg=deg, otherwise=by_name(path, writers("poses")) or "csv")
+    forms = settings().input_forms
+    found, name, skipped = trajectory(path, on_error, forms[-1] if forms else "")
+    from frametool.fit.resampling import resampled, stamps_at_rate, stamps_every
+
+    found = found.in_order()
+    counted = found.stamps_ns is None
+    if counted:
+        if every is None:
+            raise click.UsageError(f"{name} has no stamps; give them with --stamps FILE")
+        found = found.numbered()
+    stamps = stamps_at_rate(found, rate) if rate else stamps_every(found, every) if every else _stamps(times or "")
+    made = resampled(found, stamps, max_gap_ns)
+    if lost := len(stamps) - made.size:
+        say(f"note: {lost} of {len(stamps)} moments are beyond the ends of {name}, or in a gap: no pose")
+    write_trajectory(output, made._replace(stamps_ns=None) if counted else made)
+    return ROWS_SKIPPED if skipped else 0
+
+
+def _stamps(text: str) -> Any:
+    """Read the stamps of a trajectory, or a list of times."""
+    import numpy as np
+
+    from frametool.errors import FileProblem
+
+    try:
+        found: Trajectory = trajectory(text, "stop")[0]
+    except (FormatError, FileProblem):
+        return np.array(read_times(text, stop), np.int64)
+    if found.stamps_ns is None:
+        raise click.UsageError(f"--at {text}: the poses there have no stamps")
+    return found.in_order().stamps_ns
