@@ -83,6 +83,38 @@ def _short(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}" if abs(value) < LARGE else f"{value:.3e}"
 
 
+def write_explanation(found: dict[str, Any]) -> str:
+    """Write how the numbers come about, each formula with those of this run."""
+    poses, fit, ate, settings = found["poses"], found["transform"], found["ate"], found["settings"]
+    c, q = fit.get("scale", 1.0), fit["quaternion"]
+    parts = [ate[key]["rmse"] for key in ("along_m", "across_m", "up_m")]
+    turn, shift = ", ".join(f"{q[axis]:.9g}" for axis in "xyzw"), ", ".join(f"{part:.9g}" for part in fit["xyz"])
+    lines = [
+        f"pairs      n = {poses['paired']} of {poses['possible']}, t_ref = t_est + {found['offset_s']:.9g} s",
+        f"fit        p' = c R p + t, R' = R R_i   ({settings['align']})",
+        f"           c = {c:.9g}",
+        f"           R = quaternion x y z w ({turn})",
+        f"           t = ({shift}) m",
+        "ate        d_i = p'_i - p_ref,i;  rmse = sqrt(sum |d_i|^2 / n)",
+        f"           = sqrt({ate['m']['sse']:.9g} / {poses['paired']}) = {ate['m']['rmse']:.9g} m",
+        "           along, across, up: d_i in the axes of REF's path",
+        f"           {' + '.join(f'{each:.6g}^2' for each in parts)} = {ate['m']['rmse']:.6g}^2",
+    ]
+    if ate["deg"]:
+        lines.append(f"           E_i = inv(ref_i) est'_i;  its angle: rmse {ate['deg']['rmse']:.9g} deg")
+    if found["rpe"]:
+        lines.append("rpe        E_ij = inv(inv(ref_i) ref_j) inv(est'_i) est'_j")
+    for row in found["rpe"]:
+        if row["m"]:
+            share = "" if row["percent"] is None else f" = {row['percent']:.6g} % of the delta"
+            root = f"sqrt({row['m']['sse']:.9g} / {row['pairs']}) = {row['m']['rmse']:.9g} m"
+            lines.append(f"           {row['delta']}: |t(E)|, rmse = {root}{share}")
+    if kitti := found["kitti"]:
+        lines.append(f"kitti      mean of |t(E)| / L over {kitti['segments']} stretches = {kitti['percent']:.9g} %")
+        lines.append(f"           mean of angle(E) / L = {kitti['deg_per_m']:.9g} deg/m")
+    return "\n".join([*lines, ""])
+
+
 def cells(found: dict[str, Any]) -> list[Any]:
     """Return the numbers of a comparison that stand in a table, behind the name of the estimate."""
     ate, last = found["ate"], found["rpe"][-1] if found["rpe"] else None

@@ -251,7 +251,7 @@ def _map(
         for column, value in enumerate(values):
             label = f"linear {linear[row]:g}, angular {angular[column]:g}: {value:.4g}"
             x, y = left + column * wide, MAP_MARGIN + SIDE - (row + 1) * high
-            yield PictureBox(x, y, wide, high, _colour(value, low, most), label)
+            yield PictureBox(x, y, wide, high, shade_of(value, low, most), label)
     below, bottom = MAP_MARGIN + SIDE + 14.0, MAP_MARGIN + SIDE
     yield PictureWords(left, below, f"{angular[0]:g}")
     yield PictureWords(left + SIDE / 2.0, below, "angular gain (1/s)", anchor="middle")
@@ -266,12 +266,12 @@ def _bar(left: float, low: float, high: float) -> Iterator[Shape]:
     """Draw what the colours mean."""
     for shade in range(SHADES):
         y = MAP_MARGIN + SIDE * (SHADES - 1 - shade) / SHADES
-        yield PictureBox(left, y, BAR, SIDE / SHADES + 0.5, _colour(shade / (SHADES - 1), 0.0, 1.0))
+        yield PictureBox(left, y, BAR, SIDE / SHADES + 0.5, shade_of(shade / (SHADES - 1), 0.0, 1.0))
     yield PictureWords(left, MAP_MARGIN - 8.0, f"{high:.3g}")
     yield PictureWords(left, MAP_MARGIN + SIDE + 14.0, f"{low:.3g}")
 
 
-def _colour(value: float, low: float, high: float) -> str:
+def shade_of(value: float, low: float, high: float) -> str:
     """Return the colour of a value between its bounds; that of the paper for nan."""
     if value != value:  # noqa: PLR0124 - nan
         return "paper"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -9,18 +10,32 @@ import click
 from frametool.cli.comparing import comparisons, error_options, pairing_options, trajectory_options
 from frametool.cli.options import OPTIONAL, TEXT, Command, Parsed, list_options, reading_options
 from frametool.cli.output import Output
+from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.errors import FrametoolError
+from frametool.errors import FrametoolError, ValueInvalid, shown
 from frametool.stream.faults import ROWS_SKIPPED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.fit.comparison import Comparison
     from frametool.fit.limits import Limit
 
 PASSED, TROUBLE = 1, 2
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; --fail: 0 holds, 1 passed, 2 trouble."
 TABLES = ("csv", "markdown", "latex")
+REPORTS = {".html": "html", ".htm": "html", ".svg": "svg"}
+
+
+def _form_of(path: str) -> str:
+    """Return the form of a report by its suffix, "" for what is none."""
+    return REPORTS.get(splitext(path)[1].lower(), "")
+
+
+def _read_report(path: str) -> str:
+    if not _form_of(path):
+        raise ValueInvalid(f"{shown(path)}: a report is written as .html or .svg")
+    return path
 
 
 def _read_limits(text: str) -> list[Limit]:
@@ -36,12 +51,18 @@ def _read_limits(text: str) -> list[Limit]:
 @error_options
 @click.option("--rows", type=click.Choice(OPTIONAL["--rows"]), metavar="[=ate|rpe|kitti]",
               help="one a pair, step or stretch of path: CSV, JSON")  # fmt: skip
+@click.option("--explain", is_flag=True, help="the formulas with this run's numbers")
 @click.option("--fail", "limits", type=Parsed("limits", _read_limits), metavar="LIMIT,..",
               help="end with 1 where a number passes one: ate>5cm")  # fmt: skip
+@click.option("--report", type=Parsed("report", _read_report), metavar="FILE.html|svg",
+              help="also a picture of it, in one file; -o: instead")  # fmt: skip
 @trajectory_options
 @reading_options(streams=True)
 @list_options("markdown", "latex")
-def command(ref: str, est: Sequence[str], rows: str | None, limits: list[Limit] | None, **options: Any) -> int:
+def command(
+    ref: str, est: Sequence[str], rows: str | None, explain: bool, limits: list[Limit] | None, report: str | None,
+    **options: Any,
+) -> int:  # fmt: skip
     """Compare trajectories with a reference: pairs, the fit, errors in place and along the way.
 
     \b
@@ -54,25 +75,49 @@ def command(ref: str, est: Sequence[str], rows: str | None, limits: list[Limit] 
     ate is the distance in place after the fit, and its parts along, across and above the path; rpe that of the way
     between two poses a delta apart; kitti the mean error of stretches of path, in percent of their length.
     """
-    output = Output("report", **_of_output(options), otherwise="text")
+    shaping = {name: options.pop(name) for name in ("format_name", "output", "force")}
+    path, told = shaping["output"], shaping["format_name"]
+    instead = path if path and told is None and _form_of(path) else None
+    for name in filter(None, (report, instead)):
+        refuse_existing(name, force=shaping["force"])
+    if instead and rows:
+        raise click.UsageError("--rows are CSV or JSON, no picture; write them with -f, or leave them out")
+    if len(est) > 1 and "svg" in (_form_of(report or ""), _form_of(instead or "")):
+        raise click.UsageError("an SVG shows one comparison; write .html for several")
+    if explain and (rows or instead or shaping["format_name"] not in (None, "text")):
+        raise click.UsageError("--explain writes text; leave --rows, -f and pictures out")
+    output = Output("report", **shaping, otherwise="text")
     try:
         found, skipped = comparisons(ref, est, options)
         from frametool.fit.numbers import numbers
+        from frametool.view.comparison_text import write_explanation
 
         every = [numbers(each) for each in found]
         passed = [(each, limit) for each in every for limit in limits or () if limit.passed(each) is not None]
-        _write(output, found, every, rows)
+        for name in filter(None, (report, instead)):
+            _write_report(found, name, force=shaping["force"])
+        if explain:
+            output.text("\n".join(map(write_explanation, every)))
+        elif not instead:
+            _write(output, found, every, rows)
     except FrametoolError as error:
         if limits:
-            error.exit_code = TROUBLE  # type: ignore[misc]
+            error.exit_code = TROUBLE
         raise
     for each, limit in passed:
         say(f"limit passed: {each['est']}: {limit.name} is {limit.passed(each):.6g}, {limit.text}")
     return PASSED if passed else ROWS_SKIPPED if skipped and not limits else TROUBLE if skipped else 0
 
 
-def _of_output(options: dict[str, Any]) -> dict[str, Any]:
-    return {name: options.pop(name) for name in ("format_name", "output", "force")}
+def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> None:
+    """Write the pictures of a comparison, with the command that made them."""
+    import shlex
+    import sys
+
+    from frametool.view.comparison_page import write_report
+
+    with writing(path, force=force) as write:
+        write(write_report(found, _form_of(path), shlex.join(["frametool", *sys.argv[1:]])))
 
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
