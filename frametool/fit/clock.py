@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 LIMIT_S = 10.0
 REFINED_S = 1e-7
 STEPS = 8
+NEARBY = 0.35  # of a step: what the parabola through three lags may miss
+DOUBT = 0.25  # of a step: the standard error that least squares may have
 TINY = 1e-12
 
 
@@ -26,8 +28,8 @@ class ClockOffset(NamedTuple):
     score: float
 
 
-def clock_offset(ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S) -> ClockOffset:
-    """Find the lag at which angular speeds, or else speeds, correlate best; refine it by least squares with a scale.
+def clock_offset(ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, kind: str = "sim3") -> ClockOffset:
+    """Find the lag at which angular speeds, or else speeds, correlate best; refine it by least squares.
 
     Where the two spans do not meet, their first stamps are put together and every lag is tried.
     """
@@ -45,7 +47,7 @@ def clock_offset(ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S) 
             best = max(best, _best_lag(courses[0], courses[1], step, limit_s), key=lambda found: found.score)
     seconds = best.seconds
     if best.score > 0:
-        seconds = _refined(ref, est, shift, seconds, step)
+        seconds = _refined(ref, est, shift, seconds, step, kind)
     return ClockOffset(seconds + shift / 1e9, best.score)
 
 
@@ -95,25 +97,33 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     return ClockOffset(float((lags[at] + part) * step), float(here))
 
 
-def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float) -> float:
-    """Let what is left along the velocity after the fit be time: Gauss-Newton on one number."""
+def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
+    """Let what is left along the velocity after the fit be time: Gauss-Newton on one number.
+
+    Drift is along the velocity too, but alike from pose to pose: where what is left is so alike that it says less
+    than the correlation did, or wants a lag beyond what that leaves open (a lever arm does), the lag stays.
+    """
     up = np.array([0.0, 0.0, 1.0])
     plain = ref._replace(xyzw=None)
     half, gap_ns = round(step * 1e9), GAP * interval(ref.stamps_ns)
+    found = seconds
     for _ in range(STEPS):
-        at = est.stamps_ns + shift + round(seconds * 1e9)
+        at = est.stamps_ns + shift + round(found * 1e9)
         inside = np.logical_and.reduce([between(plain, at + lag, gap_ns)[1] for lag in (-half, 0, half)])
         own = est.at(inside)._replace(xyzw=None)
         sooner, here, later = (between(plain, at[inside] + lag, gap_ns)[0].xyz for lag in (-half, 0, half))
         velocity = (later - sooner) / (2e-9 * half)
         try:
-            fit = fitted("sim3", plain._replace(xyz=here), own, up)
+            fit = fitted(kind, plain._replace(xyz=here), own, up)
         except Unaligned:
-            break
-        left = fit.moved(own).xyz - here
-        turning = ((velocity - velocity.mean(0)) ** 2).sum()  # a constant velocity is a shift, which the fit takes
-        change = float(np.clip((left * velocity).sum() / max(turning, TINY), -step, step))
-        seconds += change
+            return seconds
+        left = ((fit.moved(own).xyz - here) * velocity).sum(1)
+        squared = max(((velocity - velocity.mean(0)) ** 2).sum(), TINY)  # a constant velocity is a shift of the fit
+        change = float(np.clip(left.sum() / squared, -step, step))
+        found += change
         if abs(change) < REFINED_S:
             break
-    return seconds
+    centred = left - left.mean()
+    alike = float((centred[1:] @ centred[:-1]) / max(centred @ centred, TINY))
+    doubt = float(np.sqrt(left @ left * (1 + alike) / max(1 - alike, TINY)) / squared)
+    return found if doubt < DOUBT * step and abs(found - seconds) < NEARBY * step else seconds

@@ -198,7 +198,8 @@ def _paired(
         return pairing.by_number(ref, est), 0, None
     offset_ns, score = 0, None
     if settings.offset == AUTO:
-        found = clock_offset(ref, est, limit_s=settings.offset_limit_s)
+        kind = "sim3" if settings.align == "sim3" else "se3"
+        found = clock_offset(ref, est, limit_s=settings.offset_limit_s, kind=kind)
         if found.score < CLEAR:
             raise ValueInvalid(f"no clear clock offset (score {found.score:.2f}); give one: --offset T")
         offset_ns, score = round(found.seconds * 1e9), found.score

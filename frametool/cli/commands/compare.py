@@ -51,7 +51,7 @@ def _read_limits(text: str) -> list[Limit]:
 @error_options
 @click.option("--rows", type=click.Choice(OPTIONAL["--rows"]), metavar="[=ate|rpe|kitti]",
               help="one a pair, step or stretch of path: CSV, JSON")  # fmt: skip
-@click.option("--explain", is_flag=True, help="the formulas with this run's numbers")
+@click.option("--explain", type=click.Choice(("text",)), metavar="", help="the formulas with this run's numbers")
 @click.option("--fail", "limits", type=Parsed("limits", _read_limits), metavar="LIMIT,..",
               help="end with 1 where a number passes one: ate>5cm")  # fmt: skip
 @click.option("--report", type=Parsed("report", _read_report), metavar="FILE.html|svg",
@@ -60,7 +60,7 @@ def _read_limits(text: str) -> list[Limit]:
 @reading_options(streams=True)
 @list_options("markdown", "latex")
 def command(
-    ref: str, est: Sequence[str], rows: str | None, explain: bool, limits: list[Limit] | None, report: str | None,
+    ref: str, est: Sequence[str], rows: str | None, explain: str | None, limits: list[Limit] | None, report: str | None,
     **options: Any,
 ) -> int:  # fmt: skip
     """Compare trajectories with a reference: pairs, the fit, errors in place and along the way.
