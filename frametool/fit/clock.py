@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LIMIT_S = 10.0
 REFINED_S = 1e-7
 STEPS = 8
-NEARBY = 0.35  # of a step: what the parabola through three lags may miss
+NEARBY = 1.2  # of a step: what the best of all lags and its neighbours may miss
 DOUBT = 0.25  # of a step: the standard error that least squares may have
 TINY = 1e-12
 
