@@ -11,6 +11,11 @@ import tokenize
 from collections import Counter
 from pathlib import Path
 
+# what came after the size was settled: its files are counted apart, and no other may grow for it
+LATER = (
+    "fit", "frames/trajectory.py", "stream/trajectories.py", "view/comparison_text.py", "view/comparison_page.py",
+    "cli/comparing.py", "cli/commands/compare.py", "cli/commands/align.py", "cli/commands/resample.py",
+)  # fmt: skip
 PACKAGE = Path(__file__).resolve().parent.parent / "frametool"
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 NO_CODE = {
@@ -35,11 +40,15 @@ def docstring_lines(tree: ast.Module) -> set[int]:
 
 
 def rooms() -> tuple[Counter[str], Counter[str]]:
-    """Return the files and the lines of code of each folder of the package; a module outside of them is its own room."""
+    """Return the files and the lines of code of each folder of the package, those of `LATER` under `later`.
+
+    A module outside of them is its own room.
+    """
     files: Counter[str] = Counter()
     lines: Counter[str] = Counter()
     for path in PACKAGE.rglob("*.py"):
-        room = path.relative_to(PACKAGE).parts[0]
+        inside = path.relative_to(PACKAGE)
+        room = "later" if inside.as_posix() in LATER or inside.parts[0] in LATER else inside.parts[0]
         files[room] += 1
         lines[room] += code_lines(path.read_text(encoding="utf-8"))
     return files, lines
@@ -49,4 +58,6 @@ if __name__ == "__main__":
     files_of, lines_of = rooms()
     for name, count in lines_of.most_common():
         print(f"{name:12} {files_of[name]:4} files {count:6} lines")
+    settled = (files_of.total() - files_of["later"], lines_of.total() - lines_of["later"])
+    print(f"{'settled':12} {settled[0]:4} files {settled[1]:6} lines, without what came later")
     print(f"{'total':12} {files_of.total():4} files {lines_of.total():6} lines")

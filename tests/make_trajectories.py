@@ -51,7 +51,7 @@ def main() -> None:
     at = np.arange(0.02, SECONDS - 0.3, 0.1)
     poses = truth(at)
     steps = poses[:-1].relative(poses[1:])
-    turned = Rotation.from_rotvec(draw.normal(0, 6e-4, (len(steps), 3)) + [0, 0, 2e-4])
+    turned = Rotation.from_rotvec(draw.normal((0, 0, 2e-4), 6e-4, (len(steps), 3)))
     steps = Transform(steps.rotation @ turned, steps.xyz * 1.008 + draw.normal(0, 0.002, (len(steps), 3)))
     found = [Transform.identity()]
     for step in steps:

@@ -104,8 +104,9 @@ def test_no_imports_inside_a_room_run_in_a_circle(room: str) -> None:
 def test_the_package_stays_as_small_as_it_can_be_read() -> None:
     """`python tests/count_code.py` says in which room the lines are."""
     files, lines = rooms()
-    assert lines.total() <= 33_500
-    assert files.total() <= 250
+    assert lines.total() - lines["later"] <= 33_500
+    assert files.total() - files["later"] <= 250
+    assert lines["later"] <= 1_800
 
 
 def loaded_by(*arguments: str, stdin: str = "") -> set[str]:

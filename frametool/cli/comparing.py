@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.group import settings
-from frametool.cli.options import TEXT, Parsed, in_option, together
+from frametool.cli.options import TEXT, Parsed, together
 from frametool.cli.stderr import say_error
 from frametool.cli.trees import answers
 from frametool.errors import ValueInvalid, shown, warn
@@ -147,7 +147,6 @@ error_options = together(
     click.option("--as", "like", type=click.Choice(("evo",)), help="what evo does where nothing else is said"),
 )  # fmt: skip
 trajectory_options = together(
-    in_option,
     click.option("--on-error", type=click.Choice((STOP, "skip")), default=STOP, show_default=True, help="bad rows"),
 )  # fmt: skip
 

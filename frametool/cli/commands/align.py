@@ -20,16 +20,16 @@ SHAPING = ("format_name", "precision", "output", "force", "notations", "keep_sig
 @pairing_options
 @click.option("--names", type=TEXT, metavar="REF,EST", help="names of the two worlds  [default: as they are called]")
 @trajectory_options
-@reading_options(streams=True)
+@reading_options()
 @rotation_options
 @result_options("poses")
 def command(ref: str, est: str, names: str | None, deg: bool, **options: Any) -> int:
     """Print where EST's world is in REF's: the fit that `compare` makes, as an entry of a tree.
 
     \b
-      frametool align truth.tum odometry.tum
-      frametool align truth.tum odometry.tum -o aligned.tum
-      frametool align truth.csv slam.tum --align sim3 --to matrix
+      frametool align truth.tum odometry.tum --offset auto --names map,odom
+      frametool align truth.tum odometry.tum --offset auto -o aligned.tum
+      frametool align truth.tum mono.tum --align sim3 --to matrix
 
     -o FILE takes all of EST as it was compared: on REF's clock, mounted and moved, in the form of its suffix or of -f.
     The scale of sim3 is beside the pose: p' = scale R p + t; such an entry is no part of a tree.

@@ -57,7 +57,7 @@ def _read_limits(text: str) -> list[Limit]:
 @click.option("--report", type=Parsed("report", _read_report), metavar="FILE.html|svg",
               help="also a picture of it, in one file; -o: instead")  # fmt: skip
 @trajectory_options
-@reading_options(streams=True)
+@reading_options()
 @list_options("markdown", "latex")
 def command(
     ref: str, est: Sequence[str], rows: str | None, explain: str | None, limits: list[Limit] | None, report: str | None,
@@ -66,10 +66,10 @@ def command(
     """Compare trajectories with a reference: pairs, the fit, errors in place and along the way.
 
     \b
-      frametool compare truth.tum odometry.tum
-      frametool compare truth.tum a.tum b.tum --align yaw -f markdown
-      frametool compare truth.csv run.mcap:map:base_link --offset auto --mount auto
-      frametool compare truth.tum odometry.tum --fail 'ate>5cm,rpe:10m>1%,paired<90%'
+      frametool compare truth.tum odometry.tum --offset auto
+      frametool compare truth.tum truth.tum mono.tum --align sim3 -f markdown
+      frametool compare gps.csv truth.tum --mount auto --report error.html
+      frametool compare truth.tum mono.tum --align sim3 --fail 'ate>1m,paired<90%'
 
     REF and EST are trajectories in any form, tables of positions, recordings as FILE:TOPIC or FILE:TARGET:SOURCE, or -.
     ate is the distance in place after the fit, and its parts along, across and above the path; rpe that of the way

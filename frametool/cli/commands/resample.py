@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 @click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
               help="that is interpolated  [default: 3 median intervals]")  # fmt: skip
 @trajectory_options
-@reading_options(streams=True)
+@reading_options()
 @rotation_options
 @result_options("poses")
 def command(
@@ -51,7 +51,7 @@ def command(
 
     \b
       frametool resample walk.tum --rate 10
-      frametool resample odometry.tum --at truth.tum -o same_stamps.tum
+      frametool resample truth.tum --at mono.tum -o same_stamps.tum
       frametool resample walk.tum --every 0.5m -f csv
 
     TRAJ is a trajectory as `compare` takes it. Nothing is made beyond its ends, nor where its poses are more than

@@ -1,0 +1,247 @@
+"""`compare`, `align`, `resample` on the command line: what they print, refuse and end with."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import yaml
+
+import frametool
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Outcome
+
+    Run = Callable[..., Outcome]
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "compare"
+FILES = {path.name: path.read_bytes() for path in GOLDEN.iterdir()}
+DRONE = ("drone-ref.tum", "drone-est.tum")
+
+
+def found(run: Run, *arguments: str, **more: Any) -> dict[str, Any]:
+    done = run("compare", *arguments, "-f", "json", files=FILES, **more)
+    assert done.status == 0, done.err
+    return json.loads(done.out)  # type: ignore[no-any-return]
+
+
+def test_the_pairs_come_first_and_the_text_holds_the_numbers(run: Run) -> None:
+    done = run("compare", *DRONE, files=FILES)
+    assert done.out.splitlines()[:6] == [
+        "drone-ref.tum     reference: 450 poses, 8.980 s, 31.735 m",
+        "drone-est.tum     160 of 160 poses paired (100 %), drone-ref.tum interpolated",
+        "fit se3; ate m    none 18.837  origin 0.138  yaw 4.025  se3 0.043  sim3 0.029",
+        "                      rmse      mean    median       p95       max",
+        "ate m             0.042998  0.039549  0.039266  0.073505  0.095208",
+        "ate deg           0.592264  0.548815  0.529096  0.896243  1.221841",
+    ]
+    assert "kitti             -  (31.7 m of path, 100 m asked)" in done.out
+    assert (done.status, done.err) == (0, "")
+
+
+@pytest.mark.parametrize("form", ["json", "yaml"])
+def test_every_setting_and_number_stands_in_an_object(run: Run, form: str) -> None:
+    done = run("compare", *DRONE, "-f", form, files=FILES)
+    each = json.loads(done.out) if form == "json" else yaml.safe_load(done.out)
+    assert {"ref", "est", "settings", "poses", "duration_s", "path_m", "offset_s", "offset_score", "transform", "ate_by_alignment", "ate", "rpe", "kitti", "hints"} <= {*each}
+    assert each["poses"] == {"ref": 450, "est": 160, "possible": 160, "paired": 160, "shared": 0}
+    assert (each["settings"]["match"], each["settings"]["interpolated"], each["settings"]["max_gap_s"]) == ("interpolate", "ref", 0.06)
+    assert each["kitti"] is None
+    assert {*each["ate"]["m"]} == {"rmse", "mean", "median", "std", "min", "max", "sse", "p95"}
+
+
+def test_positions_alone_have_no_angles_and_never_zeros(run: Run) -> None:
+    each = found(run, "prism-ref.csv", "prism-est.tum")
+    assert each["ate"]["deg"] is each["kitti"] is each["rpe"][0]["m"] is None
+    assert each["ate_by_alignment"]["origin"] is None
+    assert each["rpe"][0]["distance_m"]["rmse"] > 0
+    assert "ate deg                  -" in run("compare", "prism-ref.csv", "prism-est.tum", files=FILES).out
+
+
+def test_evo_does_the_same(run: Run) -> None:
+    cases = json.loads((GOLDEN.parent / "compare.json").read_text())["cases"]
+    wanted = next(case for case in cases if case["name"] == "drone")["evo"]
+    each = found(run, *DRONE, "--as", "evo")
+    ape, rpe = wanted["ape"][0], wanted["rpe"][0]
+    assert each["ate"]["m"]["rmse"] == pytest.approx(ape["trans_part"]["rmse"], rel=1e-9)
+    assert each["ate"]["rot"]["rmse"] == pytest.approx(ape["rot_part"]["rmse"], rel=1e-9)
+    assert each["ate"]["full"]["rmse"] == pytest.approx(ape["full"]["rmse"], rel=1e-9)
+    assert each["rpe"][0]["full"]["rmse"] == pytest.approx(rpe["full"]["rmse"], rel=1e-9)
+
+
+def test_clock_and_mount_are_found_and_told(run: Run) -> None:
+    told = run("compare", "clock-ref.tum", "clock-est.tum", files=FILES).err
+    assert re.search(r"the clock of clock-est.tum seems 0.25\d s behind \(score 0.99\d\); --offset auto", told)
+    each = found(run, "clock-ref.tum", "clock-est.tum", "--offset", "auto")
+    assert each["offset_s"] == pytest.approx(0.25, abs=1e-3)
+    assert any("the bodies are 86.0 deg apart; --mount" in hint for hint in each["hints"])
+    mount = re.search(r"--mount '(.*)'", " ".join(each["hints"]))
+    assert mount is not None
+    mounted = found(run, "clock-ref.tum", "clock-est.tum", "--offset", "auto", "--mount", mount[1])
+    assert mounted["ate"]["deg"]["rmse"] < 1
+    arm = found(run, "prism-ref.csv", "prism-est.tum", "--mount", "auto")["settings"]["mount"]["xyz"]
+    assert arm == pytest.approx([-0.073693, -0.06452, -0.465915], abs=1e-6)
+
+
+REFUSED = {
+    ("drone-ref.tum", "clock-est.tum"): (1, "clock-est.tum: 0 of 182 poses have a partner in drone-ref.tum (0.0 %): drone-ref.tum 1700000000.000 .. 1700000008.980 s, clock-est.tum 1001.652 .. 1010.703 s; try --offset auto, --max-gap, --min-match 0"),
+    ("line-ref.tum", "line-est.tum"): (1, "line-ref.tum lies on a line: the turn about it is free; --align yaw, origin or none"),
+    ("kitti-ref.txt", "drone-est.tum"): (2, "kitti-ref.txt has no stamps, the other has; give them with --stamps FILE"),
+    ("drone-ref.tum", "line-est.tum", "--offset", "auto"): (1, "no clear clock offset (score 0.19); give one: --offset T"),
+    (*DRONE, "--delta", "5"): (2, "'5' is no distance between poses; write a number with m, s, deg, frames"),
+    (*DRONE, "--max-diff", "1ms"): (2, "--max-diff is of --match nearest; --max-gap is of interpolation"),
+    (*DRONE, "--tolerance", "5%"): (2, "--tolerance is of --all-pairs: how near to the delta two poses are"),
+    (*DRONE, "--fail", "ate>1", "--delta", "x"): (2, "'x' is no distance between poses"),
+    (*DRONE, "--fail", "atee>1"): (2, "no number is called 'atee'; did you mean 'ate'?"),
+    (*DRONE, "--fail", "kitti>1"): (2, "kitti>1: drone-est.tum has no such number; -f json shows those there are"),
+    ("drone-ref.tum", "none.tum"): (5, "none.tum: no such file or directory"),
+    ("-", "-"): (2, "standard input can be read once; only one trajectory may be -"),
+    (*DRONE, "--start", "+20s"): (1, "no pair from 1700000020.505976832 to 1700000008.455779072 s; there are some in 1700000000.505 .. 1700000008.455 s"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("arguments", REFUSED, ids=" ".join)
+def test_what_is_not_determined_is_refused_in_one_line(run: Run, arguments: tuple[str, ...]) -> None:
+    status, message = REFUSED[arguments]
+    done = run("compare", *arguments, files=FILES)
+    assert (done.status, done.out) == (status, "")
+    assert message in done.err
+    assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize(
+    ("limits", "status"), [("ate<1cm,paired<90%", 0), ("ate>5cm", 0), ("ate>4cm", 1), ("rpe:1m>3%", 1), ("rpe:1m>1deg,ate.m.p95>=7cm", 1), ("paired<=160", 1)]
+)
+def test_limits_decide_the_exit_status(run: Run, limits: str, status: int) -> None:
+    done = run("compare", *DRONE, "--fail", limits, files=FILES)
+    assert done.status == status
+    assert ("limit passed" in done.err) == (status == 1)
+
+
+def test_trouble_is_no_limit_passed(run: Run) -> None:
+    assert run("compare", "line-ref.tum", "line-est.tum", "--fail", "ate>1", files=FILES).status == 2
+
+
+@pytest.mark.parametrize("form", ["text", "csv", "markdown", "latex"])
+def test_several_estimates_are_a_table(run: Run, form: str) -> None:
+    lines = run("compare", "drone-ref.tum", "drone-est.tum", "handheld-est.tum", "-f", form, files=FILES).out.splitlines()
+    rows = [line for line in lines if "est.tum" in line]
+    assert len(rows) == 2
+    best = {"text": "0.043*", "csv": "0.0429975122", "markdown": "**0.043**", "latex": r"\textbf{0.043}"}[form]
+    assert best in rows[0]
+
+
+def test_rows_are_those_of_the_errors(run: Run) -> None:
+    done = run("compare", *DRONE, "--rows", "-f", "json", files=FILES)
+    rows = [json.loads(line) for line in done.out.splitlines()]
+    errors = np.array([row["ate_m"] for row in rows])
+    assert float(np.sqrt((errors**2).mean())) == pytest.approx(0.0429975122282, rel=1e-9)
+    assert [row["stamp_ns"] for row in rows[:2]] == [1700000000505976832, 1700000000551459328]
+    assert run("compare", *DRONE, "--rows=rpe", files=FILES).out.startswith("stamp_ns,end_ns,delta,m,deg,distance_m\n")
+    assert run("compare", "kitti-ref.txt", "kitti-est.txt", "--rows=kitti", "--align", "none", files=FILES).out.startswith("stamp_ns,end_ns,length_m,percent,deg_per_m\n")
+
+
+def test_any_way_to_name_a_trajectory_gives_the_same_numbers(run: Run) -> None:
+    wanted = found(run, *DRONE)["ate"]
+    piped = found(run, "drone-ref.tum", "-", stdin=FILES["drone-est.tum"])
+    assert piped["ate"] == wanted
+    tree = run("tree", "drone-est.tum", "-f", "yaml", "--frames", "odom,base", files=FILES).out
+    files = FILES | {"est.yaml": tree}
+    for name in ("est.yaml:odom:base", "est.yaml"):
+        done = run("compare", "drone-ref.tum", name, "-f", "json", files=files)
+        each = json.loads(done.out)
+        assert each["ate"]["m"]["rmse"] == pytest.approx(wanted["m"]["rmse"], rel=1e-12)
+        assert each["transform"]["name"] == "odom"
+    rows = run("convert", "-i", "drone-est.tum", "-f", "csv", files=FILES).out
+    assert json.loads(run("compare", "drone-ref.tum", "est.csv", "-f", "json", files=FILES | {"est.csv": rows}).out)["ate"] == wanted
+
+
+def test_bad_rows_stop_or_are_skipped(run: Run) -> None:
+    lines = FILES["drone-est.tum"].decode().splitlines(keepends=True)
+    files = FILES | {"bad.tum": "".join([*lines[:3], "1700000000.7 1 2 x 0 0 0 1\n", *lines[3:]]).encode()}
+    stopped = run("compare", "drone-ref.tum", "bad.tum", files=files)
+    assert (stopped.status, stopped.out) == (1, "")
+    assert "bad.tum:4:" in stopped.err
+    skipped = run("compare", "drone-ref.tum", "bad.tum", "--on-error", "skip", files=files)
+    assert skipped.status == 3
+    assert "160 of 160 poses paired" in skipped.out
+
+
+def test_order_and_equal_stamps_are_told(run: Run) -> None:
+    lines = FILES["drone-est.tum"].decode().splitlines(keepends=True)
+    files = FILES | {"odd.tum": "".join([lines[1], lines[0], *lines[1:]]).encode()}
+    done = run("compare", "drone-ref.tum", "odd.tum", files=files)
+    assert "odd.tum: stamps are out of order; sorted" in done.err
+    assert "odd.tum: 1 poses have the stamp of another; the last counts" in done.err
+    assert "160 of 160 poses paired" in done.out
+
+
+@pytest.mark.parametrize("suffix", ["svg", "html"])
+def test_a_report_is_one_file_that_asks_nothing(run: Run, tmp_path: Path, suffix: str) -> None:
+    name = '<script>alert("x")</script>.tum'.replace("/", "_")
+    files = FILES | {name: FILES["drone-est.tum"]}
+    done = run("compare", "drone-ref.tum", name, "-o", f"report.{suffix}", files=files)
+    assert (done.status, done.out) == (0, "")
+    text = (tmp_path / f"report.{suffix}").read_text()
+    assert len(text) < 300_000
+    assert "<script>alert" not in text
+    assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", text)
+    if suffix == "html":
+        assert "default-src 'none'" in text
+        held = re.search(r'<script type="application/json" id="numbers">(.*?)</script>', text, re.DOTALL)
+        assert held is not None
+        assert json.loads(held[1])[0]["poses"]["paired"] == 160
+    again = run("compare", "drone-ref.tum", name, "-o", f"report.{suffix}", files=files)
+    assert again.status == 5
+
+
+def test_align_prints_an_entry_and_writes_the_whole_estimate(run: Run) -> None:
+    done = run("align", "mono-ref.tum", "mono-est.tum", "--align", "sim3", "-o", "moved.tum", "-f", "tum", "--names", "map,slam", files=FILES)
+    entry = yaml.safe_load(done.out)
+    assert (entry["name"], entry["parent"]) == ("slam", "map")
+    again = found_in(run, "mono-ref.tum", "moved.tum", "--align", "none")
+    assert again["ate"]["m"]["rmse"] == pytest.approx(again["ate_by_alignment"]["sim3"], rel=1e-9)
+    assert again["poses"]["est"] == FILES["mono-est.tum"].count(b"\n")
+    assert run("tree", "entry.yaml", files={"entry.yaml": "frames:\n  map:\n    slam: {xyz: [1, 2, 3], scale: 2.0}\n"}).status == 1
+
+
+def found_in(run: Run, *arguments: str) -> dict[str, Any]:
+    return json.loads(run("compare", *arguments, "-f", "json").out)  # type: ignore[no-any-return]
+
+
+def test_resampling_keeps_the_poses_there_are(run: Run) -> None:
+    at = run("resample", "drone-ref.tum", "--at", "drone-ref.tum", "-f", "tum", files=FILES)
+    assert [line.split()[1:4] for line in at.out.splitlines()] == [line.split()[1:4] for line in FILES["drone-ref.tum"].decode().splitlines()]
+    rate = run("resample", "drone-ref.tum", "--rate", "10", "-f", "csv", files=FILES).out.splitlines()
+    assert len(rate) == 1 + 90
+    path = run("resample", "drone-ref.tum", "--every", "1m", "-f", "csv", files=FILES).out.splitlines()
+    steps = np.linalg.norm(np.diff([[float(cell) for cell in row.split(",")[:3]] for row in path[1:]], axis=0), axis=1)
+    assert (steps <= 1 + 1e-6).all()
+    assert (steps > 0.8).all()
+    gaps = run("resample", "gaps-ref.csv", "--rate", "20", files=FILES)
+    assert "moments are beyond the ends of gaps-ref.csv, or in a gap: no pose" in gaps.err
+    assert run("resample", "drone-ref.tum", files=FILES).status == 2
+
+
+def test_the_python_face_gives_what_the_command_prints(run: Run, tmp_path: Path) -> None:
+    wanted = found(run, *DRONE)
+    ref, est = (frametool.load_trajectory(tmp_path / name) for name in DRONE)
+    each = frametool.compare(ref, est, align="se3", deltas=("1m", "10m"))
+    assert each.as_dict()["ate"] == wanted["ate"]
+    assert float(np.sqrt((each.ate.m**2).mean())) == pytest.approx(wanted["ate"]["m"]["rmse"], rel=1e-12)
+    aligned = frametool.align(ref, est)
+    assert aligned.transform.xyz.tolist() == wanted["transform"]["xyz"]
+    assert aligned.moved.size == est.size
+    assert frametool.resample(ref, rate=10).size == 90
+    shifted = frametool.Trajectory(est.stamps_ns, est.xyz, world="odom")
+    assert frametool.compare(ref, shifted).ate.rad is None
+    with pytest.raises(frametool.FrametoolError, match="integer nanoseconds"):
+        frametool.compare(ref, frametool.Trajectory(est.stamps_ns / 1e9, est.xyz))
+    with pytest.raises(TypeError, match="aling"):
+        frametool.compare(ref, est, aling="yaw")
