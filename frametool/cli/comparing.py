@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import partial
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from frametool.frames.trajectory import Trajectory
     from frametool.stream.faults import BadRows
 
+LONGEST = 2.0**62  # nanoseconds
 NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9, "": 1e9}
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -30,9 +32,10 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 def read_time(text: str) -> int:
     """Read `10ms`, `0.25`, `-3s` as nanoseconds."""
     found = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(ns|us|ms|s|)", text.strip())
-    if found is None:
+    nanoseconds = float(found[1]) * NANOSECONDS[found[2]] if found else inf
+    if abs(nanoseconds) >= LONGEST:
         raise ValueInvalid(f"{shown(text)} is not a time; write seconds, or a number with ms, us or ns")
-    return round(float(found[1]) * NANOSECONDS[found[2]])
+    return round(nanoseconds)
 
 
 def read_span(text: str) -> int:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 LIMIT_S = 10.0
 REFINED_S = 1e-7
 STEPS = 8
+LEAST = 3  # poses: two speeds make the least course
 NEARBY = 1.2  # of a step: what the best of all lags and its neighbours may miss
 DOUBT = 0.25  # of a step: the standard error that least squares may have
 TINY = 1e-12
@@ -33,6 +34,8 @@ def clock_offset(ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, 
 
     Where the two spans do not meet, their first stamps are put together and every lag is tried.
     """
+    if min(ref.size, est.size) < LEAST:
+        return ClockOffset(0.0, -1.0)
     first = int(ref.stamps_ns[0])
     shift = 0
     if est.stamps_ns[0] > ref.stamps_ns[-1] or est.stamps_ns[-1] < ref.stamps_ns[0]:
@@ -53,7 +56,7 @@ def clock_offset(ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, 
 
 def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Array] | None:
     """Return the times between poses and the angular speed or speed there; None where there is none to speak of."""
-    if each.size < 3 or (turning and each.rotation is None):
+    if turning and each.rotation is None:
         return None
     if turning:
         rotation = each.rotation

@@ -234,7 +234,7 @@ def _tell_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]
     """Tell of an offset that is larger than half an interval and clear, where looking for it costs little."""
     intervals = [pairing.interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
-    if not span / (min(intervals) / 2) <= MOST_TRIED:
+    if span > MOST_TRIED * min(intervals) / 2:
         return
     found = clock_offset(ref, est)
     if abs(found.seconds) * 1e9 > max(intervals) / 2 and found.score > SURE:
@@ -290,9 +290,10 @@ def _first(pairs: Pairs, limit: Delta | None) -> int | None:
 def _by_alignment(pairs: Pairs, first: Pairs, up: Array) -> dict[str, float | None]:
     """Return the rmse of positions under every alignment."""
     found: dict[str, float | None] = {}
+    positions = pairs.est._replace(xyzw=None)
     for kind in ALIGNMENTS:
         try:
-            gap = fitted(kind, first.ref, first.est, up).moved(pairs.est).xyz - pairs.ref.xyz
+            gap = fitted(kind, first.ref, first.est, up).moved(positions).xyz - pairs.ref.xyz
             found[kind] = float(np.sqrt((gap**2).sum() / len(gap)))
         except Unaligned:
             found[kind] = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -51,7 +52,8 @@ def interpolated(ref: Trajectory, est: Trajectory, max_gap_ns: float | None = No
     kept = walked.at(has_partner)
     sides = (made, kept) if walks_est else (kept, made)
     possible = est.size if walks_est else _inside(ref.stamps_ns, est.stamps_ns)
-    return Pairs(*sides, possible, 0, "ref" if walks_est else "est", gap_ns / 1e9)
+    name = "ref" if walks_est else "est"
+    return Pairs(*sides, possible, 0, name, gap_ns / 1e9 if isfinite(gap_ns) else None)
 
 
 def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float) -> tuple[Trajectory, Array]:

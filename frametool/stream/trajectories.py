@@ -147,6 +147,8 @@ def _of_tree(
     """Take the samples of a way through a tree that moves; of the only edge that does where none is named."""
     recording = Recording(name, None if file is None else file.stream, form or None, topics, answers)
     tree = cast("TransformBuffer", load_sources(opened_together([recording])))
+    if topics and not recording.topics.counts:
+        raise ValueInvalid(f"{recording.name}: {FORMATS[recording.form].summary}: nothing in it came by a topic")
     if not tree.moves:
         raise ValueInvalid(f"{recording.name}: nothing moves in it")
     if not frames:
