@@ -7,6 +7,7 @@ it has, so that nothing passes unseen; after it the next record is looked for wh
 from __future__ import annotations
 
 import re
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.text.lines import whole_lines
@@ -27,9 +28,9 @@ _GAP = re.compile(rb"\s*(,?)\s*")
 _OPENING = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[")
 _WORD_AT_END = re.compile(r"[\w.+-]*\s*\Z")  # such as the 1e of 1e-05
 _LINE_OF_NEXT = re.compile(rb"\n([ \t]*+(?:,[ \t]*+)?+)[{\[]")
-_BESIDE = re.compile(rb"\}[ \t]*+(?:,[ \t]*+)?+(?=\{)")
-_NEXT = re.compile(rb"\n[ \t]*+(?:,[ \t]*+)?+(?=[{\[])|" + _BESIDE.pattern)
-MOST_NEXT = 20  # places that are looked at for a record that begins as the broken one does
+_NEXT = re.compile(rb"([^ \t,])[ \t]*+(?:,[ \t]*+)?+(?=([{\[]))")
+_NEXT_ITEM = re.compile(rb"\}[ \t]*+(?:,[ \t]*+)?+(?=\{)|\n[ \t]*+(?:,[ \t]*+)?+(?=[{\[])")
+MOST_NEXT = 200  # brackets that are looked at for a record that begins as the broken one does
 _FIRST_KEY = re.compile(rb"[{\[]\s*+(?:\"[^\"\n]*+\"|)")
 _TOKEN = re.compile(rb'"(?:[^"\\\n]|\\.)*+"?|[{}\[\]]')
 _WORD = re.compile(rb"[\]}]*+[^\[\]{}\n]*+")
@@ -229,7 +230,7 @@ def _scanned(
                 end = _end_of_broken(data, start, end if wrong else len(data), own, closed, array=array, final=final)
                 if not end:
                     return Parts(found)
-                problem = _value(text[start:end], 0)[1] or "not JSON: it is cut off"
+                problem = _value(text[start:end], 0)[1] or f"not JSON: {'it is cut off' if opening in b'[{' else 'no value'}"
         found.append(Part(at if array else start, start, end, end, problem))
         at, needs_comma = end, array
 
@@ -269,16 +270,17 @@ def _end_of_broken(
         _note_closings(data, start, last, closed, settled=limit is None and final)
     if 0 < closed.get(start, 0) <= last:
         return closed[start]
-    nexts = _NEXT if own < 0 else _BESIDE
-    following = [each for each, _ in zip(nexts.finditer(data, start, last), range(MOST_NEXT), strict=False)]
+    following = list(islice(_NEXT.finditer(data, start + 1, last), MOST_NEXT))
     if limit is None and not final and (start not in closed or len(following) < MOST_NEXT):
         return 0
     key = _FIRST_KEY.match(data, start)
-    found = next((each for each in following if key and data.startswith(key[0], each.end())), None)
+    alike = (each for each in following if key and data.startswith(key[0], each.end()))
+    found = next((each for each in alike if own < 0 or each[1] != b"\n"), None)
     if found is None and limit is None:
         line = data.rfind(b"\n", start, wrong + 1)
-        found = nexts.search(data, wrong if line < 0 else line)
-    end = last if found is None else found.start() + data.startswith(b"}", found.start())
+        items = _NEXT_ITEM.finditer(data, wrong if line < 0 else line)
+        found = next((each for each in items if own < 0 or each[0][0] != 10), None)
+    end = last if found is None else found.start() + (found[0][0] != 10)
     body = data[start:end].rstrip(b" \t\r\n,")
     if array and end == len(data) and body.endswith(b"]") and body.count(b"]") > body.count(b"["):
         body = body[:-1].rstrip()
