@@ -7,7 +7,6 @@ it has, so that nothing passes unseen; after it the next record is looked for wh
 from __future__ import annotations
 
 import re
-from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.text.lines import whole_lines
@@ -28,10 +27,9 @@ _GAP = re.compile(rb"\s*(,?)\s*")
 _OPENING = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[")
 _WORD_AT_END = re.compile(r"[\w.+-]*\s*\Z")  # such as the 1e of 1e-05
 _LINE_OF_NEXT = re.compile(rb"\n([ \t]*+(?:,[ \t]*+)?+)[{\[]")
-_NEXT = re.compile(rb"([^ \t,])[ \t]*+(?:,[ \t]*+)?+(?=([{\[]))")
 _NEXT_ITEM = re.compile(rb"\}[ \t]*+(?:,[ \t]*+)?+(?=\{)|\n[ \t]*+(?:,[ \t]*+)?+(?=[{\[])")
-MOST_NEXT = 200  # brackets that are looked at for a record that begins as the broken one does
-_FIRST_KEY = re.compile(rb"[{\[]\s*+(?:\"[^\"\n]*+\"|)")
+MOST_KEYS = 100  # first keys of broken records that stand nowhere else
+_FIRST_KEY = re.compile(rb"\{\s*+\"[^\"\n]*+\"")
 _TOKEN = re.compile(rb'"(?:[^"\\\n]|\\.)*+"?|[{}\[\]]')
 _WORD = re.compile(rb"[\]}]*+[^\[\]{}\n]*+")
 _ITEM = re.compile(rb"[\]}]*+[^\[\]{},\n]*+")
@@ -199,7 +197,7 @@ def _scanned(
     """Scan values from a place on; one that may go on behind the text ends the scan, or is a part if it is final."""
     found: list[Part] = []
     text = data.decode("latin-1")  # keeps every offset; the syntax of JSON is ASCII
-    closed: dict[int, int] = {}
+    broken = _Broken(data, array=array, final=final)
     needs_comma = array and not first
     while True:
         gap = _GAP.match(data, at)
@@ -222,12 +220,12 @@ def _scanned(
             continue
         end = match(start) if match else None
         if end is None:
-            end, wrong = _value(text, start) if closed.get(start) != 0 else (len(data), None)
+            end, wrong = _value(text, start) if broken.closed.get(start) != 0 else (len(data), None)
             if wrong is None and not final:
                 return Parts(found)
             if wrong != "":
                 own = _own_indent(data, at, start, array=array, first=first and not found)
-                end = _end_of_broken(data, start, end if wrong else len(data), own, closed, array=array, final=final)
+                end = broken.end(start, end if wrong else len(data), own)
                 if not end:
                     return Parts(found)
                 problem = _value(text[start:end], 0)[1] or f"not JSON: {'it is cut off' if opening in b'[{' else 'no value'}"
@@ -251,60 +249,79 @@ def _own_indent(data: bytes, at: int, start: int, *, array: bool, first: bool) -
     return -1 if array else 0
 
 
-def _end_of_broken(
-    data: bytes, start: int, wrong: int, own: int, closed: dict[int, int], *, array: bool, final: bool
-) -> int:
-    """Return where a value that goes wrong ends; 0 where what decides it may be behind the text.
+class _Broken:
+    """Where values that go wrong end in a text; keeps what was found for the next of them."""
 
-    It ends before a line that begins with a bracket and is not indented deeper, even if that could be a part of it, or
-    where its brackets are closed, else before the next object that begins as it does, or any, or at the end.
-    """
-    if data[start : start + 1] not in (b"{", b"["):
-        word = (_ITEM if array else _WORD).match(data, start)
-        end = word.end() if word else start
-        return 0 if end == len(data) and not final else max(start + len(data[start:end].rstrip()), start + 1)
-    lines = _LINE_OF_NEXT.finditer(data, start) if own >= 0 else ()
-    limit = next((line.start() for line in lines if len(line[1]) <= own), None)
-    last = len(data) if limit is None else limit
-    if start not in closed:
-        _note_closings(data, start, last, closed, settled=limit is None and final)
-    if 0 < closed.get(start, 0) <= last:
-        return closed[start]
-    following = list(islice(_NEXT.finditer(data, start + 1, last), MOST_NEXT))
-    if limit is None and not final and (start not in closed or len(following) < MOST_NEXT):
-        return 0
-    key = _FIRST_KEY.match(data, start)
-    alike = (each for each in following if key and data.startswith(key[0], each.end()))
-    found = next((each for each in alike if own < 0 or each[1] != b"\n"), None)
-    if found is None and limit is None:
-        line = data.rfind(b"\n", start, wrong + 1)
-        items = _NEXT_ITEM.finditer(data, wrong if line < 0 else line)
-        found = next((each for each in items if own < 0 or each[0][0] != 10), None)
-    end = last if found is None else found.start() + (found[0][0] != 10)
-    body = data[start:end].rstrip(b" \t\r\n,")
-    if array and end == len(data) and body.endswith(b"]") and body.count(b"]") > body.count(b"["):
-        body = body[:-1].rstrip()
-    return start + max(len(body), 1)
+    def __init__(self, data: bytes, *, array: bool, final: bool) -> None:
+        """Take a text, and whether nothing comes behind it."""
+        self.data = data
+        self.array = array
+        self.final = final
+        self.closed: dict[int, int] = {}  # behind which place a bracket is closed: 0 for one of the other kind, or none
+        self.single: set[bytes] = set()  # keys that do not come again
 
+    def end(self, start: int, wrong: int, own: int) -> int:
+        """Return where a value ends; 0 where what decides it may be behind the text.
 
-def _note_closings(data: bytes, start: int, last: int, closed: dict[int, int], *, settled: bool) -> None:
-    """Note where each bracket from a place on is closed, up to the one there.
+        It ends before a line that begins with a bracket and is not indented deeper, even if that could be a part of
+        it, or where its brackets are closed, else before what begins as it does, or the next object, or at the end.
+        """
+        data = self.data
+        if data[start : start + 1] not in (b"{", b"["):
+            word = (_ITEM if self.array else _WORD).match(data, start)
+            end = word.end() if word else start
+            return 0 if end == len(data) and not self.final else max(start + len(data[start:end].rstrip()), start + 1)
+        lines = _LINE_OF_NEXT.finditer(data, start) if own >= 0 else ()
+        limit = next((line.start() for line in lines if len(line[1]) <= own), None)
+        last = len(data) if limit is None else limit
+        if start not in self.closed:
+            self._close(start, last, settled=limit is None and self.final)
+        if 0 < self.closed.get(start, 0) <= last:
+            return self.closed[start]
+        if limit is None and not self.final and start not in self.closed:
+            return 0
+        end = self._alike(start, last, own)
+        if end < 0 and limit is None:
+            if not self.final:
+                return 0
+            line = data.rfind(b"\n", start, wrong + 1)
+            items = _NEXT_ITEM.finditer(data, wrong if line < 0 else line)
+            found = next((each for each in items if own < 0 or each[0][0] != 10), None)
+            end = last if found is None else found.start() + (found[0][0] != 10)
+        elif end < 0:
+            end = last
+        body = data[start:end].rstrip(b" \t\r\n,")
+        if self.array and end == len(data) and body.endswith(b"]") and body.count(b"]") > body.count(b"["):
+            body = body[:-1].rstrip()
+        return start + max(len(body), 1)
 
-    It is 0 where a bracket of the other kind comes first, and if nothing comes any more (settled) where none comes.
-    """
-    opened: list[int] = []
-    for token in _TOKEN.finditer(data, start, last):
-        if token[0] in (b"{", b"["):
-            opened.append(token.start())
-        elif token[0] in (b"}", b"]"):
-            if data[opened[-1]] + 2 != ord(token[0]):
-                settled = True
-                break
-            closed[opened.pop()] = token.end()
-            if not opened:
-                return
-    if settled:
-        closed.update(dict.fromkeys(opened, 0))
+    def _close(self, start: int, last: int, *, settled: bool) -> None:
+        """Note where each bracket from a place on is closed, up to the one there."""
+        opened: list[int] = []
+        for token in _TOKEN.finditer(self.data, start, last):
+            if token[0] in (b"{", b"["):
+                opened.append(token.start())
+            elif token[0] in (b"}", b"]"):
+                if self.data[opened[-1]] + 2 != ord(token[0]):
+                    settled = True
+                    break
+                self.closed[opened.pop()] = token.end()
+                if not opened:
+                    return
+        if settled:
+            self.closed.update(dict.fromkeys(opened, 0))
+
+    def _alike(self, start: int, last: int, own: int) -> int:
+        """Return where an object begins with the first key of one; -1 if none does."""
+        key = _FIRST_KEY.match(self.data, start)
+        if key is None or key[0] in self.single or len(self.single) > MOST_KEYS:
+            return -1
+        at = self.data.find(key[0], start + 1, last)
+        while own >= 0 and at > 0 and not self.data[self.data.rfind(b"\n", start, at) + 1 : at].strip(b" \t,"):
+            at = self.data.find(key[0], at + 1, last)  # deeper in the lines of its own
+        if at < 0 and last == len(self.data):
+            self.single.add(key[0])
+        return at
 
 
 def _documents(text: bytes) -> Iterator[Part]:
