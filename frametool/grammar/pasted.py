@@ -157,7 +157,8 @@ _SCALAR_FIRST = rf"\s*({NUMBER})\s*(<<|<)\s*({NUMBER})\s*,\s*({NUMBER})\s*,\s*({
 _ONE_LINE = rf"\s*(?:\w+:\s*)?t\s*=\s*{_THREE}[;,]\s*(\S+)\s*=\s*(.*)"
 _ABOUT = rf"\((?:x=)?({NUMBER}),\s*(?:y=)?({NUMBER}),\s*(?:z=)?({NUMBER})\)"
 _EULER = rf"\s*(?:<Euler {_ABOUT}, order='([XYZ]{{3}})'>|Euler\({_ABOUT}, '([XYZ]{{3}})'\))\s*"
-_LISTS = r"\s*+\w++\(\s*+((?:(?:wxyz|xyzw|xyz)\s*+=\s*+(?:\w++\()?\[[^\[\]]*+\](?:,\s*+dtype=\w++)?\)?\s*+(?:,\s*+)?)+)\)\s*"
+_LISTED = r"(?:wxyz|xyzw|xyz)\s*+=\s*+(?:\w++\()?\[[^\[\]]*+\](?:,\s*+dtype=\w++)?\)?"
+_LISTS = rf"\s*+\w++\(\s*+((?:{_LISTED}\s*+(?:,\s*+)?)+)\)\s*"
 _TURNED = "R|rot|rotation|rotation_matrix"
 _MOVED = "t|p|T|trans|translation|tvec"
 _PART = re.compile(rf"(?:^|(?<=[\s(]))({_TURNED}|{_MOVED})\s*[=:]\s*(?=[\[(]|\n|np\.|array|Rot|{NUMBER})")

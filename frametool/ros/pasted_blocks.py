@@ -51,8 +51,9 @@ _BEGIN = re.compile(
       | {NUMBER}(?:[ \t\r]*+(?:[,;\n<]|\Z)|[ \t]++[-+.\d*])          # bare numbers, MATLAB's factor
       | [-+]?\s*+(?:{DECIMAL}\s*+)?(?:\*\s*+)?[ijk]\s*+(?:[-+]|\Z) | {NUMBER}\s*+[-+]
       | \d+[\xd7x]\d+\b | Columns?\ \d | \[,\d | \\(?:left|begin)\b | [⎡⎢⎛│┃┌] | (?:se3|so3|quaternion)\s*\n )
-    | \x1b\[ | Out\[\d | Parameter\ containing: | (?:[A-Za-z_]\w*\s*)?<< | \(x,\s*y,\s*z,\s*w\)\s*= | (?:\w++:\s*+)?t\s*+=
-    | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=]\s*[\[(\n] | [xyzw]:\s*{NUMBER}\s*,
+    | \x1b\[ | Out\[\d | Parameter\ containing: | (?:[A-Za-z_]\w*\s*)?<< | \(x,\s*y,\s*z,\s*w\)\s*=
+    | (?:\w++:\s*+)?t\s*+= | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=]\s*[\[(\n]
+    | [xyzw]:\s*{NUMBER}\s*,
     | <(?:origin|joint|node|Matrix|Quaternion|Euler)\b | (?:args|x)\s*=
     | (?:\[\w++\]\ .*+\n\s*+)*+(?:At\ (?:any\ )?time\b|-\ ++(?:Translation|Rotation):|\S+\ seen\ from\ )
     | (?:Requesting\ state\ .*+\s++)?(?:Model:\ \[|(?:-\ )?Pose\ \[\ XYZ)

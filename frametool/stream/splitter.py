@@ -228,7 +228,8 @@ def _scanned(
                 end = broken.end(start, end if wrong else len(data), own)
                 if not end:
                     return Parts(found)
-                problem = _value(text[start:end], 0)[1] or f"not JSON: {'it is cut off' if opening in b'[{' else 'no value'}"
+                problem = _value(text[start:end], 0)[1] or ("" if opening in b"[{" else "not JSON: no value")
+                problem = problem or "not JSON: it is cut off"
         found.append(Part(at if array else start, start, end, end, problem))
         at, needs_comma = end, array
 

@@ -47,7 +47,7 @@ def test_answers_and_errors_do_not_depend_on_the_size_of_blocks(seed: int, on_er
         assert other.text == one.text or on_error == "stop"
 
 
-LONG = ",".join(["[1, {\"x\": 2}]", '{"x": [3]}'] * 4000)
+LONG = ",".join(['[1, {"x": 2}]', '{"x": [3]}'] * 4000)
 WRONG = {
     "a word": f'{{"id": 1, "l": [{LONG}], "x": tru}}', "a comma": f'{{"id": 1, "l": [{LONG}],}}', "at its begin": f'{{"id" 1, "l": [{LONG}]}}',
     "no colon": f'{{"id": 1, "l" [{LONG}]}}', "a bracket less": f'{{"id": 1, "l": [{LONG}}}', "a bracket more": f'{{"id": 1, "l": [{LONG}]]}}',
