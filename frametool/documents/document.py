@@ -140,10 +140,20 @@ class Node(NamedTuple):
                 yield node
 
 
+class Aliased(FormatError):
+    """Report an alias of YAML: what it stands for is written elsewhere, and perhaps for others too."""
+
+    def in_text(self, text: str) -> Aliased:
+        """Take the place of the first alias in a text."""
+        aliases = (leaf.start for root in parse_nodes(text) for leaf in root.leaves() if leaf.quote == "*")
+        ((self.line, self.column),) = places_of(text, [next(aliases, 0)])
+        return self
+
+
 def refuse_alias(node: Node) -> None:
-    """Raise FormatError for an alias of YAML: what it stands for is written elsewhere, and perhaps for others too."""
+    """Raise Aliased for an alias of YAML."""
     if node.quote == "*":
-        raise FormatError("an alias of YAML stands in the place of what is rewritten; write out what it stands for")
+        raise Aliased("an alias of YAML stands in the place of what is rewritten; write out what it stands for")
 
 
 NOTHING = Node(0, 0, {})  # a mapping without keys

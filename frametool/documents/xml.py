@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 DEEPEST_ELEMENT = 100_000
 _BLOCK = 1 << 16
-_OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s;]+;")
+_OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s;&]++;")
 _DECIMALS = "0123456789.-+eE \t\r\n"
 
 

@@ -272,7 +272,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     return "yaml", "nothing else"
 
 
-_LIKE_YAML = r"""(?m):(?:\s|$)|^\s*[-?&!{[]"""  # a key, a list, or what else may begin a value
+_LIKE_YAML = r"""(?m):(?:\s|$)|^[^\S\n]*+[-?&!{[]"""  # a key, a list, or what else may begin a value
 _MOST_NAMED = 8
 
 
@@ -293,7 +293,7 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
 
 
 _ROBOT = rb"\s*(?:<\?xml\b|<!--|<(?:robot|sdf|mujoco|launch|opencv_storage)\b)"
-_FRAMES_KEY = r"""(?m)^\s*(?:---\s*)?\{?\s*["']?frames["']?\s*:"""  # of the tool's own trees
+_FRAMES_KEY = r"""(?m)^[^\S\n]*+(?:---\s*+)?(?:\{\s*+)?["']?frames["']?\s*+:"""  # of the tool's own trees
 _MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # are read as poses too
 
 

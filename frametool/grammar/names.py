@@ -19,8 +19,8 @@ PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # what a message's header says is
 NAME_KEYS = ("child_frame_id", "name")  # what a pose is the pose of
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
-_STAMP = re.compile(r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
-_UNIT = re.compile(r"_([nmuµ]?s)$|[\[(]\s*([^\])]*?)\s*[\])]$")
+_STAMP = re.compile(r"[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
+_UNIT = re.compile(r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$")
 _SECONDS = ("s", "sec", "seconds", "")
 
 

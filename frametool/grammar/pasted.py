@@ -30,9 +30,9 @@ Rows: TypeAlias = "list[list[str]]"
 
 DECIMAL = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?"
 NUMBER = rf"[-+]?{DECIMAL}"
-LABEL = r"\s*[A-Za-z_]\w*+\s*=(?!=)\s*"  # MATLAB's and Python's `T =`
+LABEL = r"\s*+[A-Za-z_]\w*+\s*+=(?!=)\s*"  # MATLAB's and Python's `T =`
 _NAMED = r"(?<![\w.)\]}])[A-Za-z_][\w.]*+\((?=\s*[-+.\d\[({A-Za-z])"  # array(, np.array(, tensor(
-_ARGUMENTS = r"(?:,\s*[A-Za-z]\w*\s*=\s*[\w.'\":<>]+)+\s*(?=\))"  # dtype=float32
+_ARGUMENTS = r"(?:,\s*+[A-Za-z]\w*+\s*+=\s*+[\w.'\":<>]++){1,9}+\s*+(?=\))"  # dtype=float32
 _SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
 _SCALAR = r"(?:np|numpy)\.\w+\(([^()]*)\)"  # numpy 2 in lists: np.float64(0.5)
 _OPEN, _CLOSE = "[({", "])}"
@@ -45,18 +45,18 @@ _DECORATIONS: Sequence[tuple[str, str]] = (
     (r"\A\s*(?:[A-Za-z_][\w.()]*\s*)?<<", ""),  # Eigen's comma initializer
     (rf"\A({LABEL})?\s*\d+[\xd7x]\d+\b[^\n]*\n", ""),  # heading of Julia and MATLAB's live scripts
     (rf"\A({LABEL})\s*(?:se3|so3)[ \t]*\n", ""),  # MATLAB's classes
-    (r"(?s)<Matrix \d+x\d+\s*(.*)>", r"[\1]"),  # Blender
+    (r"(?s)\A([^<]*)<Matrix \d+x\d+\s*(.*)>", r"\1[\2]"),  # Blender
     (r"(?m)^[ \t]*(?:\[,\d+\][ \t]*)+\n|^\[\d+,\]", ""),  # R
     (r"\\(?:left|right)\s*\\?[][().{}|]|\\(?:begin|end)\{\w+\}(?:\{[lcr]+\})?|[$]", " "),  # LaTeX
-    (r"\s*\\\\\s*", "\n"),
-    (r"\s*&\s*", " "),
+    (r"(?<!\s)\s*+\\\\\s*+", "\n"),
+    (r"(?<!\s)\s*+&\s*+", " "),
     (r"[⎡⎢⎣⎤⎥⎦⎛⎜⎝⎞⎟⎠│┃┌┐└┘]", " "),  # brackets that SymPy and nalgebra draw
     (r"\b(?:Float|Integer)\('?([-+.\deE]+)'?(?:, precision=\d+)?\)", r"\1"),  # SymPy's srepr
     (r"(?<=[\d.])`+[\d.]*", ""),  # Mathematica's precision
     (r"(?<=[\d.])\*\^", "e"),  # and its power of ten
     (_SCALAR, r"\1"),
 )
-_DECORATED = r"""[\x1b\\⎡⎢⎣⎤⎥⎦⎛⎜⎝⎞⎟⎠│┃┌┐└┘`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w*[(: ]|(?m:^\s*se3|so3)"""
+_DECORATED = r"""[\x1b\\⎡⎢⎣⎤⎥⎦⎛⎜⎝⎞⎟⎠│┃┌┐└┘`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w{,60}[(: ]|(?m:^[ \t]*se3|so3)"""
 
 
 def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
@@ -69,7 +69,7 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
     body = re.sub(LABEL, "", body, count=1) if re.match(LABEL, body) else body
     scale = re.match(_SCALE, body)
     body = _side_by_side(body[scale.end() :] if scale else body)
-    if "..." in body and re.search(rf"{NUMBER}[\s,]*\.\.\.", body):
+    if "..." in body and re.search(r"[0-9]\.?[\s,]*+\.\.\.", body):
         raise ValueInvalid("the print was cut at '...'; print all numbers")
     pieces = _bracketed(body) if body[:1] and body[0] in _OPEN else re.split(r";|\n", body)
     if pieces is None:
@@ -157,7 +157,8 @@ _SCALAR_FIRST = rf"\s*({NUMBER})\s*(<<|<)\s*({NUMBER})\s*,\s*({NUMBER})\s*,\s*({
 _ONE_LINE = rf"\s*(?:\w+:\s*)?t\s*=\s*{_THREE}[;,]\s*(\S+)\s*=\s*(.*)"
 _ABOUT = rf"\((?:x=)?({NUMBER}),\s*(?:y=)?({NUMBER}),\s*(?:z=)?({NUMBER})\)"
 _EULER = rf"\s*(?:<Euler {_ABOUT}, order='([XYZ]{{3}})'>|Euler\({_ABOUT}, '([XYZ]{{3}})'\))\s*"
-_LISTS = r"\s*\w+\(\s*((?:(?:wxyz|xyzw|xyz)\s*=\s*(?:\w+\()?\[[^\[\]]*\](?:,\s*dtype=\w+)?\)?\s*,?\s*)+)\)\s*"
+_LISTED = r"(?:wxyz|xyzw|xyz)\s*+=\s*+(?:\w++\()?\[[^\[\]]*+\](?:,\s*+dtype=\w++)?\)?"
+_LISTS = rf"\s*+\w++\(\s*+((?:{_LISTED}\s*+(?:,\s*+)?)+)\)\s*"
 _TURNED = "R|rot|rotation|rotation_matrix"
 _MOVED = "t|p|T|trans|translation|tvec"
 _PART = re.compile(rf"(?:^|(?<=[\s(]))({_TURNED}|{_MOVED})\s*[=:]\s*(?=[\[(]|\n|np\.|array|Rot|{NUMBER})")
@@ -205,7 +206,7 @@ def _scalar_first(text: str) -> dict[str, Any] | None:
 def _members(text: str) -> dict[str, Any] | None:
     """Read `geometry_msgs.msg.Transform(translation=..Vector3(x=1.0, ..), ..)`, or `x=1.0, y=2.0` without a name."""
     text = re.sub(r"\A\s*<Quaternion \((.*)\)>\s*\Z", r"Quaternion(\1)", text)
-    if not re.match(rf"\s*(?:[A-Za-z_][\w.]*\()?{_MEMBERS}", text) or re.match(r"\s*\w+:[^,]*\n", text):
+    if not re.match(rf"\s*+(?:[A-Za-z_][\w.]*\()?{_MEMBERS}", text) or re.match(r"\s*\w+:[^,]*\n", text):
         return None
     words = re.findall(rf"[A-Za-z_][\w.]*|{NUMBER}|[=(),:]|\S", text.strip())
     stack: list[dict[str, Any]] = [{}]
@@ -277,7 +278,7 @@ def _parts(text: str) -> dict[str, Any] | None:
     ends = [*(label.start() for label in labels[1:]), len(text)]
     value: dict[str, Any] = {}
     for label, end in zip(labels, ends, strict=True):
-        rows = number_rows(re.sub(r"[,\s]+\Z", "", text[label.end() : end]))
+        rows = number_rows(re.sub(r"(?<![,\s])[,\s]++\Z", "", text[label.end() : end]))
         cells = [cell for row in rows or () for cell in row]
         is_turn = re.fullmatch(_TURNED, label[1]) is not None
         if rows is None or (len(cells), len(rows)) not in (((9, 3),) if is_turn else ((3, 1), (3, 3))):
@@ -288,7 +289,7 @@ def _parts(text: str) -> dict[str, Any] | None:
 
 def _origins(text: str) -> list[Any] | None:
     """Read the origins of joints: metres, rpy in radians; the links of one joint are its frames."""
-    plain = re.sub(r"(?s)<!--.*?-->", "", text)
+    plain = re.sub(r"(?s)<!--.*?(?:-->|\Z)", "", text)
     found = re.findall(r"<origin\b([^<>]*?)/?>", plain)
     if not found or re.match(r"\s*<(?!origin\b|joint\b)", plain):
         return None
@@ -303,7 +304,7 @@ def _origins(text: str) -> list[Any] | None:
 def _origin(attributes: str) -> dict[str, Any]:
     """Read the attributes of one origin."""
     value: dict[str, Any] = {"xyz": ["0"] * 3, "rpy": ["0"] * 3}
-    for name, _, numbers in re.findall(r"([\w:]+)\s*=\s*([\"'])(.*?)\2", attributes):
+    for name, _, numbers in re.findall(r"(?<![\w:])([\w:]++)\s*+=\s*+([\"'])(.*?)\2", attributes):
         if name not in value:
             raise ValueInvalid(f"unknown attribute {shown(name)} of an origin; it has xyz and rpy")
         value[name] = numbers.split()

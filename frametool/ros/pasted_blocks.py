@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
-_TRANSLATION = re.compile(rf"(?m)^\s*-\s+Translation:\s*{_LIST}")
-_TIME = re.compile(rf"(?m)^\s*At time ({NUMBER})")
+_TRANSLATION = re.compile(rf"(?m)^[ \t]*+-\s+Translation:\s*{_LIST}")
+_TIME = re.compile(rf"(?m)^[ \t]*+At time ({NUMBER})")
 _HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _ROTATIONS = (
     ("xyzw", re.compile(rf"in Quaternion(?: \(xyzw\))?\s*{_LIST}")),
@@ -43,19 +43,20 @@ _TRIPLE = rf"\[({NUMBER}(?:[ |]+{NUMBER}){{2}})\]"
 _GAZEBO = re.compile(rf"Pose \[ XYZ \(m\) \] \[ RPY \(rad\) \]:\s*{_TRIPLE}\s*{_TRIPLE}")
 _ARGS = re.compile(r"\bargs\s*[=:]\s*([\"'])(.*?)\1", re.DOTALL)
 _BEGIN = re.compile(
-    rf"""(?x)\s*(?:
-    (?:[A-Za-z_]\w*\s*=\s*)?                                # T =
-    (?: [A-Za-z_][\w.]*\(\s*[-+.\d\[({{A-Za-z_]             # array([[.., Quaternion(x=..
-      | [\[({{][\[({{\s]*(?:{NUMBER}|nan|-?inf)(?:[\s;`*]|\s*[,\])}}])   # [[1. 0., [1 0; 0 1], [0, 0, 0.7, 0.7]
-      | [\[({{][\[({{\s]*(?:np\.|array|Array|Float)
-      | {NUMBER}(?:\s*[,;\n<]|[ \t]+[-+.\d*]|\s*\Z)          # bare numbers, MATLAB's factor
-      | [-+]?\s*(?:{DECIMAL})?\s*\*?\s*[ijk]\s*(?:[-+]|\Z) | {NUMBER}\s*[-+]
+    rf"""(?x)\s*+(?:
+    (?:[A-Za-z_]\w*+\s*+=\s*+)?                               # T =
+    (?: [A-Za-z_][\w.]*+\(\s*+[-+.\d\[({{A-Za-z_]             # array([[.., Quaternion(x=..
+      | [\[({{][\[({{\s]*+(?:{NUMBER}|nan|-?inf)(?:[\s;`*]|[,\])}}])   # [[1. 0., [1 0; 0 1], [0, 0, 0.7, 0.7]
+      | [\[({{][\[({{\s]*+(?:np\.|array|Array|Float)
+      | {NUMBER}(?:[ \t\r]*+(?:[,;\n<]|\Z)|[ \t]++[-+.\d*])          # bare numbers, MATLAB's factor
+      | [-+]?\s*+(?:{DECIMAL}\s*+)?(?:\*\s*+)?[ijk]\s*+(?:[-+]|\Z) | {NUMBER}\s*+[-+]
       | \d+[\xd7x]\d+\b | Columns?\ \d | \[,\d | \\(?:left|begin)\b | [⎡⎢⎛│┃┌] | (?:se3|so3|quaternion)\s*\n )
-    | \x1b\[ | Out\[\d | Parameter\ containing: | (?:[A-Za-z_]\w*\s*)?<< | \(x,\s*y,\s*z,\s*w\)\s*= | (?:\w+:\s*)?t\s*=
-    | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=]\s*[\[(\n] | [xyzw]:\s*{NUMBER}\s*,
+    | \x1b\[ | Out\[\d | Parameter\ containing: | (?:[A-Za-z_]\w*\s*)?<< | \(x,\s*y,\s*z,\s*w\)\s*=
+    | (?:\w++:\s*+)?t\s*+= | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=]\s*[\[(\n]
+    | [xyzw]:\s*{NUMBER}\s*,
     | <(?:origin|joint|node|Matrix|Quaternion|Euler)\b | (?:args|x)\s*=
-    | (?:\[\w+\]\ .*\n\s*)*(?:At\ (?:any\ )?time\b|-\ +(?:Translation|Rotation):|\S+\ seen\ from\ )
-    | (?:Requesting\ state\ .*\s+)?(?:Model:\ \[|(?:-\ )?Pose\ \[\ XYZ)
+    | (?:\[\w++\]\ .*+\n\s*+)*+(?:At\ (?:any\ )?time\b|-\ ++(?:Translation|Rotation):|\S+\ seen\ from\ )
+    | (?:Requesting\ state\ .*+\s++)?(?:Model:\ \[|(?:-\ )?Pose\ \[\ XYZ)
     | .*\b{CALL}\s | --(?:[xyz]|roll|pitch|yaw|q[xyzw]|(?:child-)?frame-id)[ =]
     )"""
 )

@@ -170,7 +170,7 @@ class FormatConverter:
         """Return stamps, unless they only count and the other form has no place for them: they are not lost then."""
         rows = getattr(import_module(FORMATS[self.style.form].writer), "ROWS", None)
         counts = bool(form.counted) and self.stamps is None
-        return None if counts and rows is not None and "stamps" not in rows.holds else stamps_ns
+        return None if counts and "stamps" not in getattr(rows, "holds", ("stamps",)) else stamps_ns
 
     # --- columns of numbers ---
 

@@ -11,7 +11,7 @@ from functools import cached_property, partial
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import NOTHING, Node, parse_documents, parse_nodes, refuse_alias
+from frametool.documents.document import NOTHING, Aliased, Node, parse_documents, parse_nodes, refuse_alias
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
@@ -139,7 +139,10 @@ def results(
             yield from _values(NOTHING, unit, ours, request, style, spliced)
             continue
         nodes = nodes or parse_nodes(source.text)
-        yield from _values(_at(nodes, unit), unit, ours, request, style, spliced)
+        try:
+            yield from _values(_at(nodes, unit), unit, ours, request, style, spliced)
+        except Aliased as error:
+            raise error.in_text(source.text) from None
     if teller is None:
         own.end(source.name)
     if not documents:

@@ -21,12 +21,20 @@ MUCH = 1 << 20  # bytes of one unfinished value from which it is looked at only 
 _SEPARATOR = re.compile(rb"^(?:---|\ttotal count: ?\d+---)[ \t]*\r?\n", re.MULTILINE)  # the last: ros2's note of a loss
 _NO_DOCUMENT = re.compile(rb"(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|---)\s*)?")
 _LINE = re.compile(rb"[^\n]*\n|[^\n]+\Z")
-_SEVERAL = re.compile(rb"[}\]]\s*,?\s*[{\[]|\}\s*,?\s*[^\s,}\]]")
+_SEVERAL = re.compile(rb"[}\]]\s*+(?:,\s*+)?+[{\[]|\}\s*+(?:,\s*+)?+[^\s,}\]]")
 _AFTER = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
 _GAP = re.compile(rb"\s*(,?)\s*")
 _OPENING = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[")
 _WORD_AT_END = re.compile(r"[\w.+-]*\s*\Z")  # such as the 1e of 1e-05
-_NEXT = re.compile(rb"\n[ \t]*,?[ \t]*(?=[{\[])|\}[ \t]*,?[ \t]*(?=\{)")
+_LINE_OF_NEXT = re.compile(rb"\n([ \t]*+(?:,[ \t]*+)?+)[{\[]")
+_NEXT_ITEM = re.compile(rb"\}[ \t]*+(?:,[ \t]*+)?+(?=\{)|\n[ \t]*+(?:,[ \t]*+)?+(?=[{\[])")
+MOST_KEYS = 100  # first keys of broken records that stand nowhere else
+_FIRST_KEY = re.compile(rb"\{\s*+\"[^\"\n]*+\"")
+_TOKEN = re.compile(rb'"(?:[^"\\\n]|\\.)*+"?|[{}\[\]]')
+_WORD = re.compile(rb"[\]}]*+[^\[\]{}\n]*+")
+_ITEM = re.compile(rb"[\]}]*+[^\[\]{},\n]*+")
+_BEHIND_ITEM = re.compile(rb"\s*+[^\s\[]")
+_INSIDE = re.compile(rb"\]\s*+[,\]}]")  # a bracket that does not end the array, whatever went wrong before it
 
 
 class Part(NamedTuple):
@@ -71,15 +79,20 @@ class Splitter:
             return whole_lines(text) if self.layout else 0
         if MUCH < len(text) < 2 * self._looked:
             return 0
-        ended = [part for part in self._values(text, final=False).parts if self._has_ended(text, part)]
-        good = [part for part in ended if not part.problem]  # what goes wrong may go on behind the text
+        found = self._values(text, final=False).parts
+        ended = [part for part in found if self._has_ended(text, part)]
+        good = [part for part in ended if not part.problem]
         end = (good or ended)[-1].after if ended else 0
+        if ended and not good and self._values(text[:end], final=True).parts != found[: found.index(ended[-1]) + 1]:
+            end = 0  # where the last one ends is told by what follows
         self._looked = 0 if end else len(text)
         return end
 
     def _has_ended(self, text: bytes, part: Part) -> bool:
-        """Tell whether what goes with a record has come: behind it stands more, or its line has ended."""
-        return not part.outside and (self.layout == ARRAY or part.after < len(text) or text.endswith(b"\n"))
+        """Tell whether a text can be cut behind a record so that either piece means what it meant."""
+        if self.layout != ARRAY:
+            return part.after < len(text) or text.endswith(b"\n")
+        return bool(_BEHIND_ITEM.match(text, part.end))
 
     def _whole_documents(self, text: bytes) -> int:
         """Return the end of the last separator; what has been looked at is not looked at again."""
@@ -181,9 +194,10 @@ def _scanned(
     match: Callable[[int], int | None] | None,
     first: bool = True,
 ) -> Parts:
-    """Scan values from a place on; an unfinished one ends the scan, or is a part with a problem if it is final."""
+    """Scan values from a place on; one that may go on behind the text ends the scan, or is a part if it is final."""
     found: list[Part] = []
     text = data.decode("latin-1")  # keeps every offset; the syntax of JSON is ASCII
+    broken = _Broken(data, array=array, final=final)
     needs_comma = array and not first
     while True:
         gap = _GAP.match(data, at)
@@ -192,24 +206,31 @@ def _scanned(
             if comma and array and final:
                 found.append(Part(at, start - 1, start, start, "no record follows this comma"))
             return Parts(found)
-        if array and data[start : start + 1] == b"]":
+        opening = data[start : start + 1]
+        problem = "a comma is missing before this record" if needs_comma and not comma else ""
+        if array and opening == b"]" and not _INSIDE.match(data, start):
+            if not final:
+                return Parts(found)
             if comma:
                 found.append(Part(at, start, start, start, "no record follows this comma"))
             return Parts([*found, *_behind(data, start + 1)], closed=True)
-        problem: str | None = "a comma is missing before this record" if needs_comma and not comma else ""
-        if array and data[start : start + 1] == b",":
+        if array and opening == b",":
             found.append(Part(at, start, start, start, "no record stands between two commas"))
             at, needs_comma = start, False
             continue
         end = match(start) if match else None
         if end is None:
-            end, wrong = _value(text, start)
+            end, wrong = _value(text, start) if broken.closed.get(start) != 0 else (len(data), None)
             if wrong is None and not final:
                 return Parts(found)
             if wrong != "":
-                end = _end_of_broken(data, start, len(data) if wrong is None else end, array=array)
-                problem = wrong or "not JSON: it is cut off"
-        found.append(Part(at if array else start, start, end, end, problem or ""))
+                own = _own_indent(data, at, start, array=array, first=first and not found)
+                end = broken.end(start, end if wrong else len(data), own)
+                if not end:
+                    return Parts(found)
+                problem = _value(text[start:end], 0)[1] or ("" if opening in b"[{" else "not JSON: no value")
+                problem = problem or "not JSON: it is cut off"
+        found.append(Part(at if array else start, start, end, end, problem))
         at, needs_comma = end, array
 
 
@@ -221,20 +242,87 @@ def _behind(data: bytes, at: int) -> Iterator[Part]:
         yield Part(at, start, start + len(rest), len(data), "text behind the end of the array", outside=True)
 
 
-def _end_of_broken(data: bytes, start: int, wrong: int, *, array: bool) -> int:
-    """Return where a value that goes wrong ends: before the next line or object that begins, or at the end.
+def _own_indent(data: bytes, at: int, start: int, *, array: bool, first: bool) -> int:
+    """Return how far a value is indented that stands behind a place; -1 where it does not begin its line."""
+    line = data.rfind(b"\n", at, start)
+    if line >= 0 or first:
+        return start - line - 1 if line >= 0 else start - at + array
+    return -1 if array else 0
 
-    A line that begins as the value's own first line does is the next value, even if it could be a part of this one.
-    """
-    line = data.rfind(b"\n", start, wrong + 1)
-    indent = re.escape(data[data.rfind(b"\n", 0, start) + 1 : start])
-    following = re.compile(rb"\n" + indent + rb"(?=[{\[])").search(data, start, wrong + 1)
-    following = following or _NEXT.search(data, wrong if line < 0 else line)
-    end = len(data) if following is None else following.start() + data.startswith(b"}", following.start())
-    body = data[start:end].rstrip(b" \t\r\n,")
-    if array and following is None and body.endswith(b"]") and body.count(b"]") > body.count(b"["):
-        body = body[:-1].rstrip()
-    return start + max(len(body), 1)
+
+class _Broken:
+    """Where values that go wrong end in a text; keeps what was found for the next of them."""
+
+    def __init__(self, data: bytes, *, array: bool, final: bool) -> None:
+        """Take a text, and whether nothing comes behind it."""
+        self.data = data
+        self.array = array
+        self.final = final
+        self.closed: dict[int, int] = {}  # behind which place a bracket is closed: 0 for one of the other kind, or none
+        self.single: set[bytes] = set()  # keys that do not come again
+
+    def end(self, start: int, wrong: int, own: int) -> int:
+        """Return where a value ends; 0 where what decides it may be behind the text.
+
+        It ends before a line that begins with a bracket and is not indented deeper, even if that could be a part of
+        it, or where its brackets are closed, else before what begins as it does, or the next object, or at the end.
+        """
+        data = self.data
+        if data[start : start + 1] not in (b"{", b"["):
+            word = (_ITEM if self.array else _WORD).match(data, start)
+            end = word.end() if word else start
+            return 0 if end == len(data) and not self.final else max(start + len(data[start:end].rstrip()), start + 1)
+        lines = _LINE_OF_NEXT.finditer(data, start) if own >= 0 else ()
+        limit = next((line.start() for line in lines if len(line[1]) <= own), None)
+        last = len(data) if limit is None else limit
+        if start not in self.closed:
+            self._close(start, last, settled=limit is None and self.final)
+        if 0 < self.closed.get(start, 0) <= last:
+            return self.closed[start]
+        if limit is None and not self.final and start not in self.closed:
+            return 0
+        end = self._alike(start, last, own)
+        if end < 0 and limit is None:
+            if not self.final:
+                return 0
+            line = data.rfind(b"\n", start, wrong + 1)
+            items = _NEXT_ITEM.finditer(data, wrong if line < 0 else line)
+            found = next((each for each in items if own < 0 or each[0][0] != 10), None)
+            end = last if found is None else found.start() + (found[0][0] != 10)
+        elif end < 0:
+            end = last
+        body = data[start:end].rstrip(b" \t\r\n,")
+        if self.array and end == len(data) and body.endswith(b"]") and body.count(b"]") > body.count(b"["):
+            body = body[:-1].rstrip()
+        return start + max(len(body), 1)
+
+    def _close(self, start: int, last: int, *, settled: bool) -> None:
+        """Note where each bracket from a place on is closed, up to the one there."""
+        opened: list[int] = []
+        for token in _TOKEN.finditer(self.data, start, last):
+            if token[0] in (b"{", b"["):
+                opened.append(token.start())
+            elif token[0] in (b"}", b"]"):
+                if self.data[opened[-1]] + 2 != ord(token[0]):
+                    settled = True
+                    break
+                self.closed[opened.pop()] = token.end()
+                if not opened:
+                    return
+        if settled:
+            self.closed.update(dict.fromkeys(opened, 0))
+
+    def _alike(self, start: int, last: int, own: int) -> int:
+        """Return where an object begins with the first key of one; -1 if none does."""
+        key = _FIRST_KEY.match(self.data, start)
+        if key is None or key[0] in self.single or len(self.single) > MOST_KEYS:
+            return -1
+        at = self.data.find(key[0], start + 1, last)
+        while own >= 0 and at > 0 and not self.data[self.data.rfind(b"\n", start, at) + 1 : at].strip(b" \t,"):
+            at = self.data.find(key[0], at + 1, last)  # deeper in the lines of its own
+        if at < 0 and last == len(self.data):
+            self.single.add(key[0])
+        return at
 
 
 def _documents(text: bytes) -> Iterator[Part]:

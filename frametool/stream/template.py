@@ -11,7 +11,7 @@ from functools import cached_property
 from itertools import accumulate, islice
 from typing import TYPE_CHECKING
 
-from frametool.documents.document import Document, Node, parse_documents, parse_nodes
+from frametool.documents.document import Aliased, Document, Node, parse_documents, parse_nodes
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
@@ -302,7 +302,12 @@ def learn(text: str, request: Request, *, json: bool, source: str, line: int) ->
     if not entries:
         return None
     root = Node(0, len(text), parse_nodes(text))
-    return Template(text, entries, root, edits_of(text, entries, root, request, json=json), request, notes, json=json)
+    try:
+        edits = edits_of(text, entries, root, request, json=json)
+        return Template(text, entries, root, edits, request, notes, json=json)
+    except Aliased as error:
+        error.in_text(text).line += line - 1
+        raise
 
 
 def nulled(text: str, *, json: bool) -> str | None:
