@@ -31,7 +31,7 @@ from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
@@ -115,19 +115,21 @@ def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
     return int(word)
 
 
-def type_in(form: str, part: str, codes: Mapping[str, Code], column: OutColumn, taken: str = "") -> Code:
-    """Return how a format calls the type of a column; raises ValueInvalid for what it cannot hold.
+def misfit_of(codes: Collection[str], column: OutColumn, taken: Collection[str] = ()) -> str:
+    """Say why a format has no place for a column, "" where it has one.
 
-    part: what it calls a column; codes: what it calls the types of numpy, without their byte order
-    taken: a name that has a meaning
+    codes: the types that it has as numpy calls them, without their byte order; taken: names that have a meaning
     """
-    name = shown(column.name)
-    if column.kind is None:
-        raise ValueInvalid(f"{form} holds numbers; column {name} of texts has no place in it")
-    if column.kind.str[1:] not in codes:
-        raise ValueInvalid(f"{form} has no type for {column.kind}, that of column {name}")
-    if column.name.split() != [column.name] or column.name == taken:
-        raise ValueInvalid(f"{name} cannot be the name of a {part} of {form}: one word without blanks")
+    if column.kind is None or column.kind.str[1:] not in codes:
+        return f"it has no type for {column.kind}" if column.kind is not None else "it holds numbers"
+    one_word = column.name.split() == [column.name] and column.name not in taken
+    return "" if one_word else "a name is one word without blanks" + f", and not {' or '.join(taken)}" * bool(taken)
+
+
+def type_in(form: str, codes: Mapping[str, Code], column: OutColumn, taken: Collection[str] = ()) -> Code:
+    """Return how a format calls the type of a column; raises ValueInvalid for what it cannot hold."""
+    if (reason := misfit_of(codes, column, taken)) or column.kind is None:
+        raise ValueInvalid(f"column {shown(column.name)} has no place in {form}: {reason}")
     return codes[column.kind.str[1:]]
 
 

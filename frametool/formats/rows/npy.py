@@ -152,10 +152,10 @@ def _writer(
 
 def _record_type(columns: Sequence[OutColumn], given: Kind) -> Kind:
     """Return the type of the records of an output; that of the input, padding included, if its fields stay."""
-    text = np.dtype(f"U{LONGEST_TEXT}")
+    made = [column.kind or np.dtype(f"U{column.longest or LONGEST_TEXT}") for column in columns]
     fields = [
-        (column.name or f"{at}", (column.kind or text) if column.passed is None else given[column.passed])
-        for at, column in enumerate(columns)
+        (column.name or f"{at}", kind if column.passed is None else given[column.passed])
+        for at, (column, kind) in enumerate(zip(columns, made, strict=True))
     ]
     same = given.names is not None and fields == [(name, given[name]) for name in given.names]
     return given if same else np.dtype(fields)

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
-from frametool.formats.rows.clouds import LONGEST_HEAD, CloudFile, TextRows, count_in, same_columns, type_in
+from frametool.formats.rows.clouds import LONGEST_HEAD, CloudFile, TextRows, count_in, misfit_of, same_columns, type_in
 from frametool.formats.rows.column_file import (
     CountedWriter,
     StructuredBatch,
@@ -403,7 +403,12 @@ class PcdFile(CloudFile):
 
 def _new_field(column: OutColumn) -> PcdField:
     """Return the field of a column; raises ValueInvalid for what PCD cannot hold."""
-    return PcdField(column.name, *type_in("pcd", "field", CODES, column, taken=PADDING), 1)
+    return PcdField(column.name, *type_in("pcd", CODES, column, PADDING), 1)
+
+
+def misfit(column: OutColumn) -> str:
+    """Say why PCD has no place for a column, "" where it has one."""
+    return misfit_of(CODES, column, PADDING)
 
 
 def open_columns(file: InputFile, _options: Options) -> PcdFile:

@@ -26,7 +26,16 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
-from frametool.formats.rows.clouds import LONGEST_HEAD, NORMALS, CloudFile, TextRows, count_in, same_columns, type_in
+from frametool.formats.rows.clouds import (
+    LONGEST_HEAD,
+    NORMALS,
+    CloudFile,
+    TextRows,
+    count_in,
+    misfit_of,
+    same_columns,
+    type_in,
+)
 from frametool.formats.rows.column_file import (
     CountedWriter,
     bytes_left,
@@ -368,11 +377,16 @@ def _check_lists(before: Sequence[PlyElement], vertex: PlyElement, order: str, s
 
 def _type_of(column: OutColumn) -> str:
     """Return the type of a column as PLY calls it; raises ValueInvalid for what PLY cannot hold."""
-    return type_in("ply", "property", NEW_NAMES if column.passed is None else NAMES, column)
+    return type_in("ply", NEW_NAMES if column.passed is None else NAMES, column)
 
 
 def _property_line(column: OutColumn) -> bytes:
     return f"property {_type_of(column)} {column.name}".encode()
+
+
+def misfit(column: OutColumn) -> str:
+    """Say why PLY has no place for a column, "" where it has one."""
+    return misfit_of(NEW_NAMES, column)
 
 
 def open_columns(file: InputFile, _options: Options) -> PlyFile:
