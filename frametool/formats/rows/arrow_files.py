@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow", b"\xff\xff\xff\xff": "arrows"}
 LARGEST = 3 << 26  # bytes of a group of rows that is held as a whole, four times in all: below 1 GB
 NEW_GROUP = 1 << 20  # rows of a group where the input has none
+HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory that writing a group may take: times its size, and bytes beside
 NULLS = True  # its columns have room for them
 AT_ONCE = 1 << 16  # rows of a batch: what is made of it stays near the cache
 
@@ -185,6 +186,7 @@ class GroupWriter:
     def _write_group(self) -> None:
         """Write what waits; a group whose rows were all left out is none."""
         table = self.pa.Table.from_batches(self.waiting, self.schema)
+        np.empty(HEADROOM * self.size + LEAST_ROOM, np.uint8)  # raises MemoryError, where pyarrow would end the process
         if self.writer is None:
             self.writer = self.begin()
         if self.count or (self.waiting and not self.read):

@@ -32,6 +32,7 @@ from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from typing import BinaryIO
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
@@ -106,6 +107,25 @@ class CloudFile(ColumnFile):
 def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
     """Tell whether the columns of an output are those of the input, each in its place."""
     return len(columns) == width and all(column.passed in (None, at) for at, column in enumerate(columns))
+
+
+def head_lines(
+    stream: BinaryIO, text: list[bytes], fail: Callable[[str], FormatError], last: str
+) -> Iterator[list[str]]:
+    """Yield the words of a header's lines, which are added to the text; raises FormatError where it never ends.
+
+    last: the line that ends it
+    """
+    size = sum(map(len, text))
+    while True:
+        text.append(line := stream.readline(LONGEST_HEAD))
+        size += len(line)
+        if not line:
+            raise fail(f"the header ends before its {last} line; is the file whole?")
+        if size > LONGEST_HEAD:
+            raise fail(f"no {last} line in the first megabyte; is it a header?")
+        if words := line.decode("latin-1").split():
+            yield words
 
 
 def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:

@@ -77,7 +77,9 @@ def _translated(name: str, what: str) -> Iterator[None]:
         yield
     except FrametoolError:
         raise
-    except Exception as error:  # noqa: BLE001 - a broken file makes the library raise anything, also MemoryError
+    except Exception as error:  # a broken file makes the library raise anything, also MemoryError
+        if isinstance(error, MemoryError) and what == REFUSED:
+            raise
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
         raise FormatError(what.format(said), source=name) from None
 
