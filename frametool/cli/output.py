@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
+    from frametool.stream.array_writer import ArrayWriter
+    from frametool.stream.writers import TextWriter
     from frametool.view.pictures import Picture
 
 BATCH = 256  # poses
@@ -96,12 +98,24 @@ class Output:
         """Yield the poses of a trajectory, or columns of numbers, block after block."""
         from frametool.stream.row_layout import POSE
         from frametool.stream.row_poses import block_of
-        from frametool.stream.writers import ArrayWriter, TextWriter
 
-        writer = (ArrayWriter if self._holds_arrays else TextWriter)(self.style, POSE)
-        while batch := list(islice(results, BLOCK)):
-            yield bytes(writer.of_block(block_of(batch)))
+        batch = list(islice(results, BLOCK))
+        placed = not (self._holds_arrays and all(each.pose.position is None for each in batch))
+        writer = self._writer(POSE, placed=placed)
+        while batch:
+            yield writer.of_block(block_of(batch, placed=placed))
+            batch = list(islice(results, BLOCK))
         yield from writer.end()
+
+    def _writer(self, kind: str, *, placed: bool = True) -> TextWriter | ArrayWriter:
+        """Return what writes blocks in the form."""
+        if self._holds_arrays:
+            from frametool.stream.array_writer import ArrayWriter
+
+            return ArrayWriter(self.style, kind, placed=placed)
+        from frametool.stream.writers import TextWriter
+
+        return TextWriter(self.style, kind)
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
@@ -109,9 +123,13 @@ class Output:
             self.poses(map(_as_pose, values))
             return
         found = list(values)
+        if self._holds_arrays:
+            found = [_as_point(each) for each in found]
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) == len(found):
             self.poses(poses)
+        elif poses and self._holds_arrays:
+            raise ValueInvalid(f"{self.style.form} holds things of one kind, found poses among others")
         else:
             self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
 
@@ -148,10 +166,10 @@ class Output:
             raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
         if self._holds_arrays:
             from frametool.stream.row_poses import block_of_points
-            from frametool.stream.writers import ArrayWriter
 
-            writer = ArrayWriter(self.style, next((kind for kind in ("point", "vector") if kind in found[0]), "point"))
-            self.pieces([bytes(writer.of_block(block_of_points(found))), *writer.end()])
+            kind, block = block_of_points(found)
+            writer = self._writer(kind)
+            self.pieces([writer.of_block(block), *writer.end()])
             return
         is_plain = all(any(isinstance(value, list) for value in each.values()) for each in found)
         text_module = "frametool.view.pose_text" if is_plain else FORMATS["yaml"].writer
@@ -192,6 +210,14 @@ class Output:
     def text(self, text: str) -> None:
         """Write text."""
         self.pieces([text])
+
+
+def _as_point(value: Result | dict[str, Any]) -> Result | dict[str, Any]:
+    """Take a result without a rotation for a point."""
+    if not isinstance(value, Result) or value.pose.rotation is not None or value.pose.position is None:
+        return value
+    named = {"name": value.pose.name, "frame": value.pose.parent, "point": list(value.pose.position)}
+    return {key: each for key, each in named.items() if each is not None} | value.extras
 
 
 def _as_pose(value: Result | dict[str, Any]) -> Result:

@@ -225,6 +225,7 @@ class Stream:
         if output.told is not None and request.gathered is None:
             into = import_module(FORMATS[output.told].writer)
         style = output.style.in_form(output.told or form)
+        request = request._replace(by_default=into is not module and not output.notations)
         outcomes = run_columns(opened, request, style, source=self.name, into=None if into is module else into)
         now = f", now in {request.result_frame}" if request.result_frame and request.operation.moves else ""
         return outcomes, lambda: now
@@ -239,6 +240,7 @@ class Stream:
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         self._jobs(f"rows become {target} one after the other")
+        request = request._replace(by_default=not output.notations)
         converted = FormatConverter(form, request, output.style.in_form(target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.options["header"])
         return outcomes, lambda: ", " * bool(converted.tally.about) + converted.tally.about
@@ -285,6 +287,7 @@ class Stream:
 
         self._jobs(f"records become {output.told} one after the other")
         bad = self.policy(self.name)
+        request = request._replace(by_default=holds_arrays(output.told or "") and not output.notations)
         output.values(stream_results(stream, form, request, output.style, bad))
         return ROWS_SKIPPED if bad.count else 0
 

@@ -432,12 +432,14 @@ FORMATS = {
     "npy": _arrays(
         "NPY of numpy: n x 3 points, n x 7 poses, records with fields",
         "frametool.formats.rows.npy",
+        texts=True,
         suffixes=(".npy",),
         signs=(("magic", rb"\x93NUMPY"),),
     ),
     "npz": _arrays(
         "NPZ of numpy, several arrays in a zip file",
         "frametool.formats.rows.npz",
+        texts=True,
         suffixes=(".npz",),
         signs=(("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
         asks=("array",),

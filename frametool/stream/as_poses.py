@@ -19,17 +19,19 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
+from frametool.stream.array_writer import ArrayWriter
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
-from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
+from frametool.stream.header import listed
+from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, chosen_poses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_samples import TABLE
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
-from frametool.stream.writers import ArrayWriter, TextWriter
+from frametool.stream.writers import TextWriter
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
@@ -68,7 +70,7 @@ class FormatConverter:
         self.style = style.in_form(style.form)
         self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
-        self.to_arrays = "arrays" in FORMATS[style.form].writes
+        self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.form].writes)), "points" in writes
         self.without = 0  # rows of an array that stand for no point or pose, and have no place in a text
 
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
@@ -103,7 +105,8 @@ class FormatConverter:
         operation = self.request.operation
         kind = operation.result_kind(self.shape.kind)
         extras = [self.request.prefix + name for name in operation.extras(self.shape.kind)]
-        if operation.only_adds or kind not in (POSE, POINT, VECTOR) or (extras and kind != POSE):
+        kinds = (POSE, POINT, VECTOR, *(SIX if self.to_arrays else ()))
+        if operation.only_adds or kind not in kinds or (extras and kind != POSE):
             raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
         writer = ArrayWriter if self.to_arrays else TextWriter
         return writer(self.style, kind, extras, placed=self.placed)
@@ -118,6 +121,16 @@ class FormatConverter:
             operation = operation._replace(before=HALF_TURN)
         return self.request._replace(operation=operation)
 
+    def _settle(self, shape: Shape, plan: Plan, columns: str, line: int = 0) -> None:
+        """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
+        self.placed = plan.targets[0].unit is not None
+        is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.poses)
+        has_none = is_bare and not plan.targets[0].notations
+        if (is_bare and self.request.operation.keeps_position and not has_none) or (has_none and not self.has_points):
+            message = f"no rotation among the columns {columns}: {self.style.form} is written of poses"
+            raise FormatError(message, source=self.source, line=line)
+        self.shape = shape._replace(kind=POINT) if has_none else shape
+
     # --- tables ---
 
     def _rows(self, stream: BufferedReader, *, header: bool) -> Iterator[Step]:
@@ -127,15 +140,7 @@ class FormatConverter:
         begun = begin_table(stream, self.form, request, source=self.source, header=header)
         request, unasked = settle_stamps(begun.table, request, self.source)
         rows = TablePoses(begun, self.form, request, self.source)
-        self.shape = rows.shape
-        bare = rows.shape.kind == POSE and rows.shape.notation is None and request.poses
-        if bare and request.operation.keeps_position:
-            raise FormatError(
-                f"no rotation among the columns {rows.columns}: {self.style.form} is written of poses",
-                source=self.source,
-                line=1,
-            )
-        self.placed = rows.plan.targets[0].unit is not None
+        self._settle(rows.shape, rows.plan, rows.columns, line=1)
         count = 0
         yield Step(_none(), Outcome(b"", lines=begun.lines, size=begun.taken))
         for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
@@ -180,9 +185,8 @@ class FormatConverter:
         opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
         rows = ColumnRows(opened, self._turned(TABLE), self.source)
         move_along(opened, self.request)
-        self.shape = rows.shape
-        self.placed = rows.plan.targets[0].unit is not None
-        yield Step(_none(), Outcome(b""))
+        self._settle(rows.shape, rows.plan, listed(rows.table.names or ("columns without names",)))
+        yield Step(rows.poses(opened.nothing()), Outcome(b""))
         for batch in opened.batches():
             poses = rows.poses(batch)
             if not self.to_arrays:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, ValueInvalid, listing, warn
+from frametool.errors import FormatError, warn
 from frametool.formats.rows import pcd
 from frametool.formats.rows.clouds import NORMALS
 from frametool.formats.rows.column_file import (
@@ -20,17 +20,19 @@ from frametool.formats.rows.column_file import (
     OutColumn,
     StructuredBatch,
     not_finite,
+    plain_value,
     rows_of_batch,
 )
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import in_nanoseconds, stamp_column
+from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused, RowNote
 from frametool.stream.header import XYZ
 from frametool.stream.layout import NAME, PARENT, Kept, New, quoted
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
-from frametool.stream.row_poses import RowPoses, spans_of, texts_of
+from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import Naming, Table, rename_of
@@ -375,10 +377,12 @@ def _chosen(block: Block, rows: Ints) -> Block:
 
 
 def _cells(column: Any, rows: Ints) -> Any:
-    """Return some of a column as it is, of texts as cells."""
-    if isinstance(column, np.ndarray) and column.dtype.kind not in "USO":
+    """Return some of a column as it is; what is no number, truth value or time of numpy as plain values."""
+    if not isinstance(column, np.ndarray):
+        return objects([column[row] for row in rows.tolist()])
+    if column.ndim == 1 and column.dtype.kind in "fiubM":
         return column[rows]
-    return spans_of([str(column[row]).encode() for row in rows.tolist()])
+    return objects(map(plain_value, column[rows].tolist()))
 
 
 def _either(first: Flags | None, second: Flags | None) -> Flags | None:
@@ -399,64 +403,44 @@ def run_columns(
         warn(f"{source}: {kinds} columns are computed as float64 and rounded once")
     drops = request.on_error == SKIP or request.operation.velocity
     writer: ColumnWriter | None = None
-    if into is not None:
-        writer = _InOtherForm(columns, into, style)
-    elif not request.gathered:
+    other = None if into is None else ColumnsWriter(style, into)
+    if other is None and not request.gathered:
         writer = file.rewriter(columns, style, drops=drops)
     for batch in file.batches():
         results = rows.of_batch(batch)
         text: Any = b""
-        if writer is not None:
+        if other is not None:
+            text = other.of_columns(len(results.numbers), _in_other_form(columns, rows, batch, results))
+        elif writer is not None:
             text = writer.of_rows(batch, results.rows, made_of(columns, rows, results))
         yield Outcome(
             text, rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read,
         )  # fmt: skip
         rows.mended = 0
-    if writer is not None:
-        yield from map(Outcome, writer.end())
+    if other is not None and not other.begun:
+        empty = file.nothing()
+        other.of_columns(0, _in_other_form(columns, rows, empty, rows.of_batch(empty)))
+    if (last := other or writer) is not None:
+        yield from map(Outcome, last.end())
 
 
-class _InOtherForm:
-    """Write columns into a file of another form, with their types; those that it has no place for are left out."""
-
-    def __init__(self, columns: Sequence[OutColumn], into: Any, style: Style) -> None:
-        """Choose the columns."""
-        has_texts = FORMATS[style.form].texts
-        self.columns = columns
-        self.kept = [column for column in columns if column.kind is not None or has_texts]
-        self.writer: ColumnWriter = into.create([column._replace(passed=None) for column in self.kept], None, style)
-        if len(self.kept) < len(columns):
-            left = listing(column.name for column in columns if column not in self.kept)
-            warn(f"{style.form}: {left} left out: it holds numbers")
-
-    def of_rows(self, batch: Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
-        """Return what is written of a batch."""
-        new = iter(made)
-        found = []
-        for column in self.columns:
-            if column.passed is None or batch is None:
-                found.append(next(new))
-                continue
-            given, nulls = batch.column(column.passed), None
-            if column.kind is not None and not isinstance(given, np.ndarray):
-                given, nulls = self._with_nulls(batch, column)
-            if rows is not None:
-                given, nulls = np.asarray(given)[rows], None if nulls is None else nulls[rows]
-            found.append(Made(given, nulls))
-        kept = [each for each, column in zip(found, self.columns, strict=True) if column in self.kept]
-        return self.writer.of_rows(None, None, kept)
-
-    def _with_nulls(self, batch: Batch, column: OutColumn) -> tuple[Floats, Flags | None]:
-        """Return numbers some of which are nulls, nan in their place; raises ValueInvalid where none can stand."""
-        if column.kind is None or column.kind.kind not in FLOATS:
-            name = f"column {column.name}"
-            raise ValueInvalid(f"{name} holds nulls, and {column.kind} has none; -f csv leaves them empty")
-        values, nulls = batch.numbers(column.passed or 0)
-        return values.astype(column.kind), nulls
-
-    def end(self) -> Iterator[bytes]:
-        """Return what comes behind the last batch."""
-        return self.writer.end()
+def _in_other_form(
+    columns: Sequence[OutColumn], rows: ColumnRows, batch: Batch, results: RowResults
+) -> dict[str, Made]:
+    """Return the columns of a batch by name, for a file of another form."""
+    new = iter(made_of(columns, rows, results))
+    chosen = np.arange(batch.size) if results.rows is None else results.rows
+    found = {}
+    for column in columns:
+        if column.passed is None:
+            made = next(new)
+            found[column.name] = made if isinstance(made.values, np.ndarray) else Made(objects(made.values))
+        elif column.kind is not None and column.kind.kind in FLOATS:
+            values, nulls = batch.numbers(column.passed)
+            found[column.name] = Made(values.astype(column.kind)[chosen], None if nulls is None else nulls[chosen])
+        else:
+            found[column.name] = Made(_cells(batch.column(column.passed), chosen))
+    return found
 
 
 def move_along(file: ColumnFile, request: Request) -> None:
@@ -513,6 +497,8 @@ class _GridOfForm:
         self.module: Any = import_module(FORMATS[form].writer)
         self.cloud = cloud
         self.pose = pose
+        if hasattr(self.module, "misfit"):
+            self.misfit = self.module.misfit
 
     def create(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
         """Return what writes the points."""

@@ -241,6 +241,7 @@ class Request(NamedTuple):
     given: the notation of their rotations
     degrees: whether bare angles are in degrees
     notations: those of the result; none means as read
+    by_default: nobody asked for these notations, so that what has no rotation gets none
     columns: which columns are ours, one entry a pose
     keep, prefix: results stand beside what they come from, under other names
     frames: columns that name a row's frame
@@ -264,6 +265,7 @@ class Request(NamedTuple):
     degrees: bool = False
     normalize: bool = False
     notations: tuple[Notation, ...] = ()
+    by_default: bool = False
     keep_sign: bool = False
     precision: int | None = None
     columns: tuple[str, ...] = ()
@@ -302,7 +304,8 @@ class Request(NamedTuple):
         placed = there or self.shifts
         unit = 1.0 if self.all_numbers and (self.notations or shape.notation is None) else shape.unit or 1.0
         if self.notations or shape.notation is None:
-            notations = self.notations or (() if self._only_turns_around else (notation("quaternion"),))
+            stays = shape.notation is None and self._only_turns_around and (self.by_default or not self.notations)
+            notations = () if stays else self.notations or (notation("quaternion"),)
             whole = there and len(notations) == 1 and notations[0].representation.whole is not None
             written = tuple((each, self.in_degrees(each)) for each in notations)
             return Target(unit if placed and not whole else None, written, self.keep_sign, whole)
@@ -334,7 +337,7 @@ class Request(NamedTuple):
         """Tell whether things without a rotation have none afterwards."""
         operation = self.operation
         bare = operation.left is None and not operation.right and not operation.of and operation.formula is None
-        return bare and not self.by_row
+        return (bare or operation.turns) and not self.by_row
 
     def for_kind(self, kind: str) -> Request:
         """Return what is asked of rows of one kind: how an expression names its result depends on it."""

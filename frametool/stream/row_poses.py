@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from frametool.documents.json import JSON_NUMBER
+from frametool.documents.json import JSON_NUMBER, dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
-from frametool.formats.rows.pose_rows import IMAGE
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -21,6 +20,7 @@ from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import Fault
 from frametool.stream.header import listed
 from frametool.stream.layout import NAMED
+from frametool.stream.record import PARTS
 from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
@@ -32,7 +32,7 @@ from frametool.text.spans import MARGIN, Spans, framed
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -50,7 +50,7 @@ class RowPoses(NamedTuple):
     stamps_ns: (n,) or None where rows have none
     lines: (n,) from 0
     parents, names: one a row, one for all, or none
-    extras: columns that are not ours, by name: cells of text, or numbers as they are
+    extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
     given: the frames that the rows of the input are given in
     """
 
@@ -193,59 +193,83 @@ def cells_at(cells: Cells, rows: slice | Ints) -> Cells:
     return Spans(cells.data, cells.starts[rows], cells.ends[rows]) if isinstance(cells, Spans) else cells[rows]
 
 
-def block_of(results: Sequence[Result]) -> RowPoses:
-    """Return results as a block of poses; raises ValueInvalid for one without a rotation."""
+def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
+    """Return results as a block of poses; raises ValueInvalid for one without a rotation.
+
+    placed: they have positions
+    """
     if any(result.pose.rotation is None for result in results):
         raise ValueInvalid("a trajectory holds poses; a point has no rotation")
-    stamps = [result.extras.get("stamp_ns") for result in results]
-    others = {name for result in results for name in result.extras} - {"stamp_ns"}
-    images = [str(result.extras.get(IMAGE, "")).encode() for result in results]
-    blank = [b""] * len(results)
-    names = {(result.pose.parent, result.pose.name) for result in results}
-    parent, name = next(iter(names))
-    return RowPoses(
-        np.array([result.pose.components for result in results]),
-        None if None in stamps else np.array(stamps, np.int64),
-        np.arange(len(results)),
-        [parent],
-        [name],
-        {each: spans_of(images if each == IMAGE else blank) for each in sorted(others)},
-    )
+    poses = [result.pose for result in results]
+    numbers = np.array([pose.components[0 if placed else 3 :] for pose in poses])
+    parents, names = [pose.parent for pose in poses], [pose.name for pose in poses]
+    return _block(numbers, parents, names, [result.extras for result in results])
 
 
-def block_of_points(records: Sequence[dict[str, Any]]) -> RowPoses:
-    """Return mappings of points or vectors as a block; raises ValueInvalid for what is neither."""
-    kind = next((kind for kind in ("point", "vector") if records and kind in records[0]), "point")
-    rows = [_coordinates(record, kind) for record in records]
-    others = list(dict.fromkeys(key for record in records for key in record if key not in (kind, "frame", *"xyz")))
-    return RowPoses(
-        np.array(rows, np.float64).reshape(-1, 3),
-        None,
-        np.arange(len(rows)),
-        [record.get("frame") for record in records],
-        [None],
-        {each: spans_of([_cell(record.get(each)) for record in records]) for each in others},
-    )
+def block_of_points(records: Sequence[Mapping[str, Any]]) -> tuple[str, RowPoses]:
+    """Return mappings of points, vectors, twists or wrenches as a block, and what they are.
+
+    Raises ValueInvalid for what is none of them, or several of them.
+    """
+    found = [_components(record) for record in records]
+    kinds = sorted({kind for kind, _, _ in found})
+    if len(kinds) > 1:
+        raise ValueInvalid(f"columns hold things of one kind, found {' and '.join(kinds)}")
+    numbers = np.array([numbers for _, _, numbers in found], np.float64)
+    rest = [
+        {key: value for key, value in record.items() if key not in used}
+        for record, (_, used, _) in zip(records, found, strict=True)
+    ]
+    return kinds[0], _block(numbers, [record.get("frame") for record in records], [None], rest)
 
 
-def _coordinates(record: dict[str, Any], kind: str) -> list[float]:
-    """Return the three numbers of a point, as a list, as a mapping, or under x, y, z."""
-    given = record.get(kind, record)
-    numbers = given if isinstance(given, list) else [given.get(name) for name in "xyz"] if given else []
-    if len(numbers) != 3 or not all(isinstance(number, float) for number in numbers):
+def _components(record: Mapping[str, Any]) -> tuple[str, tuple[str, ...], list[float]]:
+    """Return what a mapping is, the keys that say so, and its numbers: lists, mappings, or under x, y, z."""
+    choices = (("point",), ("vector",), ("xyz",), *PARTS.values())
+    keys = next((keys for keys in choices if set(keys) <= record.keys()), tuple("xyz"))
+    kind = next((kind for kind, parts in PARTS.items() if parts == keys), "vector" if "vector" in keys else "point")
+    numbers: list[Any] = []
+    for key in keys:
+        value = record.get(key)
+        numbers += value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+    if len(numbers) != (6 if kind in PARTS else 3) or not all(isinstance(number, float) for number in numbers):
         raise ValueInvalid(f"columns hold points or poses, found {', '.join(record)}")
-    return numbers
+    return kind, (*keys, "frame"), numbers
 
 
-def _cell(value: Any) -> bytes:
-    return b"" if value is None else str(value).encode()
+def _block(
+    numbers: Floats, parents: list[str | None], names: list[str | None], others: Sequence[Mapping[str, Any]]
+) -> RowPoses:
+    """Return results as a block, with what else each of them says."""
+    stamps = [other.get("stamp_ns") for other in others]
+    is_stamped = bool(stamps) and all(type(stamp) is int for stamp in stamps)
+    used = {"stamp_ns"} if is_stamped else set[str]()
+    keys = dict.fromkeys(key for other in others for key in other if key not in used)
+    parents, names = (each[:1] if len(set(each)) == 1 else each for each in (parents, names))
+    return RowPoses(
+        numbers, np.array(stamps, np.int64) if is_stamped else None, np.arange(len(numbers)), parents, names,
+        {key: objects([other.get(key) for other in others]) for key in keys},
+    )  # fmt: skip
+
+
+def objects(values: Iterable[Any]) -> NDArray[Any]:
+    """Return plain values as a column (n,): texts, None, mappings and lists; numbers and truth values as written."""
+    found = [Verbatim(_written(value)) if isinstance(value, (int, float)) else value for value in values]
+    column = np.empty(len(found), object)
+    for at, value in enumerate(found):
+        column[at] = value
+    return column
+
+
+def _written(value: float) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
     """Return a block as results, one a pose."""
     size = len(block.numbers)
     names, parents = (each if len(each) == size else list(each) * size for each in (block.names, block.parents))
-    others = {name: [plain_cell(text) for text in texts_of(spans)] for name, spans in block.extras.items()}
+    others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
     for at, numbers in enumerate(block.numbers.tolist()):
@@ -263,7 +287,7 @@ def points_of(block: RowPoses, kind: str) -> list[dict[str, Any]]:
     """Return a block of points or vectors as mappings, one each."""
     size = len(block.numbers)
     frames = block.parents if len(block.parents) == size else list(block.parents) * size
-    others = {name: [plain_cell(text) for text in texts_of(cells)] for name, cells in block.extras.items()}
+    others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
     for at, numbers in enumerate(block.numbers.tolist()):
@@ -281,10 +305,9 @@ def spans_of(texts: list[bytes]) -> Spans:
 
 
 def texts_of(cells: Cells) -> list[str]:
-    """Return the text of each cell, without its quotes; of numbers the shortest that reads back."""
-    if not isinstance(cells, Spans) and cells.ndim > 1:  # several values a row
-        flat, width = texts_of(cells.reshape(-1)), cells[0].size if len(cells) else 1
-        return [f"[{', '.join(flat[at : at + width])}]" for at in range(0, len(flat), width)]
+    """Return the text of each cell, without its quotes; of numbers the shortest that reads back, of lists JSON."""
+    if not isinstance(cells, Spans) and cells.dtype == object:
+        return [text_of(value) for value in cells.tolist()]
     if not isinstance(cells, Spans) and cells.dtype.kind != "f":
         texts: list[str] = cells.astype(np.str_).tolist()
         return [text.lower() for text in texts] if cells.dtype.kind == "b" else texts
@@ -301,6 +324,18 @@ def float_spans(values: NDArray[Any]) -> Spans:
     doubles = values.astype(np.float64) if values.dtype.itemsize > 4 else rounded_to_single(values.astype(np.float64))
     spans = shortest_spans(doubles.reshape(-1, 1), b",")
     return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
+
+
+def text_of(value: Any) -> str:
+    """Return a plain value as a text, "" for none."""
+    return "" if value is None else dump(value) if isinstance(value, (dict, list)) else str(value)
+
+
+def plain_cells(cells: Cells) -> list[Any]:
+    """Return cells as plain values."""
+    if not isinstance(cells, Spans) and cells.dtype == object:
+        return list(cells)
+    return [plain_cell(text) for text in texts_of(cells)]
 
 
 def plain_cell(text: str) -> str | Verbatim | None:

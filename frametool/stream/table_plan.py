@@ -116,6 +116,8 @@ def _by_width(width: int, given: Notation | None) -> str:
 
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
     """Leave the position to pass as it is where only the rotation is rewritten."""
+    if pose.rotation is None and request.by_default:
+        return pose
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.given is None else ""
         raise FormatError(
@@ -202,12 +204,14 @@ def _columns(
     position, rotation, extras = _new_columns(poses, target, request, shapes[0].kind if shapes else POSE)
     ours = [columns for pose in poses for columns in pose if columns is not None]
     columns: list[Column] = [Kept(place) for place in range(table.width)]
+    only_turned = request.operation.changes_nothing and not request.operation.moves
+    if only_turned and request.by_default and not (request.all_numbers or target.notations or request.keep):
+        return columns
     if request.keep or request.operation.only_adds or not ours:
         return [*columns, *position, *rotation, *extras]
     if rename_of(request) is not None:
         for place, role in named.items():
             columns[place] = Named(place, role)
-    only_turned = request.operation.changes_nothing and not request.operation.moves
     at: dict[int, list[Column]] = {place: [] for each in ours for place in each.places}
     pose = poses[0]
     if _in_place(pose, shapes[0], target, request):

@@ -1,4 +1,4 @@
-"""Poses, points and vectors in blocks to any form that writes them: as text, or as columns of numbers.
+"""Poses, points and vectors in blocks to any form of text that writes them.
 
 What a row of text looks like is said by the form (`ROWS`), or learned from what it writes for one; where neither can
 be, the form writes row after row as it writes single results.  Other columns go along where they have a place.
@@ -15,8 +15,7 @@ import numpy as np
 
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
-from frametool.errors import ValueInvalid, listing, warn
-from frametool.formats.rows.column_file import STAMP_NS, Made, OutColumn, not_finite
+from frametool.errors import ValueInvalid, warn
 from frametool.formats.rows.pose_rows import (
     IMAGE,
     NUMBER,
@@ -35,21 +34,28 @@ from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.header import XYZ
-from frametool.stream.row_layout import POSE, Target
-from frametool.stream.row_poses import block_of, first_of, plain_cell, points_of, results_of, spans_of, texts_of
+from frametool.stream.row_layout import POSE, SIX, Target
+from frametool.stream.row_poses import (
+    block_of,
+    first_of,
+    plain_cell,
+    plain_cells,
+    points_of,
+    results_of,
+    spans_of,
+    texts_of,
+)
 from frametool.stream.rows import number_spans
 from frametool.text.csv_line import quoted
-from frametool.text.parse import parse_floats
 from frametool.text.spans import MARGIN, Spans, framed, join
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.formats.rows.column_file import ColumnWriter
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.stream.row_poses import RowPoses
-    from frametool.text.spans import Flags, Floats
+    from frametool.text.spans import Floats
 
 LEARNED = ("csv", "json", "yaml")
 PROBE_NS = 1234567890987654321
@@ -61,7 +67,7 @@ MARK = "@@{}@@"
 def target_in(style: Style, kind: str, *, placed: bool) -> Target:
     """Say which numbers of a result of some kind are written in a style; placed: whether poses have a position."""
     if kind != POSE:
-        return Target(1.0, ())
+        return Target(None, (), plain=True) if kind in SIX else Target(1.0, ())
     forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
     whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
     return Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
@@ -93,10 +99,12 @@ class TextWriter:
         self.rows: RowForm | None = None
         self.order: list[int] = []
         self.first: Any = None
+        self.empty: RowPoses | None = None  # a block without rows says what columns there are
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return the text of a block of poses; numbers are metres and x y z w."""
         if not len(block.numbers):
+            self.empty = block
             return b""
         text = self._fixed(self.fixed, block) if self.fixed else self._free(block)
         self.dropped |= self.style.form not in LEARNED and bool(self.extras or block.extras)
@@ -108,6 +116,9 @@ class TextWriter:
         if self.fixed is None or self.dropped_fields is None:
             if self.dropped:
                 warn(f"{self.style.form}: other columns left out")
+            if self.style.form == "csv" and not self.count and self.empty is not None:
+                self._learn(self.empty)
+                yield self.rows.head if self.rows is not None else b""
             return
         self.dropped_fields.tell()
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
@@ -188,6 +199,8 @@ class TextWriter:
         if what in ("name", "parent"):
             texts: Sequence[str | None] = block.names if what == "name" else block.parents
             texts = list(texts) * (len(block.numbers) if len(texts) == 1 else 1)
+        elif self.style.form != "csv" and not isinstance(cells := list(block.extras.values())[int(what)], Spans):
+            return spans_of([dump(value).encode() for value in plain_cells(cells)])
         else:
             texts = texts_of(list(block.extras.values())[int(what)])
         write: Callable[[str | None], bytes] = _csv_cell if self.style.form == "csv" else _json_cell
@@ -323,105 +336,3 @@ def _csv_cell(text: str | None) -> bytes:
 
 def _json_cell(text: str | None) -> bytes:
     return dump(plain_cell(text or "")).encode()
-
-
-DOUBLE = np.dtype(np.float64)
-
-
-class ArrayWriter:
-    """Write blocks of poses, points or vectors one after the other; `end` yields what comes behind the last.
-
-    The columns are those of the first block: frames where it has names, stamps, numbers, and what is not ours.
-    """
-
-    def __init__(self, style: Style, kind: str, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Choose the form; kind: pose, point or vector; extras: the numbers beside each; placed: it has a position."""
-        self.style = style
-        self.kind = kind
-        self.extras = tuple(extras)
-        self.module: Any = import_module(FORMATS[style.form].writer)
-        self.has_texts = FORMATS[style.form].texts
-        self.target = target_in(style, kind, placed=placed)
-        self.placed = placed
-        self.columns: list[OutColumn] = []
-        self.left_out: list[str] = []
-        self.writer: ColumnWriter | None = None
-
-    def of_block(self, block: RowPoses) -> bytes | memoryview:
-        """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
-        if not len(block.numbers):
-            return b""
-        made = self._made(block)
-        if self.writer is None:
-            self._begin(made)
-        assert self.writer is not None  # noqa: S101 - for the types
-        return self.writer.of_rows(None, None, [made[column.name] for column in self.columns])
-
-    def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last block."""
-        if self.writer is None:
-            self._begin({name: Made(np.empty(0)) for name in self._numbers()})
-        assert self.writer is not None  # noqa: S101 - for the types
-        yield from self.writer.end()
-        if self.left_out:
-            warn(f"{self.style.form}: {listing(self.left_out)} left out: it holds numbers")
-
-    def _begin(self, made: dict[str, Made]) -> None:
-        """Choose the columns."""
-        for name, each in made.items():
-            kind = each.values.dtype if isinstance(each.values, np.ndarray) else None
-            if kind is not None or self.has_texts:
-                self.columns.append(OutColumn(name, kind))
-            else:
-                self.left_out.append(name)
-        self.writer = self.module.create(self.columns, None, self.style)
-
-    def _numbers(self) -> list[str]:
-        """Name the numbers of a result."""
-        position = list(XYZ) if self.target.unit is not None else []
-        return [*position, *self.target.names, *self.extras]
-
-    def _made(self, block: RowPoses) -> dict[str, Made]:
-        """Return the columns of a block by name."""
-        size = len(block.numbers)
-        made: dict[str, Made] = {}
-        names = (("name", block.names), ("parent", block.parents)) if self.kind == POSE else (("frame", block.parents),)
-        for name, given in names:
-            if any(given):
-                made[name] = Made([each or "" for each in given] * (1 if len(given) == size else size))
-        for name, column in zip(self._numbers(), self._written(block), strict=True):
-            made[name] = Made(column, not_finite(column))
-        if block.stamps_ns is not None:
-            made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS))
-        for name, cells in block.extras.items():
-            made.setdefault(name, self._extra(name, cells))
-        return made
-
-    def _written(self, block: RowPoses) -> list[Any]:
-        """Return the numbers of the results in the notations that are written."""
-        columns = [np.ascontiguousarray(column) for column in block.numbers.T]
-        if self.kind == POSE and not self.placed:
-            columns = [columns[0] * 0.0] * 3 + columns
-        own = 7 if self.kind == POSE else 3
-        with np.errstate(invalid="ignore"):
-            return [*self.target.numbers(tuple(columns[:own]), arrays), *columns[own:]]
-
-    def _extra(self, name: str, cells: Any) -> Made:
-        """Return a column that is not ours: as it is, or of cells as numbers if all of the first block are."""
-        if not isinstance(cells, Spans):
-            return Made(cells)
-        if self.has_texts:  # it types them by itself
-            return Made(texts_of(cells))
-        known = next((column.kind for column in self.columns if column.name == name), DOUBLE)
-        if name in self.left_out or known is None:
-            return Made(texts_of(cells))
-        numbers, bad = parse_floats(cells)
-        empty = cells.starts == cells.ends
-        absent: Flags | None = empty if empty.any() else None
-        if set(bad.tolist()) <= set(np.flatnonzero(empty).tolist()):
-            numbers[empty] = np.nan
-            return Made(numbers, absent)
-        if self.writer is not None:
-            text = texts_of(Spans(cells.data, cells.starts[bad[:1]], cells.ends[bad[:1]]))[0]
-            raise ValueInvalid(f"column {name}: {text!r} is no number as those before; write csv, or drop the column")
-        return Made(texts_of(cells))

@@ -57,7 +57,7 @@ class ConvertCommand(Command):
 @click.option(
     "--tolerance", type=Number(), default=1e-6, metavar="RAD", help="how near --find wants it  [default: 1e-06]"
 )
-@pose_result_options("poses")
+@pose_result_options("poses", "points")
 @explain_options
 @click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
 @pose_stream_options
@@ -83,10 +83,10 @@ def command(
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, what another tool printed (help pose), a file, or - for
-    standard input, also with several poses; without any argument standard input is read.
+    standard input, which is read without any argument too.
     """
     values = rejoined(values)
-    task = PoseTask(options)
+    task = PoseTask(options, "poses", "points")
     stream, output = task.stream, task.output
     if task.derives:
         task.plan()

@@ -6,13 +6,16 @@ Loads pyarrow, the extra `arrow`, where it is asked for; nothing else does.  Kno
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frametool.documents.json import dump
+from frametool.documents.source import Verbatim
 from frametool.errors import FileProblem, ValueInvalid, shown
-from frametool.formats.rows.column_file import FLOATS, WHOLE, Batch, ColumnNumbers
+from frametool.formats.rows.column_file import FLOATS, WHOLE, Batch, ColumnNumbers, plain_value
 from frametool.frames.stamps import BILLION
 from frametool.text.parse import FURTHEST, nanoseconds_of
 
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 NUMBERS: dict[str, Kind] = {"double": np.dtype("f8"), "float": np.dtype("f4"), "halffloat": np.dtype("f2")}
 NUMBERS |= {f"{sign}int{bits}": np.dtype(f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)}
 NO_TIME = "no time: null"
+STRUCTURED = ("bool", "decimal", "list", "large_list", "fixed_size_list", "struct", "map")  # no texts
+IS_JSON = {b"ARROW:extension:name": b"arrow.json", b"ARROW:extension:metadata": b""}  # of a column of JSON texts
 
 
 def require_pyarrow(what: str, part: str = "") -> Any:
@@ -120,55 +125,32 @@ class ArrowBatch(Batch):
 
     def texts(self, place: int) -> list[str]:
         """Return a column as texts, "" for null; what is nested as JSON, bytes that are not UTF-8 as \\xff."""
-        column = self.rows.column(place)
+        values = ["" if value is None else value for value in self.values(place)]
+        return [value if isinstance(value, str) else dump(value) for value in values]
+
+    def values(self, place: int) -> list[Any]:
+        """Return a column as plain values: numbers, texts, None, and what is nested, as a whole or as JSON."""
+        column, field = self.rows.column(place), self.rows.schema.field(place)
+        kind = str(column.type)
+        if "arrow.json" in kind or (field.metadata or {}).get(b"ARROW:extension:name") == b"arrow.json":
+            return [_of_json(text) for text in column.to_pylist()]
         pa = require_pyarrow("an Arrow column")
-        if "binary" in str(column.type):
-            return [(data or b"").decode("utf-8", "backslashreplace") for data in column.to_pylist()]
-        try:
-            return [text or "" for text in column.cast(pa.string()).to_pylist()]
-        except (pa.ArrowInvalid, pa.ArrowNotImplementedError, pa.ArrowTypeError):
-            return ["" if value is None else json.dumps(value, default=str) for value in column.to_pylist()]
+        if kind_of(column.type) is None and not kind.startswith(STRUCTURED):
+            with suppress(pa.ArrowInvalid, pa.ArrowNotImplementedError, pa.ArrowTypeError):
+                column = column.cast(pa.string())
+        return list(map(plain_value, column.to_pylist()))
 
     def column(self, place: int) -> Any:
-        """Return a column as it is: numbers and truth values without a null as an array, else texts."""
+        """Return a column as it is: numbers and truth values without a null as an array, else plain values."""
         column = self.rows.column(place)
         if column.null_count or (kind_of(column.type) is None and str(column.type) != "bool"):
-            return self.texts(place)
+            return self.values(place)
         return column.to_numpy(zero_copy_only=False)
 
 
-# --- cells of text as columns: of a type only if each is written as a number of it is, 007 and +5 stay text ---
-
-WHOLE_NUMBER = r"^-?(0|[1-9][0-9]{0,18})$"
-NUMBER = r"^-?(0|[1-9][0-9]{0,14})(\.[0-9]+)?([eE][-+]?[0-9]+)?$"  # longer whole numbers would lose digits
-PATTERNS = {"int64": WHOLE_NUMBER, "double": NUMBER}
-
-
-def type_of(texts: Any) -> Any:
-    """Return the type of a column's cells, null where they are empty; of none at all, string."""
-    pa = require_pyarrow("Arrow")
-    fits = (name for name in PATTERNS if texts.null_count < len(texts) and _misfit(texts, name) is None)
-    return pa.type_for_alias(next(fits, "string"))
-
-
-def typed(texts: Any, kind: Any, name: str) -> Any:
-    """Return cells in a type; raises ValueInvalid for one that is not written so."""
-    if str(kind) not in PATTERNS:
-        return texts
-    if (text := _misfit(texts, str(kind))) is not None:
-        found = f"column {shown(name)}: {shown(text)} is no {kind}, as all cells of the first million rows are"
-        raise ValueInvalid(f"{found}; -f csv keeps it as it is")
-    return texts.cast(kind)
-
-
-def _misfit(texts: Any, kind: str) -> str | None:
-    """Return the first cell that is not written as a number of a type is; None if all are."""
-    pa, compute = require_pyarrow("Arrow"), require_pyarrow("Arrow", "compute")
-    wrong = texts.filter(compute.invert(compute.match_substring_regex(texts, PATTERNS[kind])))
-    if len(wrong):
-        return str(in_one(wrong)[0].as_py())
+def _of_json(text: str | None) -> Any:
+    """Read a text of JSON, numbers as they are written; one that is none stays a text."""
     try:
-        texts.cast(kind)
-    except pa.ArrowInvalid:  # beyond 64 bits
-        return max((text or "" for text in in_one(texts).to_pylist()), key=len)
-    return None
+        return text and json.loads(text, parse_float=Verbatim, parse_int=Verbatim)
+    except (ValueError, RecursionError):
+        return text

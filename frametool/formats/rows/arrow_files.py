@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, printable, shown, warn
-from frametool.formats.rows.arrow import ArrowBatch, kind_of, require_pyarrow, type_of, typed
+from frametool.formats.rows.arrow import IS_JSON, ArrowBatch, kind_of, require_pyarrow
 from frametool.formats.rows.column_file import Collected, ColumnFile, seekable
 
 if TYPE_CHECKING:
@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow", b"\xff\xff\xff\xff": "arrows"}
 LARGEST = 3 << 26  # bytes of a group of rows that is held as a whole, four times in all: below 1 GB
 NEW_GROUP = 1 << 20  # rows of a group where the input has none
-FRAMES = ("frame", "name", "parent")  # columns of names that we make, whatever they look like
-ROWS = 1 << 16  # a batch: what is made of it stays near the cache
+HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory that writing a group may take: times its size, and bytes beside
+NULLS = True  # its columns have room for them
+AT_ONCE = 1 << 16  # rows of a batch: what is made of it stays near the cache
 
 
 @contextmanager
@@ -107,10 +108,7 @@ class ArrowFile(ColumnFile):
 
 
 class GroupWriter:
-    """Collect rows until a group is whole; a form says how a file begins and how a group is written.
-
-    Texts from elsewhere get the types that the cells of the first group have.
-    """
+    """Collect rows until a group is whole; a form says how a file begins and how a group is written."""
 
     def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
         """Take the columns of the result, the schema of the input if it has one, and how that was encoded."""
@@ -121,9 +119,7 @@ class GroupWriter:
         self.sink = Collected()
         self.file = self.pa.PythonFile(self.sink, mode="w")
         fields = [self._field(column, given) for column in columns]
-        self.schema = self.untyped_schema = self.pa.schema(fields, metadata=None if given is None else given.metadata)
-        texts = [column.name for column in columns if column.kind is None and column.name not in FRAMES]
-        self.untyped = texts if given is None else []
+        self.schema = self.pa.schema(fields, metadata=None if given is None else given.metadata)
         self.writer: Any = None
         self.waiting: list[Any] = []
         self.size = self.count = self.read = 0
@@ -162,25 +158,25 @@ class GroupWriter:
             if replaced:
                 return given.field(replaced[0])
         kind = self.pa.string() if column.kind is None else self.pa.from_numpy_dtype(column.kind)
-        return self.pa.field(column.name, kind)
+        return self.pa.field(column.name, kind, metadata=IS_JSON if column.is_json else None)
 
     def _rows(self, batch: ArrowBatch | None, rows: Ints | None, made: Sequence[Made]) -> Any:
         """Return some rows of a batch as a RecordBatch, with what is made for them."""
         new = iter(made)
         arrays = []
-        for column, field in zip(self.columns, self.untyped_schema, strict=True):
+        for column, field in zip(self.columns, self.schema, strict=True):
             if column.passed is None or batch is None:
                 arrays.append(self._made(next(new), field))
             else:
                 passed = batch.rows.column(column.passed)
                 arrays.append(passed if rows is None else passed.take(self.pa.array(rows)))
-        return self.pa.RecordBatch.from_arrays(arrays, schema=self.untyped_schema)
+        return self.pa.RecordBatch.from_arrays(arrays, schema=self.schema)
 
     def _made(self, made: Made, field: Any) -> Any:
         """Return what is made as a column; raises ValueInvalid for a null that the schema does not allow."""
         if made.absent is not None and not field.nullable and made.absent.any():
             raise ValueInvalid(f"column {field.name} is declared not to hold nulls, and a row becomes null there")
-        if isinstance(made.values, np.ndarray) and made.values.dtype.kind not in "USO":
+        if isinstance(made.values, np.ndarray):
             return self.pa.array(made.values, type=field.type, mask=made.absent)
         texts = self.pa.array([text or None for text in made.values], self.pa.string())
         if self.pa.types.is_dictionary(field.type):
@@ -189,28 +185,13 @@ class GroupWriter:
 
     def _write_group(self) -> None:
         """Write what waits; a group whose rows were all left out is none."""
-        table = self.pa.Table.from_batches(self.waiting, self.untyped_schema)
-        begins = self.writer is None
-        if self.untyped:
-            table = self._typed(table, begins=begins)
-        if begins:
+        table = self.pa.Table.from_batches(self.waiting, self.schema)
+        np.empty(HEADROOM * self.size + LEAST_ROOM, np.uint8)  # raises MemoryError, where pyarrow would end the process
+        if self.writer is None:
             self.writer = self.begin()
         if self.count or (self.waiting and not self.read):
             self.write(table)
         self.waiting, self.size, self.count, self.read = [], 0, 0, 0
-
-    def _typed(self, table: Any, *, begins: bool) -> Any:
-        """Return a group whose texts have their types, which the first one settles."""
-        for name in self.untyped:
-            at = self.schema.get_field_index(name)
-            if begins:
-                self.schema = self.schema.set(at, self.pa.field(name, type_of(table.column(at))))
-            made = typed(table.column(at), self.schema.field(at).type, name)
-            table = table.set_column(at, self.schema.field(at), made)
-        if begins:
-            types = ", ".join(f"{name} {self.schema.field(name).type}" for name in self.untyped)
-            warn(f"types of other columns, by their cells: {types}")
-        return table
 
 
 # --- Arrow IPC: batches as a file with a directory at its end (Feather), or as a stream that begins at once ---
@@ -251,9 +232,9 @@ class IpcFile(ArrowFile):
     def read(self) -> Iterator[ArrowBatch]:
         """Yield the rows; raises FormatError where the file is broken."""
         for rows in self.guarded(self._records()):
-            for start in range(0, max(rows.num_rows, 1), ROWS):
-                part = rows.slice(start, ROWS)
-                yield ArrowBatch(part, part.nbytes, ends_group=start + ROWS >= rows.num_rows)
+            for start in range(0, max(rows.num_rows, 1), AT_ONCE):
+                part = rows.slice(start, AT_ONCE)
+                yield ArrowBatch(part, part.nbytes, ends_group=start + AT_ONCE >= rows.num_rows)
             del rows, part  # before the next are read
 
 
@@ -365,9 +346,9 @@ class ParquetFile(ArrowFile):
         share = packed / max(left, 1)
         if table is not None:
             empty = require_pyarrow("Arrow").RecordBatch.from_pylist([], schema=self.schema)
-            parts = iter(table.to_batches(max_chunksize=ROWS) or [empty])
+            parts = iter(table.to_batches(max_chunksize=AT_ONCE) or [empty])
         else:
-            parts = self.guarded(self._rows_of(group, ROWS))
+            parts = self.guarded(self._rows_of(group, AT_ONCE))
             if not self.warned:
                 warn(f"{self.name}: groups of rows beyond {LARGEST >> 20} MiB are written in parts")
             self.warned = True

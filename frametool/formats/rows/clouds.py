@@ -31,7 +31,8 @@ from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from typing import BinaryIO
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
@@ -108,6 +109,25 @@ def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
     return len(columns) == width and all(column.passed in (None, at) for at, column in enumerate(columns))
 
 
+def head_lines(
+    stream: BinaryIO, text: list[bytes], fail: Callable[[str], FormatError], last: str
+) -> Iterator[list[str]]:
+    """Yield the words of a header's lines, which are added to the text; raises FormatError where it never ends.
+
+    last: the line that ends it
+    """
+    size = sum(map(len, text))
+    while True:
+        text.append(line := stream.readline(LONGEST_HEAD))
+        size += len(line)
+        if not line:
+            raise fail(f"the header ends before its {last} line; is the file whole?")
+        if size > LONGEST_HEAD:
+            raise fail(f"no {last} line in the first megabyte; is it a header?")
+        if words := line.decode("latin-1").split():
+            yield words
+
+
 def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
     """Read how many there are of something, which an error calls `what`; raises FormatError."""
     if not (word.isascii() and word.isdecimal()) or len(word) > 19 or int(word) > _MOST_POINTS:
@@ -115,19 +135,21 @@ def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
     return int(word)
 
 
-def type_in(form: str, part: str, codes: Mapping[str, Code], column: OutColumn, taken: str = "") -> Code:
-    """Return how a format calls the type of a column; raises ValueInvalid for what it cannot hold.
+def misfit_of(codes: Collection[str], column: OutColumn, taken: Collection[str] = ()) -> str:
+    """Say why a format has no place for a column, "" where it has one.
 
-    part: what it calls a column; codes: what it calls the types of numpy, without their byte order
-    taken: a name that has a meaning
+    codes: the types that it has as numpy calls them, without their byte order; taken: names that have a meaning
     """
-    name = shown(column.name)
-    if column.kind is None:
-        raise ValueInvalid(f"{form} holds numbers; column {name} of texts has no place in it")
-    if column.kind.str[1:] not in codes:
-        raise ValueInvalid(f"{form} has no type for {column.kind}, that of column {name}")
-    if column.name.split() != [column.name] or column.name == taken:
-        raise ValueInvalid(f"{name} cannot be the name of a {part} of {form}: one word without blanks")
+    if column.kind is None or column.kind.str[1:] not in codes:
+        return f"it has no type for {column.kind}" if column.kind is not None else "it holds numbers"
+    one_word = column.name.split() == [column.name] and column.name not in taken
+    return "" if one_word else "a name is one word without blanks" + f", and not {' or '.join(taken)}" * bool(taken)
+
+
+def type_in(form: str, codes: Mapping[str, Code], column: OutColumn, taken: Collection[str] = ()) -> Code:
+    """Return how a format calls the type of a column; raises ValueInvalid for what it cannot hold."""
+    if (reason := misfit_of(codes, column, taken)) or column.kind is None:
+        raise ValueInvalid(f"column {shown(column.name)} has no place in {form}: {reason}")
     return codes[column.kind.str[1:]]
 
 

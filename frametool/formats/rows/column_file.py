@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import stat
+from decimal import Decimal
 from functools import partial
 from shutil import copyfileobj
 from tempfile import TemporaryFile
@@ -19,6 +20,7 @@ from weakref import finalize
 
 import numpy as np
 
+from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.frames.stamps import BILLION
 from frametool.text.parse import FURTHEST, nanoseconds_of
@@ -58,11 +60,14 @@ class OutColumn(NamedTuple):
     name: "" where columns have no names
     kind: the type of its numbers; None for texts
     passed: the place of the column of the input that passes as it is; None for what is made
+    longest: how many characters a text has at most, where that is known; is_json: whether texts are JSON
     """
 
     name: str
     kind: Kind | None
     passed: int | None = None
+    longest: int = 0
+    is_json: bool = False
 
 
 class Made(NamedTuple):
@@ -110,8 +115,7 @@ class Batch(Protocol):
 
     def texts(self, place: int) -> Sequence[str]:
         """Return a column as texts, "" for none."""
-        cells = self.column(place).tolist()
-        return [text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text) for text in cells]
+        return [str(plain_value(value)) for value in self.column(place).tolist()]
 
 
 class ColumnWriter(Protocol):
@@ -156,6 +160,10 @@ class ColumnFile(Protocol):
     def batches(self) -> Iterator[Batch]:
         """Yield the rows; raises FormatError where the file ends too early."""
 
+    def nothing(self) -> Batch:
+        """Return a batch of no rows."""
+        return StructuredBatch(np.zeros(0, record_of(kind or "U1" for kind in self.kinds)))
+
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Return what writes a file of the same form, with what the columns do not hold as it was.
 
@@ -186,6 +194,19 @@ def record_of(kinds: Iterable[Any]) -> Kind:
 def is_number(kind: Kind | None) -> bool:
     """Tell whether a column of this kind holds numbers."""
     return kind is not None and kind.kind in FLOATS + WHOLE
+
+
+def plain_value(value: Any) -> Any:
+    """Return a value of a library as JSON has it: what it has no word for as text."""
+    if isinstance(value, dict):
+        return {str(key): plain_value(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain_value(each) for each in value]
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "backslashreplace")
+    if isinstance(value, Decimal) and value.is_finite():
+        return Verbatim(f"{value:f}")
+    return value if value is None or isinstance(value, (str, int, float)) else str(value)
 
 
 def not_finite(values: Floats) -> Flags | None:
@@ -341,7 +362,7 @@ def encode_records(
     for name, column in zip(kind.names or (), columns, strict=True):
         if column.passed is None:
             values = next(new).values
-            if column.kind is None:
+            if records.dtype[name].kind == "U":
                 _check_lengths(values, records.dtype[name], column.name)
             records[name] = values
         elif given is not None and records is not given.rows:

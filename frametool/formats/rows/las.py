@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown, warn
+from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, warn
 from frametool.formats.rows.column_file import (
     MOST_ROWS,
     XYZ,
@@ -44,6 +44,8 @@ LIMITS = np.iinfo(np.int32)
 NEW_SCALE = 0.001  # metres, of a file that is made
 COLOURS = {"red", "green", "blue"}
 LAZ = "laz"
+EXTRA = {f"{letter}{size}" for letter in "iu" for size in (1, 2, 4, 8)} | {"f4", "f8"}  # types of other dimensions
+LONGEST_NAME = 32
 PACKED_AT, PACKED = 104, b"\x80"  # the byte that says so, and from which value on
 
 
@@ -75,7 +77,9 @@ def _translated(name: str, what: str) -> Iterator[None]:
         yield
     except FrametoolError:
         raise
-    except Exception as error:  # noqa: BLE001 - a broken file makes the library raise anything, also MemoryError
+    except Exception as error:  # a broken file makes the library raise anything, also MemoryError
+        if isinstance(error, MemoryError) and what == REFUSED:
+            raise
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
         raise FormatError(what.format(said), source=name) from None
 
@@ -205,6 +209,10 @@ class LasWriter:
                 points.array[name.upper()] = self._stored(values, XYZ.index(name))
             else:
                 points[name] = values
+                same = np.asarray(points[name]) == values
+                if not same.all():
+                    value = values[int(np.argmin(same))]
+                    raise FormatError(f"{name} {value:g}: las holds small whole numbers there", source=self.name)
         return points
 
     def _stored(self, values: Floats, axis: int) -> Ints:
@@ -241,6 +249,14 @@ def open_columns(file: InputFile, _options: Options) -> LasFile:
     return LasFile(file)
 
 
+def misfit(column: OutColumn) -> str:
+    """Say why LAS has no place for a column, "" where it has one."""
+    if column.name in STORED or len(column.name.encode()) > LONGEST_NAME:
+        return f"its names have at most {LONGEST_NAME} bytes, and {', '.join(STORED)} have a meaning"
+    kind = None if column.kind is None else column.kind.str[1:]
+    return "" if kind in EXTRA else f"it has no type for {column.kind}"
+
+
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> LasWriter:
     """Return what writes points made elsewhere: LAS 1.4, what is no dimension of it as extra bytes."""
     laspy = _laspy(style.form)
@@ -251,9 +267,7 @@ def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> La
     header.scales = np.full(3, NEW_SCALE)
     known = set(header.point_format.dimension_names)
     for column in columns:
-        if column.kind is None:
-            raise ValueInvalid(f"las holds numbers; column {shown(column.name)} of texts has no place in it")
-        if column.name not in known and column.name not in XYZ:
+        if column.kind is not None and column.name not in known and column.name not in XYZ:
             with _translated(style.form, REFUSED):
                 header.add_extra_dim(laspy.ExtraBytesParams(name=column.name, type=column.kind.newbyteorder("<")))
     return LasWriter(header, columns, packed=style.form == LAZ)

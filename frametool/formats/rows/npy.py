@@ -21,6 +21,7 @@ from frametool.formats.rows.column_file import (
     ColumnFile,
     CountedWriter,
     StructuredBatch,
+    check_declared,
     encode_records,
     is_number,
     record_batches,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 MAGIC = b"\x93NUMPY"
 MOST_HEADER = 1 << 20
+MOST_COLUMNS, MOST_BYTES = 1 << 16, 1 << 24  # of a row
 LONGEST_TEXT = 64  # characters of a name that is made; numpy has a fixed size for them
 ALIGNED = 64  # bytes, as numpy pads its headers
 
@@ -67,7 +69,7 @@ def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
         by_columns = bool(found["fortran_order"])
         if type(shape) is not tuple or any(type(each) is not int or each < 0 for each in shape):
             raise ValueError(shape)
-    except (ValueError, SyntaxError, KeyError, TypeError, MemoryError, RecursionError):
+    except (ValueError, SyntaxError, KeyError, TypeError, MemoryError, RecursionError, OverflowError):
         raise wrong(f"the header cannot be read: {shown(text)}") from None
     if kind.hasobject:
         raise wrong("it holds Python objects, which are never unpickled; save plain numbers")
@@ -94,10 +96,16 @@ class NpyFile(ColumnFile):
         if kind.names is None:
             if not is_number(kind):
                 raise FormatError(f"it holds {kind}; wanted are numbers, or fields", source=file.name)
-            self.record = record_of([kind] * prod(self.shape[1:]))
+            columns = prod(self.shape[1:])
+            if columns > MOST_COLUMNS:
+                raise FormatError(f"it has {columns} columns; at most {MOST_COLUMNS} are read", source=file.name)
+            self.record = record_of([kind] * columns)
+        if self.record.itemsize > MOST_BYTES:
+            raise FormatError(f"a row of {self.record.itemsize} bytes; at most {MOST_BYTES} are read", source=file.name)
         self.width = len(self.record.names or ())
         kinds = [self.record[place] for place in range(self.width)]
         self.kinds = [kind if is_number(kind) else None for kind in kinds]
+        check_declared(file, self.count, self.record.itemsize, "rows", last=True)
 
     def batches(self) -> Iterator[Batch]:
         """Yield the rows; raises FormatError where the file ends too early."""
@@ -152,10 +160,10 @@ def _writer(
 
 def _record_type(columns: Sequence[OutColumn], given: Kind) -> Kind:
     """Return the type of the records of an output; that of the input, padding included, if its fields stay."""
-    text = np.dtype(f"U{LONGEST_TEXT}")
+    made = [column.kind or np.dtype(f"U{column.longest or LONGEST_TEXT}") for column in columns]
     fields = [
-        (column.name or f"{at}", (column.kind or text) if column.passed is None else given[column.passed])
-        for at, column in enumerate(columns)
+        (column.name or f"{at}", kind if column.passed is None else given[column.passed])
+        for at, (column, kind) in enumerate(zip(columns, made, strict=True))
     ]
     same = given.names is not None and fields == [(name, given[name]) for name in given.names]
     return given if same else np.dtype(fields)

@@ -57,6 +57,8 @@ class NpzFile(npy.NpyFile):
     def _chosen(self, wanted: str) -> ZipInfo:
         """Return the array that was named, or the only one that fits."""
         arrays = {each.filename.removesuffix(SUFFIX): each for each in self.members if each.filename.endswith(SUFFIX)}
+        if len({each.filename for each in self.members}) < len(self.members):
+            raise FormatError("two arrays of one name; which is meant is not known", source=self.name)
         if wanted and wanted not in arrays:
             message = f"--array {shown(wanted)}: there is none{alternatives(wanted, arrays, 'arrays')}"
             raise BadAnswer(message, source=self.name)

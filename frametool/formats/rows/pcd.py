@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
-from frametool.formats.rows.clouds import LONGEST_HEAD, CloudFile, TextRows, count_in, same_columns, type_in
+from frametool.formats.rows.clouds import CloudFile, TextRows, count_in, head_lines, misfit_of, same_columns, type_in
 from frametool.formats.rows.column_file import (
     CountedWriter,
     StructuredBatch,
@@ -122,7 +122,6 @@ class PcdHead:
     def __init__(self, stream: BinaryIO, source: str) -> None:
         """Read a header and leave the stream behind it; raises FormatError that says line, value and remedy."""
         self.source = source
-        self.text = b""
         self.words: dict[str, list[str]] = {}
         self.lines: dict[str, int] = {}
         self._read(stream)
@@ -143,26 +142,22 @@ class PcdHead:
 
     def _read(self, stream: BinaryIO) -> None:
         """Read up to the line of DATA."""
-        number = 0
-        while "DATA" not in self.lines:
-            line = stream.readline(LONGEST_HEAD)
-            number += 1
-            self.text += line
-            words = line.decode("latin-1").split()
-            problem = ""
-            if not line:
-                problem = "the header ends before its DATA line; is the file whole?"
-            elif len(self.text) > LONGEST_HEAD:
-                problem = "no DATA line in the first megabyte: this is no PCD file"
-            elif not words or line.startswith(b"#"):
+        text: list[bytes] = []
+
+        def fail(message: str) -> FormatError:
+            return FormatError(message, source=self.source, line=len(text))
+
+        for words in head_lines(stream, text, fail, "DATA"):
+            if words[0].startswith("#"):
                 continue
-            elif (key := words[0].upper()) not in _KEYS:
-                problem = f"{shown(words[0])} is no key of a PCD header; keys: {listing(_KEYS)}"
-            elif (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
-                problem = f"{key} stands twice, first on line {self.lines[key]}"
-            if problem:
-                raise FormatError(problem, source=self.source, line=number)
-            self.lines[key], self.words[key] = number, words[1:]
+            if (key := words[0].upper()) not in _KEYS:
+                raise fail(f"{shown(words[0])} is no key of a PCD header; keys: {listing(_KEYS)}")
+            if (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
+                raise fail(f"{key} stands twice, first on line {self.lines[key]}")
+            self.lines[key], self.words[key] = len(text), words[1:]
+            if key == "DATA":
+                break
+        self.text = b"".join(text)
 
     def problem(self, key: str, message: str) -> FormatError:
         """Return the error for a line."""
@@ -403,7 +398,12 @@ class PcdFile(CloudFile):
 
 def _new_field(column: OutColumn) -> PcdField:
     """Return the field of a column; raises ValueInvalid for what PCD cannot hold."""
-    return PcdField(column.name, *type_in("pcd", "field", CODES, column, taken=PADDING), 1)
+    return PcdField(column.name, *type_in("pcd", CODES, column, PADDING), 1)
+
+
+def misfit(column: OutColumn) -> str:
+    """Say why PCD has no place for a column, "" where it has one."""
+    return misfit_of(CODES, column, PADDING)
 
 
 def open_columns(file: InputFile, _options: Options) -> PcdFile:

@@ -26,7 +26,16 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
-from frametool.formats.rows.clouds import LONGEST_HEAD, NORMALS, CloudFile, TextRows, count_in, same_columns, type_in
+from frametool.formats.rows.clouds import (
+    NORMALS,
+    CloudFile,
+    TextRows,
+    count_in,
+    head_lines,
+    misfit_of,
+    same_columns,
+    type_in,
+)
 from frametool.formats.rows.column_file import (
     CountedWriter,
     bytes_left,
@@ -68,18 +77,18 @@ class PlyElement(NamedTuple):
     """One element of a file.
 
     instances: how many there are; line: where it stands in the header
-    properties: the name of each, the type of a value, and of a list the type of what counts it, else ""
+    properties: by name the type of a value, and of a list the type of what counts it, else ""
     """
 
     name: str
     instances: int
     line: int
-    properties: tuple[tuple[str, str, str], ...] = ()
+    properties: dict[str, tuple[str, str]]
 
     @property
     def lists(self) -> list[str]:
         """Name the properties that are lists, whose size is not known beforehand."""
-        return [name for name, _, counted in self.properties if counted]
+        return [name for name, (_, counted) in self.properties.items() if counted]
 
     @property
     def size(self) -> int:
@@ -89,29 +98,20 @@ class PlyElement(NamedTuple):
     @property
     def sizes(self) -> list[tuple[int, int, bool]]:
         """Return the bytes of a value of each property, those of what counts a list (0: none does), and its sign."""
-        return [(int(code[1:]), int(counted[1:] or 0), counted[:1] == "i") for _, code, counted in self.properties]
+        codes = self.properties.values()
+        return [(int(code[1:]), int(counted[1:] or 0), counted[:1] == "i") for code, counted in codes]
 
 
 def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElement]]:
-    """Return a header byte for byte, the order of the numbers as numpy writes it, "" for text, and the elements.
-
-    Leaves the stream behind it; raises FormatError that says line, value and remedy.
-    """
-    text = stream.readline(64)
-    if text.rstrip(b"\r\n") != b"ply" or not text.endswith(b"\n"):
+    """Read a header and leave the stream behind it; raises FormatError that says line, value and remedy."""
+    if (first := stream.readline(64)).strip() != b"ply" or not first.endswith(b"\n"):
         raise FormatError("the first line of a PLY file is `ply`, and it ends in a line feed", source=source, line=1)
-    form, elements, number = "", list[PlyElement](), 1
+    form, elements, text = "", dict[str, PlyElement](), [first]
 
     def fail(message: str) -> FormatError:
-        return FormatError(message, source=source, line=number)
+        return FormatError(message, source=source, line=len(text))
 
-    while True:
-        line = stream.readline(LONGEST_HEAD)
-        number += 1
-        text += line
-        if not line or len(text) > LONGEST_HEAD:
-            raise fail("the header ends before its `end_header` line; is the file whole?")
-        words = line.decode("latin-1").split() or ["comment"]
+    for words in head_lines(stream, text, fail, "`end_header`"):
         match words[0]:
             case "comment" | "obj_info":
                 continue
@@ -122,31 +122,29 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
                     raise fail(f"{shown(' '.join(words))}: expected one format: {', '.join(FORMS)}, and 1.0")
                 form = words[1]
             case "element":
-                elements.append(_element(words, elements, number, fail))
+                element = _element(words, len(text), fail)
+                if elements.setdefault(element.name, element) is not element:
+                    raise fail(f"element {shown(element.name)} stands twice")
             case "property":
                 if not elements:
                     raise fail("a property before the first element")
-                elements[-1] = _with_property(elements[-1], words, fail)
+                _add_property(element, words, fail)
             case word:
                 known = "format, element, property, comment, obj_info, end_header"
                 raise fail(f"{shown(word)} is no key of a PLY header; keys: {known}")
     if not form:
         raise fail(f"the header has no format; formats: {', '.join(FORMS)}")
-    return text, FORMS[form], elements
+    return b"".join(text), FORMS[form], list(elements.values())
 
 
-def _element(words: Sequence[str], before: Sequence[PlyElement], line: int, fail: Fail) -> PlyElement:
+def _element(words: Sequence[str], line: int, fail: Fail) -> PlyElement:
     """Read `element NAME COUNT`."""
     if len(words) != 3:
         raise fail(f"{shown(' '.join(words))}: expected element NAME COUNT")
-    _, name, word = words
-    count = count_in(word, f"{shown(word)} of element {shown(name)}", fail)
-    if any(each.name == name for each in before):
-        raise fail(f"element {shown(name)} stands twice")
-    return PlyElement(name, count, line)
+    return PlyElement(words[1], count_in(words[2], f"{shown(words[2])} of element {shown(words[1])}", fail), line, {})
 
 
-def _with_property(element: PlyElement, words: Sequence[str], fail: Fail) -> PlyElement:
+def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None:
     """Read `property TYPE NAME` or `property list TYPE TYPE NAME`."""
     is_list = words[1:2] == ["list"]
     types, name = words[1 + is_list : -1], words[-1]
@@ -155,13 +153,12 @@ def _with_property(element: PlyElement, words: Sequence[str], fail: Fail) -> Ply
     for each in types:
         if each not in TYPES:
             raise fail(f"{shown(each)} is no type; types: {', '.join(TYPES)}")
-    if any(name == known for known, _, _ in element.properties):
+    if name in element.properties:
         raise fail(f"property {shown(name)} of {shown(element.name)} stands twice")
     codes = [TYPES[each] for each in types]
     if is_list and codes[0][0] == "f":
         raise fail(f"{shown(types[0])} counts the values of a list; it has to be an integer")
-    made = name, codes[-1], codes[0] if is_list else ""
-    return element._replace(properties=(*element.properties, made))
+    element.properties[name] = codes[-1], codes[0] if is_list else ""
 
 
 # --- what stands behind the vertices of a binary file: its rows are followed, so that a file that is cut is noticed ---
@@ -245,7 +242,7 @@ class PlyFile(CloudFile):
         before, vertex, self.after = elements[:at], elements[at], elements[at + 1 :]
         self.others = before + self.after
         _check_lists(before, vertex, self.order, file.name)
-        self.codes = {name: code for name, code, _ in vertex.properties}
+        self.codes = {name: code for name, (code, _) in vertex.properties.items()}
         record = record_of((self.order or "<") + code for code in self.codes.values())
         super().__init__(file, tuple(self.codes), record, vertex.instances, "vertices")
         self.line = vertex.line
@@ -368,11 +365,16 @@ def _check_lists(before: Sequence[PlyElement], vertex: PlyElement, order: str, s
 
 def _type_of(column: OutColumn) -> str:
     """Return the type of a column as PLY calls it; raises ValueInvalid for what PLY cannot hold."""
-    return type_in("ply", "property", NEW_NAMES if column.passed is None else NAMES, column)
+    return type_in("ply", NEW_NAMES if column.passed is None else NAMES, column)
 
 
 def _property_line(column: OutColumn) -> bytes:
     return f"property {_type_of(column)} {column.name}".encode()
+
+
+def misfit(column: OutColumn) -> str:
+    """Say why PLY has no place for a column, "" where it has one."""
+    return misfit_of(NEW_NAMES, column)
 
 
 def open_columns(file: InputFile, _options: Options) -> PlyFile:

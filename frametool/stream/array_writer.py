@@ -1,0 +1,266 @@
+"""Columns of numbers and texts on their way into a file of columns: each gets one type, as all its cells allow.
+
+Cells of text and the values of records wait until so many rows are there; then their types are settled.  What a form
+has no place for is left out, which is told once.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from frametool.documents.json import dump
+from frametool.documents.source import Verbatim
+from frametool.errors import ValueInvalid, listing, shown, warn
+from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn, not_finite
+from frametool.formats.table import FORMATS
+from frametool.geometry import arrays
+from frametool.stream.header import XYZ
+from frametool.stream.record import PARTS
+from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH
+from frametool.stream.row_poses import objects, plain_cells, text_of
+from frametool.stream.writers import target_in
+from frametool.text.parse import parse_floats
+from frametool.text.spans import Spans
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from frametool.formats.rows.column_file import ColumnWriter, Kind
+    from frametool.grammar.result import Style
+    from frametool.stream.row_poses import Cells, RowPoses
+
+WAITING = 1 << 18  # rows whose cells say what the types of columns are
+SPARE = 64  # characters that a text may have where not all rows were seen
+DOUBLE, FLAG = np.dtype(np.float64), np.dtype(np.bool_)
+EXACT = 1 << 53  # whole numbers below are floats to the bit
+LIMITS = np.iinfo(np.int64)
+# of a type only if each is written as a number of it is: 007 and +5 stay text, and what would lose digits
+PATTERNS = {
+    np.dtype(np.int64): r"-?(?:0|[1-9][0-9]{0,18})",
+    DOUBLE: r"-?(?:0|[1-9][0-9]{0,14})(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?",
+    FLAG: "true|false",
+}
+TYPE_NAMES = {None: "string", DOUBLE: "double"}
+READS: dict[Kind, Any] = {np.dtype(np.int64): int, DOUBLE: float, FLAG: "true".__eq__}
+
+
+def fits(text: str, kind: Kind) -> bool:
+    """Tell whether a cell is written as a number or truth value of a type is."""
+    is_whole = kind.kind in WHOLE
+    return re.fullmatch(PATTERNS[kind], text) is not None and (not is_whole or LIMITS.min <= int(text) <= LIMITS.max)
+
+
+class ColumnsWriter:
+    """Write blocks of columns into a file of a form; the columns are those of the first rows."""
+
+    def __init__(self, style: Style, module: Any = None) -> None:
+        """Choose the form; module: what creates its writer, where that is not the form's own."""
+        self.style = style
+        self.module: Any = module or import_module(FORMATS[style.form].writer)
+        self.has_nulls: bool = getattr(self.module, "NULLS", False)
+        self.waiting: list[tuple[int, Mapping[str, Made]]] = []
+        self.columns: list[OutColumn] = []
+        self.left_out: dict[str, str] = {}
+        self.writer: ColumnWriter | None = None
+
+    @property
+    def begun(self) -> bool:
+        """Tell whether any block came."""
+        return self.writer is not None or bool(self.waiting)
+
+    def of_columns(self, size: int, made: Mapping[str, Made]) -> bytes:
+        """Return what is written of a block of so many rows, perhaps nothing yet."""
+        self.waiting.append((size, made))
+        if self.writer is None:
+            is_open = any(not _is_typed(each.values) for each in made.values())
+            if not size or (is_open and sum(count for count, _ in self.waiting) < WAITING):
+                return b""
+        return b"".join(self._written(is_all=False))
+
+    def end(self) -> Iterator[bytes]:
+        """Yield what waits, what comes behind the last block, and tell what was left out."""
+        yield from self._written(is_all=True)
+        assert self.writer is not None  # noqa: S101 - for the types
+        yield from self.writer.end()
+        for reason in dict.fromkeys(self.left_out.values()):
+            names = listing(name for name, why in self.left_out.items() if why == reason)
+            warn(f"{self.style.form}: {names} left out: {reason}")
+
+    def _written(self, *, is_all: bool) -> Iterator[bytes]:
+        """Yield what is written of the blocks that wait."""
+        if self.writer is None:
+            self._begin(is_all=is_all)
+        assert self.writer is not None  # noqa: S101 - for the types
+        known = {column.name for column in self.columns}
+        for size, made in self.waiting:
+            for name in made.keys() - known:
+                self.left_out.setdefault(name, "the first rows do not have it")
+            if size:
+                none = Made(objects([None] * size))
+                typed = [self._typed(column, made.get(column.name, none)) for column in self.columns]
+                yield bytes(self.writer.of_rows(None, None, typed))
+        self.waiting = []
+
+    def _begin(self, *, is_all: bool) -> None:
+        """Choose the columns and their types."""
+        blocks = [made for size, made in self.waiting if size] or [made for _, made in self.waiting[-1:]]
+        for name in dict.fromkeys(name for made in blocks for name in made):
+            parts = [made[name].values for made in blocks if name in made]
+            column = self._column(name, parts, has_gaps=len(parts) < len(blocks))
+            if column.kind is None and not is_all:
+                column = column._replace(longest=max(SPARE, 2 * column.longest))
+            reason = self._misfit(column)
+            as_cells = not (FORMATS[self.style.form].texts or all(map(_is_typed, parts)))  # floats are read everywhere
+            if (reason or as_cells) and _is_exact(column.kind, parts):
+                column = column._replace(kind=DOUBLE)
+                reason = self._misfit(column)
+            if reason:
+                self.left_out[name] = reason
+            else:
+                self.columns.append(column)
+        if not self.columns:
+            raise ValueInvalid(f"{self.style.form} has no place for any column of these: {listing(self.left_out)}")
+        texts = {name for made in blocks for name in made if isinstance(made[name].values, Spans)}
+        if (told := [column for column in self.columns if column.name in texts]) and self.has_nulls:
+            types = ", ".join(f"{each.name} {TYPE_NAMES.get(each.kind, each.kind)}" for each in told)
+            warn(f"types of other columns, by their cells: {types}")
+        self.writer = self.module.create(self.columns, None, self.style)
+
+    def _misfit(self, column: OutColumn) -> str:
+        """Say why a column has no place in the form; "" where it has one."""
+        if column.kind is None and not FORMATS[self.style.form].texts:
+            return "it holds numbers"
+        reason: str = self.module.misfit(column) if hasattr(self.module, "misfit") else ""
+        return reason
+
+    def _column(self, name: str, parts: Sequence[Cells], *, has_gaps: bool) -> OutColumn:
+        """Say of which type a column is."""
+        if parts and all(map(_is_typed, parts)):
+            own: Kind = parts[0].dtype.newbyteorder("=")  # type: ignore[union-attr]
+            return OutColumn(name, DOUBLE if own.kind == "f" and own.itemsize > DOUBLE.itemsize else own)
+        values = [value for part in parts for value in plain_cells(part)]
+        there = [value for value in values if value is not None]
+        has_gaps = (has_gaps or len(there) < len(values)) and not self.has_nulls
+        if there and all(isinstance(value, Verbatim) for value in there):
+            kinds = [kind for kind in PATTERNS if all(fits(value, kind) for value in there)][:1]
+            if has_gaps and kinds not in ([], [DOUBLE]):
+                kinds = [DOUBLE] if FLAG not in kinds and all(abs(int(value)) < EXACT for value in there) else []
+            if kinds:
+                return OutColumn(name, kinds[0])
+        is_json = any(isinstance(value, (dict, list)) for value in there)
+        longest = max((len(_text(value, is_json=is_json)) for value in there), default=1)
+        return OutColumn(name, None, None, longest, is_json)
+
+    def _typed(self, column: OutColumn, made: Made) -> Made:
+        """Return a column of a block in its type; raises ValueInvalid for a cell that is of another one."""
+        cells, kind = made.values, column.kind
+        if kind is None:
+            values = plain_cells(cells)
+            return Made(["" if value is None else _text(value, is_json=column.is_json) for value in values])
+        if _is_typed(cells):
+            if kind == DOUBLE and not _is_exact(cells.dtype, [cells]) and cells.dtype.kind in WHOLE:
+                raise self._another(column, str(max(cells.tolist(), key=abs)))
+            return Made(cells.astype(kind, copy=False), made.absent)
+        if kind == DOUBLE and isinstance(cells, Spans):
+            numbers, bad = parse_floats(cells)
+            empty = cells.starts == cells.ends
+            if empty[bad].all():
+                return Made(numbers, empty if empty.any() else None)
+        values = plain_cells(cells)
+        absent = np.array([value is None for value in values], np.bool_)
+        wrong = [value for value in values if value is not None and not fits(text_of(value), kind)]
+        if wrong or (absent.any() and not self.has_nulls and kind != DOUBLE):
+            raise self._another(column, text_of(wrong[0]) if wrong else "")
+        nothing = np.nan if kind == DOUBLE else 0
+        found = np.array([nothing if value is None else READS[kind](value) for value in values], kind)
+        return Made(found, absent if absent.any() else None)
+
+    def _another(self, column: OutColumn, text: str) -> ValueInvalid:
+        found = f"column {shown(column.name)}: {shown(text)} is no {column.kind}, as all cells of the first rows are"
+        return ValueInvalid(f"{found}; -f csv keeps it as it is")
+
+
+def _is_typed(cells: Cells) -> bool:
+    """Tell whether cells are numbers, truth values or times of numpy, one a row."""
+    return isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM"
+
+
+def _is_exact(kind: Kind | None, parts: Sequence[Any]) -> bool:
+    """Tell whether whole numbers are floats to the bit."""
+    if kind is None or kind.kind not in WHOLE:
+        return False
+    return all(
+        abs(number) < EXACT
+        for part in parts
+        for number in ([part.min(), part.max()] if _is_typed(part) and part.size else map(int, _numbers(part)))
+    )
+
+
+def _numbers(part: Cells) -> list[str]:
+    return [value for value in plain_cells(part) if value is not None]
+
+
+def _text(value: Any, *, is_json: bool) -> str:
+    return dump(value) if is_json else text_of(value)
+
+
+class ArrayWriter(ColumnsWriter):
+    """Write blocks of poses, points, vectors, twists or wrenches one after the other.
+
+    The columns: frames where there are names, numbers, stamps, and what is not ours.
+    """
+
+    def __init__(self, style: Style, kind: str, extras: Sequence[str] = (), *, placed: bool = True) -> None:
+        """Choose the form; kind: what a row is; extras: the numbers beside each; placed: it has a position."""
+        super().__init__(style)
+        self.kind = kind
+        self.extras = tuple(extras)
+        self.target = target_in(style, kind, placed=placed)
+        self.placed = placed or kind != POSE
+        self.own = {POSE: 7, TWIST: 6, WRENCH: 6}.get(kind, 3)
+
+    def of_block(self, block: RowPoses) -> bytes:
+        """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
+        if not len(block.numbers):
+            block = block._replace(numbers=np.empty((0, self.own - 3 * (not self.placed) + len(self.extras))))
+        return self.of_columns(len(block.numbers), self._made(block))
+
+    def end(self) -> Iterator[bytes]:
+        """Yield what comes behind the last block."""
+        if not self.begun:
+            self.of_columns(0, {name: Made(np.empty(0)) for name in self._names()})
+        return super().end()
+
+    def _names(self) -> list[str]:
+        """Name the numbers of a result."""
+        if self.kind in SIX:
+            return [f"{part}_{axis}" for part in PARTS[self.kind] for axis in XYZ] + list(self.extras)
+        position = list(XYZ) if self.target.unit is not None else []
+        return [*position, *self.target.names, *self.extras]
+
+    def _made(self, block: RowPoses) -> dict[str, Made]:
+        """Return the columns of a block by name."""
+        size = len(block.numbers)
+        made: dict[str, Made] = {}
+        for name, given in (("name", block.names), ("parent" if self.kind == POSE else "frame", block.parents)):
+            if any(given):
+                made[name] = Made(objects(list(given) * (1 if len(given) == size else size)))
+        for name, column in zip(self._names(), self._numbers(block), strict=True):
+            made[name] = Made(column, not_finite(column))
+        if block.stamps_ns is not None:
+            made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS))
+        for name, cells in block.extras.items():
+            made.setdefault(name, Made(cells))
+        return made
+
+    def _numbers(self, block: RowPoses) -> list[Any]:
+        """Return the numbers of the results in the notations that are written."""
+        columns = [np.ascontiguousarray(column) for column in block.numbers.T]
+        if not self.placed:
+            columns = [columns[0] * 0.0] * 3 + columns
+        with np.errstate(invalid="ignore"):
+            return [*self.target.numbers(tuple(columns[: self.own]), arrays), *columns[self.own :]]
