@@ -171,7 +171,7 @@ class Output:
             writer = self._writer(kind)
             self.pieces([writer.of_block(block), *writer.end()])
             return
-        is_plain = all(any(isinstance(value, list) for value in each.values()) for each in found)
+        is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in found)
         text_module = "frametool.view.pose_text" if is_plain else FORMATS["yaml"].writer
         self.text(self._module(text_module).write_points(found, self.style))
 

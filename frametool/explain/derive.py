@@ -348,6 +348,9 @@ def apply(
     if len(records) != 1:
         raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")
     record = records[0]
+    if record.shape.kind not in (POSE, *UNITS) or {*record.shape.covariance} - {36} or len(record.shape.covariance) > 1:
+        what = f"of a {record.shape.kind}" + " with such a covariance" * bool(record.shape.covariance)
+        raise ValueInvalid(f"no derivation {what}; leave --explain out")
     names = _target_and_source(way, record.parent.text)
     target, origin = map(printable, names)
     at_ns = None if timeless else record.stamp_ns
@@ -394,7 +397,7 @@ def _move_vectors(sheet: Sheet, pose: Rigid, record: Record, mover: Rigid, frame
     shape = record.shape
     numbers, covariance = record.values[: shape.own_size], record.values[shape.own_size :]
     start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
-    own = Operation(moves=True).move(shape, (*start, *covariance), mover)
+    own = Operation(moves=True).move(shape, start, covariance, mover)
     sheet.reached(start)
     found = operations.MOVERS[shape.kind](sheet, pose, start, *frames)
     check_vector(sheet, found, own[: len(found)])

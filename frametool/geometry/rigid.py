@@ -18,7 +18,7 @@ from frametool.geometry.quaternion import cross, either, length, settled
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from typing import TypeAlias
 
     from frametool.geometry.types import (
@@ -313,26 +313,25 @@ def move_twist(
 
 
 def rotate_covariance(x: float, y: float, z: float, w: float, covariance: Sequence[float]) -> list[float]:
-    """Turn a 6 x 6 covariance, row-major: each 3 x 3 block C becomes R C R^T.
+    """Turn a 3 x 3 or 6 x 6 covariance, row-major: each 3 x 3 block C becomes R C R^T.
 
-    That is the covariance of a position and of small rotations about fixed axes, as ROS has it.
+    Of six that is the covariance of a position and of small rotations about fixed axes, as ROS has it.
     """
     turn = quaternion.to_matrix(x, y, z, w)
     rows = [turn[0:3], turn[3:6], turn[6:9]]
-    moved = [0.0] * 36
-    for top in (0, 3):
-        for left in (0, 3):
-            block = [[covariance[6 * (top + i) + left + j] for j in range(3)] for i in range(3)]
+    size = 3 if len(covariance) == 9 else 6
+    moved = [0.0] * len(covariance)
+    for top in range(0, size, 3):
+        for left in range(0, size, 3):
+            block = [[covariance[size * (top + i) + left + j] for j in range(3)] for i in range(3)]
             for i, row in enumerate(_product(_product(rows, block), _transposed(rows))):
-                moved[6 * (top + i) + left : 6 * (top + i) + left + 3] = row
+                moved[size * (top + i) + left : size * (top + i) + left + 3] = row
     return moved
 
 
-def move_twist_covariance(
-    tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float, covariance: Sequence[float]
-) -> list[float]:
-    """Move the 6 x 6 covariance of a twist: A C A^T, where A is what `move_twist` does."""
-    columns = [move_twist(tx, ty, tz, x, y, z, w, *[float(i == j) for j in range(6)]) for i in range(6)]
+def move_covariance(move: Callable[..., Six[float]], pose: Rigid, covariance: Sequence[float]) -> list[float]:
+    """Move the 6 x 6 covariance of a twist or wrench: A C A^T, where A is what `move` does by a pose."""
+    columns = [move(*pose, *[float(i == j) for j in range(6)]) for i in range(6)]
     adjoint = _transposed(columns)
     rows = [covariance[6 * i : 6 * i + 6] for i in range(6)]
     return [value for row in _product(_product(adjoint, rows), columns) for value in row]

@@ -29,6 +29,15 @@ if TYPE_CHECKING:
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
 SECONDS = {"sec": range(-(1 << 31), 1 << 32), "secs": range(1 << 32)}  # int32 of ROS 2, uint32 of the others
 PARTS = "a TransformStamped has header, child_frame_id, transform"
+# of messages that hold more than one thing, or what does not look like what it is: the fields given in the frame of the
+# header, and of what kind they are, then those given in another frame, which stay; all others say what they hold
+HELD: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
+    "Imu": ({"orientation": "attitude", "angular_velocity": "vector", "linear_acceleration": "vector"}, ()),
+    "MagneticField": ({"magnetic_field": "vector"}, ()),
+    "QuaternionStamped": ({"quaternion": "rotation"}, ()),
+    "Odometry": ({"pose": ""}, ("twist",)),  # given in the child's frame
+    "Marker": ({"pose": ""}, ("scale", "points", "uv_coordinates")),  # given in the frame of the pose
+}
 MOST_DIGITS = 25
 _INTEGER = rf"(?a) *[-+]?\d{{1,{MOST_DIGITS}}}"
 _LEFT_OUT = "<(array|sequence) type: .*>"

@@ -9,7 +9,7 @@ Arguments, files, streams and messages are read by this one definition; keys tha
 
 from __future__ import annotations
 
-from itertools import islice
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
@@ -19,9 +19,11 @@ from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, re
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
 from frametool.stream.row_layout import (
-    COVARIANCE,
+    ACCEL,
+    ATTITUDE,
     POINT,
     POSE,
+    SIX,
     TURN,
     TWIST,
     VECTOR,
@@ -43,13 +45,18 @@ if TYPE_CHECKING:
     from frametool.stream.request import Formula, Request
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
-INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "msg", "message")
-PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque")}
+INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message")
+LISTS = ("markers", "polygon", "points")  # of messages that hold nothing else
+PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
+COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
+UNKNOWN = -1.0  # as a covariance begins in ROS, where nothing is known of it, nor of what it would be of
 QUATERNION = (*XYZ, "w")
+USED = KNOWN.union(ROTATION_KEYS, (AXES_KEY,), COVARIANCES, *PARTS.values())
+NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
 KEYS_REMEDY = "name the keys _deg"
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 
@@ -70,7 +77,8 @@ class Record(NamedTuple):
     key: the key of the position; "" where each of its numbers is a member of the record, whose keys are `members`
     rotation: the key of the rotation; others: further keys that say the same rotation
     flat: keys that hold one number of the rotation each; `rotation` is then the first of them
-    stamp: the paths of seconds and nanoseconds in its header; stamp_ns: the time that they say
+    covariances: the keys of those whose numbers come last; unknown: where one begins with -1, which decides that
+    stamps: the paths of seconds and nanoseconds in its header, then of those around it; stamp_ns: the time of the first
     """
 
     path: Path
@@ -84,13 +92,33 @@ class Record(NamedTuple):
     flat: tuple[str, ...] = ()
     name: Name = Name()
     parent: Name = Name()
-    stamp: tuple[Path, ...] = ()
+    covariances: tuple[str, ...] = ()
+    unknown: tuple[Path, ...] = ()
+    stamps: tuple[Path, ...] = ()
     stamp_ns: int | None = None
+
+    @property
+    def stamp(self) -> tuple[Path, ...]:
+        """Return the paths of seconds and nanoseconds of its own time."""
+        return self.stamps[:2]
 
     @property
     def inverse(self) -> bool:
         """Tell whether what is written is the inverse of the pose."""
         return self.shape.inverse
+
+
+class Place(NamedTuple):
+    """What holds the numbers of a record, and the mappings around it; of a message its field, and the kind of that.
+
+    covariances: the keys under which one may stand
+    """
+
+    path: Path
+    outer: tuple[Path, ...]
+    field: str = ""
+    kind: str = ""
+    covariances: tuple[str, ...] = COVARIANCES
 
 
 def find_records(document: Any, request: Request, reading: Reading, path: Path = ()) -> Iterator[Record]:
@@ -100,22 +128,22 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
     """
     formula = request.operation.formula
     try:
-        found = list(_search(document, (), ())) if request.poses else []
+        found = list(_search(document, (), (), request)) if request.poses else []
         is_bare = request.poses and not request.operation.moves
         if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
             reading.here = path
             reading.note("neither position nor rotation: taken as the identity", rule="identity")
-            found = [((), ())]
+            found = [Place((), ())]
         if not found and formula is not None and not formula.reads_row:
-            found = [(path, ()) for path in _mappings(document)]
+            found = [Place(path, ()) for path in _mappings(document)]
         if not found:
             raise _nothing_in(document)
     except Misfit as misfit:
         raise misfit.below(*path) from None
     if request.operation.of == "pair":
         raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
-    for inner, outer in found:
-        yield _record(document, inner, outer, request, reading, path)
+    for place in found:
+        yield _record(document, place, request, reading, path)
 
 
 def _mappings(document: Any) -> list[Path]:
@@ -135,11 +163,8 @@ def _nothing_in(document: Any) -> Misfit:
     near = [(key, found) for key in document if key not in POSE_KEYS and (found := did_you_mean(key, wanted))]
     if near:
         return _unknown(near)
-    keys = f"the keys {', '.join(map(shown, list(document)[:MOST_KEYS]))}"
-    if len(document) > MOST_KEYS:
-        keys += f" and {len(document) - MOST_KEYS} more"
     wanted_here = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
-    return Misfit(f"expected {wanted_here}, found {keys}")
+    return Misfit(f"expected {wanted_here}, found the keys {_named_keys(list(document))}")
 
 
 def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
@@ -156,39 +181,95 @@ def _bare_numbers(value: list[Any]) -> Misfit:
     return Misfit(f"a bare list of {len(value)} numbers does not say what it is; write {write}")
 
 
-def _search(value: Any, path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[Path, tuple[Path, ...]]]:
-    """Yield the paths of what holds numbers, each with those of the mappings around it."""
+def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[Place]:
+    """Yield what holds numbers; where frames change, a mapping that does not move whole is refused."""
     if type(value) is list and value and not any(type(item) in (dict, list) for item in value):
-        yield path, outer
+        yield Place(path, outer)
     elif type(value) is list:
         if len(value) in (3, 4) and all(type(row) is list for row in value):
-            yield path, outer
+            yield Place(path, outer)
             return
         for index, item in enumerate(value):
-            yield from _search(item, (*path, index), outer)
+            yield from _search(item, (*path, index), outer, request)
     elif type(value) is dict:
-        if _holds_numbers(value):
+        operation = request.operation
+        holds, stays = _message(value)
+        if operation.moves and any(holds.values()):
+            found = [Place(path, outer, *field, (f"{field[0]}_covariance",)) for field in holds.items()]
+        elif _holds_numbers(value):
             _refuse_several(value, ["the record's own keys"], path)
-            yield path, outer
+            found = [Place(path, outer)]
         else:
-            yield from _search_inside(value, path, outer)
+            found = list(_search_inside(value, path, outer, request, stays))
+        if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
+            _refuse_half(value, found, path, stays if operation.moves else ())
+        yield from found
+
+
+def _message(value: dict[str, Any]) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return which fields of a known message hold what, and which stay, by the fields that it has."""
+    if "header" not in value and "angular_velocity" not in value:
+        return {}, ()
+    from frametool.ros.messages import HELD
+
+    there = {key for key, each in value.items() if type(each) in (dict, list)}
+    found = [row for row in HELD.values() if there.issuperset(row[0])]
+    return max(found, key=lambda row: len(there.intersection(row[1])), default=({}, ()))
+
+
+def _refuse_half(value: dict[str, Any], found: Sequence[Place], path: Path, stays: Sequence[str]) -> None:
+    """Stop where something beside what moves is given in the same frame, or may be, and would stay as it is."""
+    header = value.get("header")
+    is_message = type(header) is dict and "frame_id" in header
+    used = {"header", *stays}.union(*((*each.path[len(path) :][:1], each.field, *each.covariances) for each in found))
+    if any(each.path == path and not each.field for each in found):
+        used |= USED
+    if is_message and not found:
+        what = "a position on the Earth" if "latitude" in value else "a message"
+        said = f"{what} that cannot be moved whole: its fields are {_named_keys([*value][1:])}"
+        raise Misfit(f"{said}; see help records", path)
+    rest = [
+        key
+        for key, each in value.items()
+        if (key not in used and _is_geometry(each, doubtful=is_message or key.endswith("covariance")))
+        or (key == "name" and is_message and type(each) is list)  # of joints, whose positions are no point
+    ]
+    if found and rest:
+        given = f"{_named_keys(rest, 2)} may be given in a frame that changes, and would stay"
+        raise Misfit(f"{given}; leave out what does not move, see help records", (*path, rest[0]), key=True)
+
+
+def _named_keys(keys: Sequence[str], most: int = MOST_KEYS) -> str:
+    """Name the first keys and count the others."""
+    return ", ".join(map(shown, keys[:most])) + f" and {len(keys) - most} more" * (len(keys) > most)
+
+
+def _is_geometry(value: Any, *, doubtful: bool) -> bool:
+    """Tell whether a value may be given in a frame: it has x, y, z; if doubtful also x and y, or a list of numbers."""
+    if type(value) is dict:
+        axes = XYZ[:2] if doubtful else XYZ
+        return value.keys() >= {*axes} or any(_is_geometry(each, doubtful=doubtful) for each in value.values())
+    if type(value) is not list:
+        return False
+    numbers = sum(type(each) is str and each[:1] in NUMBER_BEGINS for each in value[:MOST_KEYS])
+    return (doubtful and numbers > 1) or any(_is_geometry(each, doubtful=doubtful) for each in value[:MOST_KEYS])
 
 
 def _search_inside(
-    value: dict[str, Any], path: Path, outer: tuple[Path, ...]
-) -> Iterator[tuple[Path, tuple[Path, ...]]]:
-    """Yield what the known keys of a message hold; of an Odometry only the pose is given in the header's frame."""
-    found = {
-        key: held
-        for key in INNER
-        if type(value.get(key)) in (dict, list) and (held := list(_search(value[key], (*path, key), (*outer, path))))
-    }
-    if "pose" in found:
-        found.pop("twist", None)
+    value: dict[str, Any], path: Path, outer: tuple[Path, ...], request: Request, stays: Sequence[str]
+) -> Iterator[Place]:
+    """Yield what the known keys of a message hold."""
+    inner = [key for key in INNER if key not in stays and type(value.get(key)) in (dict, list)]
+    inner += [key for key in LISTS if key not in stays and _holds_mappings(value.get(key))]
+    held = {key: list(_search(value[key], (*path, key), (*outer, path), request)) for key in inner}
+    found = {key: each for key, each in held.items() if each}
     if found:
         _refuse_several(value, list(found), path)
-    for held in found.values():
-        yield from held
+    yield from chain.from_iterable(found.values())
+
+
+def _holds_mappings(value: Any) -> bool:
+    return type(value) is dict or (type(value) is list and any(type(each) is dict for each in value))
 
 
 def _holds_numbers(value: dict[str, Any]) -> bool:
@@ -233,26 +314,28 @@ def _is_rotation(key: str, value: Any) -> bool:
     return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
 
 
-def _record(
-    document: Any, path: Path, outer: tuple[Path, ...], request: Request, reading: Reading, above: Path
-) -> Record:
+def _record(document: Any, place: Place, request: Request, reading: Reading, above: Path) -> Record:
     """Read one record, with all its paths below `above`."""
+    path = place.path
     value = value_at(document, path)
     reading.here = here = (*above, *path)
     try:
         if type(value) is list:
             return _bare_list(value, here, reading, request)
-        record = _mapping(value, here, reading, request) if request.poses else _only_asked(value, here, request)
+        if place.kind:
+            record = _of_message(value, place, here, reading, request)
+        else:
+            record = _mapping(value, here, reading, request) if request.poses else _only_asked(value, here, request)
         if request.poses and request.operation.formula is not None:
             record = _for_formula(record, value, request.operation.formula)
     except Misfit as misfit:
         raise misfit.below(*here) from None
     try:
-        record = _with_covariance(record, document, path, above, request)
+        record = _with_covariances(record, document, place, above, request)
         record = _with_asked(record, document, path, above, request)
         if request.operation.only_adds:
             _refuse_repeated(record, document, path, request)
-        return _with_names(record, document, path, outer, above, request) if request.poses else record
+        return _with_names(record, document, path, place.outer, above, request) if request.poses else record
     except Misfit as misfit:
         raise misfit.below(*above) from None
 
@@ -312,6 +395,25 @@ def _with_asked(record: Record, document: Any, path: Path, above: Path, request:
     return record._replace(shape=shape, numbers=numbers, values=values)
 
 
+def _of_message(value: Any, place: Place, path: Path, reading: Reading, request: Request) -> Record:
+    """Read a field of a message.
+
+    An orientation with a covariance that begins with -1 is none: nothing of it is read, and it stays.
+    """
+    field, kind = place.field, place.kind
+    if request.kind not in ("", kind):
+        raise Misfit(f"a {kind} cannot be taken for a {request.kind}")
+    if kind == VECTOR:
+        return _with_position(Record(path, Shape(kind), key=field), value[field], 1.0, partial=False)
+    known = value.get(place.covariances[0])
+    if kind == ATTITUDE and known and within(place.covariances, _entries, known, (9,))[1][0] == UNKNOWN:
+        return Record(path, Shape("", None), rotation=field)
+    reading.degrees = request.degrees
+    within((field,), read_rotation, field, value[field], reading)
+    record = _with_rotation(value[field], field, Record(path, Shape(POSE, None)), (field,), reading, request)
+    return record._replace(shape=record.shape._replace(kind=kind))
+
+
 def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request) -> Record:
     """Read [x, y, z], or the rows of a matrix."""
     if request.operation.only_adds or request.operation.columns:
@@ -327,7 +429,7 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
 def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Request) -> Record:
     """Read what a mapping says: its position, then its rotation; or the two vectors of a twist or a wrench."""
     if (parts := _parts_of(value)) is not None and not _is_holder(value):
-        return _two_vectors(value, parts, path, request)
+        return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else parts, path, request)
     positions = [key for key in value if key in POINT_KEYS and _holds(key, value[key])]
     rotations = [key for key, each in value.items() if _is_rotation(key, each)]
     flat = _flat_pose(value, rotations)
@@ -537,27 +639,49 @@ def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
     return (*path, *place)
 
 
-def _with_covariance(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
-    """Add the 36 numbers that a message has beside a pose or a twist, or a record in it, if records are moved."""
-    beside = (*path, "covariance")
-    around = value_at(document, path) if record.shape.kind in (POSE, TWIST) else None
-    if path[-1:] == (record.shape.kind,) and (type(around) is not dict or "covariance" not in around):
-        beside = (*path[:-1], "covariance")
-        around = value_at(document, path[:-1])
-    if type(around) is not dict or "covariance" not in around or request.operation.changes_nothing:
+def _with_covariances(record: Record, document: Any, place: Place, above: Path, request: Request) -> Record:
+    """Add the numbers of the covariances beside a record, or around it where a message has it so, if records move.
+
+    One that begins with -1 is unknown and stays.
+    """
+    operation, shape, path = request.operation, record.shape, place.path
+    if operation.keeps_frames:
         return record
-    if request.operation.only_adds:
-        return record
-    if not request.operation.moves or request.operation.formula is not None:
-        raise Misfit("the covariance would be wrong afterwards; leave it out, or move the message with apply", beside)
+    for around in (path, path[:-1])[: 1 + (path[-1:] == (shape.kind,))]:
+        holder = value_at(document, around)
+        there = [key for key in place.covariances if type(holder) is dict and key in holder]
+        if there:
+            break
+    if there and (not operation.moves or operation.formula is not None or shape.inverse):
+        what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
+        raise Misfit(what, (*around, there[0]))
+    allowed = (36,) if shape.kind in SIX else (36, 9) if shape.kind == POSE else (9,)
+    for key in there:
+        below = (*around, key)
+        places, numbers = within(below, _entries, holder[key], allowed)
+        paths = tuple((*above, *below, *place) for place in places)
+        if numbers[0] == UNKNOWN:
+            record = record._replace(unknown=(*record.unknown, paths[0]))
+            continue
+        record = record._replace(
+            shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
+            numbers=record.numbers + paths, values=(*record.values, *numbers), covariances=(*record.covariances, key),
+        )  # fmt: skip
+    return record
+
+
+def _entries(value: Any, allowed: Sequence[int]) -> tuple[list[Path], list[float]]:
+    """Return the places and the numbers of a covariance: a list of them, or a list of rows."""
     from frametool.ros.messages import whole_list
 
-    values = within(beside, whole_list, around["covariance"], "36 numbers")
-    names = [f"c{row}{column}" for row in range(6) for column in range(6)]
-    numbers = within(beside, read_numbers, values, names)
-    paths = tuple((*above, *beside, place) for place in range(COVARIANCE))
-    shape = record.shape._replace(covariance=True)
-    return record._replace(shape=shape, numbers=(*record.numbers, *paths), values=(*record.values, *numbers))
+    wanted = " or ".join(f"{size} numbers ({size**0.5:g}x{size**0.5:g})" for size in allowed)
+    rows: list[tuple[Path, Any]] = [((at,), row) for at, row in enumerate(whole_list(value, wanted))]
+    if not all(type(row) is list for _, row in rows):
+        rows = [((), value)]
+    numbers = [number for at, row in rows for number in within(at, read_numbers, row, row)]
+    if len(numbers) not in allowed:
+        raise Misfit(f"expected {wanted}, found {len(numbers)}")
+    return [(*at, place) for at, row in rows for place in range(len(row))], numbers
 
 
 def _with_names(
@@ -597,14 +721,15 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
 
 
 def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path) -> Record:
-    """Add the stamp of a header, and where its seconds and nanoseconds stand, unless one further in said it."""
-    if record.stamp or "stamp" not in header:
+    """Add the stamp of a header, and where its seconds and nanoseconds stand; one further in said it better."""
+    if "stamp" not in header:
         return record
     from frametool.ros.messages import read_stamp
 
     stamp_ns = within(path, read_stamp, header["stamp"])
-    parts = [next(key for key in header["stamp"] if key.startswith(letter)) for letter in "sn"]
-    return record._replace(stamp=tuple((*above, *path, part) for part in parts), stamp_ns=stamp_ns)
+    parts = (next(key for key in header["stamp"] if key.startswith(letter)) for letter in "sn")
+    stamps = (*record.stamps, *((*above, *path, part) for part in parts))
+    return record._replace(stamps=stamps, stamp_ns=record.stamp_ns if record.stamps else stamp_ns)
 
 
 def value_at(value: Any, path: Path) -> Any:

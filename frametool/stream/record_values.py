@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from functools import cached_property, partial
-from itertools import count
+from itertools import count, islice
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import NOTHING, Aliased, Node, parse_documents, parse_nodes, refuse_alias
@@ -22,7 +22,7 @@ from frametool.grammar.result import Result
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import PARTS, STALE, placed, value_at
 from frametool.stream.request import Memory, Request
-from frametool.stream.row_layout import COVARIANCE, POSE, checked_rotation
+from frametool.stream.row_layout import POSE, ROTATION, checked_rotation
 from frametool.stream.splice import target_of
 from frametool.stream.template import cut, edits_of, filled
 
@@ -177,8 +177,9 @@ class _Spliced:
         """Keep what is needed; nothing is done before something is asked for."""
         self.source = source
         self.entries: list[Entry] = []
-        self.answers: dict[Path, Answer] = {}
-        self.request = request._replace(notations=())
+        self.answers: dict[tuple[Path | None, ...], Answer] = {}
+        is_usual = [form.spec for form in request.notations] == ["quaternion"]
+        self.request = request._replace(notations=()) if is_usual else request
         # our numbers are written as numbers that nothing else in the text is, and found again by their ends
         self.mark = next(mark for mark in map("e{}".format, count(999_000)) if mark not in source.text)
         self.numbers: list[float] = []
@@ -186,7 +187,7 @@ class _Spliced:
     def add(self, entries: Sequence[Entry], answers: Sequence[Answer]) -> None:
         """Add the records of a document, and what became of them."""
         self.entries += entries
-        self.answers |= {each.entry.record.path: each for each in answers}
+        self.answers |= {each.entry.record.numbers: each for each in answers}
 
     def at(self, path: Path) -> Any:
         """Return what stands at a path as a plain value, its numbers as floats."""
@@ -199,8 +200,8 @@ class _Spliced:
     def _nodes(self) -> list[Node]:
         entries = [each._replace(target=target_of(each.record, self.request)) for each in self.entries]
         for entry in entries:
-            each = self.answers.get(entry.record.path)
-            size = entry.target.size + COVARIANCE * entry.record.shape.covariance
+            each = self.answers.get(entry.record.numbers)
+            size = entry.target.size + sum(entry.record.shape.covariance)
             self.numbers += [0.0] * size if each is None else written(each._replace(entry=entry))
         text = self.source.text
         root = Node(0, len(text), parse_nodes(text))
@@ -223,16 +224,22 @@ def _values(
 ) -> Iterator[Value]:
     """Yield what one document or item becomes: itself with new numbers, or a pose for each record in it."""
     inside = any(type(step) is str for each in answers for step in each.entry.record.path[len(unit) :])
-    keeps = not request.notations or [form.spec for form in style.notations] == ["quaternion"]
-    if inside and style.form in MESSAGES and keeps and request.operation.moves:
+    keeps = not request.notations or (inside and [form.spec for form in style.notations] == ["quaternion"])
+    is_list = type(node.value) is list
+    is_one = len({each.entry.record.path for each in answers}) < len(answers)  # of several things, as an Imu
+    moves = request.operation.moves
+    as_read = (inside and style.form in MESSAGES) or (not is_list and style.form in MESSAGES[:2])
+    if moves and request.poses and ((as_read and (keeps or is_one)) or (is_one and style.form == "text")):
         yield spliced.at(unit)
         return
-    is_list = type(node.value) is list
+    if moves and is_one:
+        yield _flat_message(node, unit, answers, spliced)
+        return
     for each in answers:
         kind = each.entry.record.shape.kind
         if request.operation.formula is not None:
             yield _formula_result(node, unit, each, request)
-        elif kind == POSE:
+        elif kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
         elif style.form == "csv" or holds_arrays(style.form) or is_list or (style.form == "text" and kind not in PARTS):
             yield _flat(node, unit, each)
@@ -266,14 +273,12 @@ def _header_stamp(record: Record) -> dict[str, int]:
 def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: Style) -> Result:
     """Return a pose with its frames and what else its record says."""
     entry = made.entry
-    record, shape = entry.record, entry.record.shape
+    record = entry.record
     pose = Pose.of(made.parts[:7], entry.name, entry.parent)
     placed, turned = entry.target.unit is not None or entry.target.whole, bool(entry.target.notations)
     pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
     extras: dict[str, Any] = dict(zip(request.operation.extras(POSE), made.parts[7:], strict=False))
-    if shape.covariance:
-        extras["covariance"] = list(made.parts[-COVARIANCE:])
-    extras |= _rest(node, unit, record)
+    extras |= _covariances(made) | _rest(node, unit, record)
     return Result(pose, _header_stamp(record) | _with_stamp_ns(extras, keeps=style.form in SPELLED))
 
 
@@ -315,7 +320,7 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
         holder = node.at(path[len(unit) :])
         if type(holder.value) is not dict:
             continue
-        on_the_way = set(record.path[depth : depth + 1]) | {"header", "covariance"}
+        on_the_way = {*record.path[depth : depth + 1], "header", *record.covariances}
         for key, (_, value) in holder.value.items():
             if key not in on_the_way and (*path, key) not in names and not (path == record.path and key in used):
                 rest.setdefault(key, plain(value))
@@ -327,12 +332,32 @@ def _flat(node: Node, unit: Path, made: Answer) -> dict[str, Any]:
     entry = made.entry
     kind = entry.record.shape.kind
     named: dict[str, Any] = {"frame": entry.parent} if entry.parent is not None else {}
-    numbers = written(made)[:6]
+    numbers = written(made)[: entry.target.size]
     if kind in PARTS:
         named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
     else:
         named[kind] = numbers
-    return named | _header_stamp(entry.record) | _rest(node, unit, entry.record)
+    return named | _header_stamp(entry.record) | _covariances(made) | _rest(node, unit, entry.record)
+
+
+def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _Spliced) -> dict[str, Any]:
+    """Return a message of several things as a mapping without levels, a key for each of their numbers."""
+    first = answers[0].entry
+    found = {"frame": first.parent} | _header_stamp(first.record) | _rest(node, unit, first.record)
+    for key, value in spliced.at(first.record.path).items():
+        if key != "header":
+            found.pop(key, None)
+            parts = value.items() if isinstance(value, dict) else [("", value)]
+            found |= {f"{key}_{axis}".rstrip("_"): each for axis, each in parts}
+    return found
+
+
+def _covariances(made: Answer) -> dict[str, list[float]]:
+    """Return the covariances of a result by their keys."""
+    record = made.entry.record
+    numbers = iter(made.parts[len(made.parts) - sum(record.shape.covariance) :])
+    sizes = zip(record.covariances, record.shape.covariance, strict=True)
+    return {key: [number + 0.0 for number in islice(numbers, size)] for key, size in sizes}
 
 
 def plain(node: Node, number: Callable[[str], float | None] = lambda _: None) -> Any:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import quaternion, rigid, vectors
+from frametool.geometry import rigid, vectors
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, VECTOR, WRENCH, Shape, Target, pose_of
+from frametool.stream.row_layout import MOVERS, POSE, SIX, TURNED, TWIST, WRENCH, Shape, Target, pose_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -26,18 +26,6 @@ if TYPE_CHECKING:
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
 PAIR = "pair"  # the two poses of a row
-
-
-def _turn(_x: Number, _y: Number, _z: Number, *numbers: Number) -> Components:
-    return quaternion.rotate(*numbers)
-
-
-MOVERS: dict[str, Callable[..., Components]] = {
-    POINT: rigid.apply,
-    VECTOR: _turn,
-    TWIST: rigid.move_twist,
-    WRENCH: rigid.move_wrench,
-}  # a pose is composed: `Operation.pose`
 
 
 class Formula(Protocol):
@@ -137,27 +125,33 @@ class Operation(NamedTuple):
         return not (changed or self.inverse)
 
     @property
+    def keeps_frames(self) -> bool:
+        """Tell whether records stay in the frames they name."""
+        return self.changes_nothing and (self.formula is None or self.formula.adds)
+
+    @property
     def keeps_position(self) -> bool:
         """Tell whether positions stay as they are written."""
         return self.changes_nothing or (self.turns and self.left is None and not self.mirrors)
 
-    def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
-        """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
+    def move(self, shape: Shape, own: Components, beside: Components, edge: Rigid | None) -> Components:
+        """Move what is no pose, with its covariances, by `edge`, else by `left`."""
         mover = edge or self.left
-        if mover is None:
-            return numbers
-        own = shape.own_size
-        moved: Components = MOVERS[shape.kind](*mover, *numbers[:own])
-        return (*moved, *self.covariance(shape, numbers[own:], mover))
+        moved = own if mover is None else MOVERS[shape.kind](*mover, *own)
+        return (*moved, *self.covariance(shape, beside, mover))
 
     def covariance(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
-        """Move the covariance of a pose or a twist by `edge`, else by `left`; nothing where there is none."""
-        mover = edge or self.left
-        if not shape.covariance or mover is None:
+        """Move the covariances of a thing by `edge`, else by `left`; what else comes beside it stays."""
+        if (mover := edge or self.left) is None:
             return numbers
-        if shape.kind == POSE:
-            return tuple(rigid.rotate_covariance(*mover[3:], numbers))
-        return tuple(rigid.move_twist_covariance(*mover, numbers))
+        moved: list[Number] = []
+        for size in shape.covariance:
+            if shape.kind in (TWIST, WRENCH):
+                moved += rigid.move_covariance(MOVERS[shape.kind], mover, numbers[:size])
+            else:
+                moved += rigid.rotate_covariance(*mover[3:], numbers[:size])
+            numbers = numbers[size:]
+        return (*moved, *numbers)
 
     def result(
         self,
@@ -178,14 +172,15 @@ class Operation(NamedTuple):
         seconds: the time since the row before, of which velocities are made; times_ns: its own time
         """
         own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
-        if shape.kind == POSE:
-            pose = thing_pose(shape, own, rotation)
+        if shape.kind in TURNED:
+            own = thing_pose(shape, own, rotation)
+        elif shape.unit is not None:
+            own = shape.position(own)
         if self.formula is not None:
-            parts = pose if shape.kind == POSE else shape.position(own) if shape.kind else ()
-            return self.formula.result(shape.kind, parts, beside, times_ns, xp)
+            return self.formula.result(shape.kind, own, beside, times_ns, xp)
         if shape.kind != POSE:
-            return self.move(shape, (*(shape.position(own) if shape.unit is not None else own), *beside), edge)
-        found = self.pose(compared(pose), edge, xp)
+            return self.move(shape, own, beside, edge)
+        found = self.pose(compared(own), edge, xp)
         if self.velocity:
             found = self.with_velocity(found, seconds(), xp)
         return (*found, *self.covariance(shape, beside, edge))
@@ -298,10 +293,10 @@ class Request(NamedTuple):
             return Target(None, ())
         if kind in SIX:
             return Target(None, (), plain=True)
-        if kind != POSE:
-            return Target(1.0 if self.all_numbers and shape.unit else shape.unit, ())
+        if kind not in TURNED:
+            return Target(1.0 if self.all_numbers and shape.unit else shape.unit, (), three=True)
         there = shape.whole or shape.unit is not None
-        placed = there or self.shifts
+        placed = there or (self.shifts and kind == POSE)
         unit = 1.0 if self.all_numbers and (self.notations or shape.notation is None) else shape.unit or 1.0
         if self.notations or shape.notation is None:
             stays = shape.notation is None and self._only_turns_around and (self.by_default or not self.notations)

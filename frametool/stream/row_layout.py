@@ -8,18 +8,30 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid, overheard
-from frametool.geometry import euler, floats, quaternion
+from frametool.geometry import euler, floats, quaternion, rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from typing import Any
 
     from frametool.geometry.representations import Notation, Whole
     from frametool.geometry.types import Components, Namespace, Quaternion, Rigid
 
-POINT, VECTOR, POSE, TWIST, WRENCH = "point", "vector", "pose", "twist", "wrench"
-SIX = (TWIST, WRENCH)  # two vectors, linear part first
-COVARIANCE = 36
+POINT, VECTOR, POSE, TWIST, WRENCH, ACCEL = "point", "vector", "pose", "twist", "wrench", "accel"
+ROTATION = "rotation"  # without a position, which no move gives it
+ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a world that stands
+TURNED = (POSE, ROTATION, ATTITUDE)
+SIX = (TWIST, WRENCH, ACCEL)  # two vectors, linear part first
+MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbers come first
+    "": lambda *_: (),
+    POINT: rigid.apply,
+    VECTOR: lambda _x, _y, _z, *numbers: quaternion.rotate(*numbers),
+    ROTATION: rigid.compose,
+    ATTITUDE: lambda *numbers: rigid.compose(*(*numbers[7:], *rigid.inverse(*numbers[:7]))),
+    TWIST: rigid.move_twist,
+    WRENCH: rigid.move_wrench,
+    ACCEL: lambda _x, _y, _z, *n: (*quaternion.rotate(*n[:7]), *quaternion.rotate(*n[:4], *n[7:])),
+}
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 TURN = 6.283185307179586
 TO_DEGREES = 180.0 / 3.141592653589793
@@ -31,12 +43,12 @@ Unit: TypeAlias = float | tuple[float, float, float]  # how many make a metre, w
 class Shape(NamedTuple):
     """The numbers of a row in order: position (3, if any), then rotation (if any); or those of a whole matrix.
 
-    kind: point, vector, pose, twist or wrench
+    kind: point, vector, pose, rotation, attitude, twist, wrench or accel; "" for no numbers
     unit: how many of the position's numbers make a metre; None where there is no position
     notation: that of the rotation; degrees: whether its angles are degrees
     whole: the numbers are those of a whole pose
     inverse: what is written is the inverse
-    covariance: the 36 numbers of a covariance come last
+    covariance: how many numbers each of the covariances has that come last
     radians_at: which of the rotation's numbers are radians where the others are degrees
     absent: which numbers have no column and count as 0
     beside: how many numbers that an expression reads come last
@@ -48,7 +60,7 @@ class Shape(NamedTuple):
     degrees: bool = False
     whole: bool = False
     inverse: bool = False
-    covariance: bool = False
+    covariance: tuple[int, ...] = ()
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
     beside: int = 0
@@ -61,7 +73,7 @@ class Shape(NamedTuple):
     @property
     def size(self) -> int:
         """Count the numbers of a row."""
-        return self.own_size + COVARIANCE * self.covariance + self.beside
+        return self.own_size + sum(self.covariance) + self.beside
 
     @property
     def own_size(self) -> int:
@@ -148,7 +160,7 @@ class Target(NamedTuple):
 
     unit: of positions (None: not at all); notations: with the unit of their angles (True: degrees)
     keep_sign: quaternions keep their sign; whole: the first notation carries the position
-    plain: the numbers of a twist or wrench as they are
+    plain: the numbers of a twist or wrench as they are; three: those of a point or vector
     radians_at: which of the first notation's numbers are radians where the others are degrees
     absent: which numbers have no column; they have to be 0
     """
@@ -158,12 +170,13 @@ class Target(NamedTuple):
     keep_sign: bool = False
     whole: bool = False
     plain: bool = False
+    three: bool = False
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
 
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
-        own = 6 if self.plain else 3 if len(parts) == 3 else 7
+        own = 6 if self.plain else 3 if self.three or len(parts) == 3 else 7
         return [*self.numbers(parts[:own], xp), *parts[own:]]
 
     def numbers(self, parts: Components, xp: Namespace) -> list[Any]:

@@ -15,7 +15,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR
+from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR
 from frametool.stream.text_parts import Const, IfLocked, Out
 
 if TYPE_CHECKING:
@@ -100,13 +100,12 @@ class Splicer:
         self._names()
         if self.request.operation.result_kind(shape.kind) != shape.kind:
             return self._of_other_kind()
-        if shape.covariance:
-            self._numbers(range(shape.own_size, shape.size), self.target.size)
+        self._numbers(range(shape.own_size, shape.own_size + sum(shape.covariance)), self.target.size)
         if shape.kind in SIX:
             self._numbers(range(6), 0)
             return self.edits
         self._position()
-        if shape.kind == POSE:
+        if shape.kind in TURNED:
             self._rotation()
             self.dropped.update({*STALE, "inverse", *self.record.others} - set(self.record.flat))
         self._leave_out()

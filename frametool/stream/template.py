@@ -21,7 +21,6 @@ from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
 from frametool.stream.faults import RowNote
 from frametool.stream.record import POINT_KEYS
-from frametool.stream.row_layout import COVARIANCE
 from frametool.stream.splice import OURS, Splicer
 from frametool.stream.text_parts import Const, IfLocked, In, Out
 
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
 
     from frametool.grammar.readers import Note, Path
     from frametool.stream.answers import Answer, Entry
+    from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
     from frametool.stream.splice import Edit
@@ -48,6 +48,8 @@ FREE = {
     (False, False): YAML_PLAIN,
 }
 SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
+STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
+NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # as a covariance begins of which nothing is known
 # scalars under these keys decide what a record is, wherever in it they stand ..
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
 # .. and these in the mappings that hold the record
@@ -62,7 +64,7 @@ class Template:
     """The text of records, and what holds for all that are written alike.
 
     stretches: where each part of the text stands
-    numbers: the stretches that hold our numbers, in order
+    numbers: the stretches that hold our numbers, in order; known: those that -1 would make another record
     stamps: the stretches of each entry's stamp
     pieces: what the result is made of
     notes: what is worth telling about all of them; own_notes: about the record that was learned alone
@@ -88,6 +90,7 @@ class Template:
         self._root = root
         self._request = request
         slots = [_inside(root, path) for entry in entries for path in entry.record.numbers]
+        known = {_inside(root, path) for entry in entries for path in _first_entries(entry.record)}
         stamps = [[_span(root, path) for path in entry.stamp] for entry in entries]
         number = re.compile(JSON_NUMBER if json else YAML_NUMBER)
         self.regular = all(slot is not None and number.fullmatch(text, *slot) for slot in slots)
@@ -96,6 +99,7 @@ class Template:
         self.stretches, self.pieces = cut(len(text), cuts, edits)
         at = {stretch: index for index, stretch in enumerate(self.stretches)}
         self.numbers = tuple(at[slot] for slot in slots if slot is not None)
+        self.known = {at[slot] for slot in known if slot is not None}
         self.stamps = tuple(tuple(at[span] for span in spans) for spans in stamps)
         first = min((slot[0] for slot in slots if slot is not None), default=0)
         self.line = text.count("\n", 0, first)
@@ -176,7 +180,7 @@ class Template:
         groups = []
         for index, (start, end) in enumerate(self.stretches):
             if index in ours and self.regular:
-                groups.append(f"({number})")
+                groups.append(f"({NOT_UNKNOWN * (index in self.known)}{number})")
                 continue
             parts, at = [], start
             while leaf is not None and leaf[0].end <= end:
@@ -192,12 +196,15 @@ class Template:
         """Yield the scalars that decide nothing, in order, each with the expression of what it may be."""
         around = {entry.record.path[:depth] for entry in self.entries for depth in range(len(entry.record.path) + 1)}
         around |= {(*path, "header") for path in around}
-        fixed = {path for entry in self.entries for path in entry.record.numbers}
+        fixed = {path for entry in self.entries for path in (*entry.record.numbers, *entry.record.unknown)}
+        stamps = {path: STAMP[at % 2] for entry in self.entries for at, path in enumerate(entry.record.stamps)}
         for path, leaf in _leaves(self._root, ()):
             depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
             key = str(path[depth - 1]) if depth else ""
             if key == "frame" and self._request.counts(leaf.value):
                 yield leaf, f"{leaf.quote}[0-9]++{leaf.quote}"
+            elif path in stamps:
+                yield leaf, f"{leaf.quote}{stamps[path]}{leaf.quote}"
             elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _may_matter(key)):
                 continue
             else:
@@ -228,6 +235,14 @@ def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
             yield from _leaves(value, (*path, index))
     else:
         yield path, node
+
+
+def _first_entries(record: Record) -> Iterator[Path | None]:
+    """Yield the places of the first number of each covariance."""
+    at = record.shape.own_size
+    for size in record.shape.covariance:
+        yield record.numbers[at]
+        at += size
 
 
 def _inside(root: Node, path: Path | None) -> tuple[int, int] | None:
@@ -341,5 +356,5 @@ def edits_of(text: str, entries: Sequence[Entry], root: Node, request: Request, 
         shape = entry.record.shape
         edits += Splicer(text, root, entry, request, json=json, first=first).run()
         first += entry.target.size + len(request.operation.extras(shape.kind))
-        first += COVARIANCE * (shape.covariance and request.operation.formula is None)
+        first += sum(shape.covariance)
     return list(dict.fromkeys(edits))

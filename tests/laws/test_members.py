@@ -123,7 +123,6 @@ IMU = {
 
 
 @pytest.mark.parametrize("way", ["argument", "line", "lines", "document"])
-@pytest.mark.xfail(strict=True, reason="seam: result members: an Imu names the new frame with the vectors of the old one")
 def test_what_names_another_frame_has_moved_whole_or_is_refused(run: Run, way: str) -> None:
     line = json.dumps(IMU)
     texts = {"line": f"{line}\n", "lines": f"{line}\n" * TWENTY, "document": document(IMU)}
