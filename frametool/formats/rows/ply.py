@@ -38,7 +38,7 @@ from frametool.formats.rows.column_file import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
     from typing import BinaryIO
 
     from frametool.documents.source import InputFile
@@ -97,10 +97,11 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
 
     Leaves the stream behind it; raises FormatError that says line, value and remedy.
     """
-    text = stream.readline(64)
+    text = bytearray(stream.readline(64))
     if text.rstrip(b"\r\n") != b"ply" or not text.endswith(b"\n"):
         raise FormatError("the first line of a PLY file is `ply`, and it ends in a line feed", source=source, line=1)
-    form, elements, number = "", list[PlyElement](), 1
+    form, elements, number = "", dict[str, PlyElement](), 1
+    properties: dict[str, dict[str, tuple[str, str, str]]] = {}  # of each element
 
     def fail(message: str) -> FormatError:
         return FormatError(message, source=source, line=number)
@@ -122,31 +123,34 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
                     raise fail(f"{shown(' '.join(words))}: expected one format: {', '.join(FORMS)}, and 1.0")
                 form = words[1]
             case "element":
-                elements.append(_element(words, elements, number, fail))
+                element = _element(words, elements, number, fail)
+                elements[element.name], properties[element.name] = element, {}
             case "property":
                 if not elements:
                     raise fail("a property before the first element")
-                elements[-1] = _with_property(elements[-1], words, fail)
+                made = _property(element.name, words, properties[element.name], fail)
+                properties[element.name][made[0]] = made
             case word:
                 known = "format, element, property, comment, obj_info, end_header"
                 raise fail(f"{shown(word)} is no key of a PLY header; keys: {known}")
     if not form:
         raise fail(f"the header has no format; formats: {', '.join(FORMS)}")
-    return text, FORMS[form], elements
+    whole = [each._replace(properties=(*properties[name].values(),)) for name, each in elements.items()]
+    return bytes(text), FORMS[form], whole
 
 
-def _element(words: Sequence[str], before: Sequence[PlyElement], line: int, fail: Fail) -> PlyElement:
+def _element(words: Sequence[str], before: Collection[str], line: int, fail: Fail) -> PlyElement:
     """Read `element NAME COUNT`."""
     if len(words) != 3:
         raise fail(f"{shown(' '.join(words))}: expected element NAME COUNT")
     _, name, word = words
     count = count_in(word, f"{shown(word)} of element {shown(name)}", fail)
-    if any(each.name == name for each in before):
+    if name in before:
         raise fail(f"element {shown(name)} stands twice")
     return PlyElement(name, count, line)
 
 
-def _with_property(element: PlyElement, words: Sequence[str], fail: Fail) -> PlyElement:
+def _property(element: str, words: Sequence[str], before: Collection[str], fail: Fail) -> tuple[str, str, str]:
     """Read `property TYPE NAME` or `property list TYPE TYPE NAME`."""
     is_list = words[1:2] == ["list"]
     types, name = words[1 + is_list : -1], words[-1]
@@ -155,13 +159,12 @@ def _with_property(element: PlyElement, words: Sequence[str], fail: Fail) -> Ply
     for each in types:
         if each not in TYPES:
             raise fail(f"{shown(each)} is no type; types: {', '.join(TYPES)}")
-    if any(name == known for known, _, _ in element.properties):
-        raise fail(f"property {shown(name)} of {shown(element.name)} stands twice")
+    if name in before:
+        raise fail(f"property {shown(name)} of {shown(element)} stands twice")
     codes = [TYPES[each] for each in types]
     if is_list and codes[0][0] == "f":
         raise fail(f"{shown(types[0])} counts the values of a list; it has to be an integer")
-    made = name, codes[-1], codes[0] if is_list else ""
-    return element._replace(properties=(*element.properties, made))
+    return name, codes[-1], codes[0] if is_list else ""
 
 
 # --- what stands behind the vertices of a binary file: its rows are followed, so that a file that is cut is noticed ---
