@@ -58,17 +58,22 @@ class Note(NamedTuple):
 class Reading:
     """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
 
-    __slots__ = ("degrees", "faults", "here", "normalize", "notes", "raw", "source")
+    __slots__ = ("bare_numbers", "degrees", "faults", "here", "normalize", "notes", "raw", "source")
 
-    def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False) -> None:
+    def __init__(
+        self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False,
+        bare_numbers: bool = False,
+    ) -> None:  # fmt: skip
         """Begin at the top of a document of `source`; `notes` collects what is odd.
 
-        raw: take messages as they are; whoever gets them judges.
+        raw: take messages as they are; whoever gets them judges.  bare_numbers: the text is in the form of another
+        tool, which reads neither `90deg` nor `pi/2`.
         """
         self.source = source
         self.degrees = degrees
         self.normalize = normalize
         self.raw = raw
+        self.bare_numbers = bare_numbers
         self.here: Path = ()
         self.notes: list[Note] = []
         self.faults: list[Misfit] | None = None

@@ -321,7 +321,7 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
         options.report(error)
         return
     for document in documents:
-        reading = Reading(source, normalize=options.normalize)
+        reading = Reading(source, normalize=options.normalize, bare_numbers=True)
         reading.faults = []
         try:
             for edge in take(document.value, reading):
