@@ -59,7 +59,8 @@ def on_earth(names: Iterable[str]) -> str:
     found = {match[1] is None: name for name in names if (match := _EARTH.fullmatch(name))}
     if len(found) < 2:
         return ""
-    return f"{shown(found[False])} and {shown(found[True])} are coordinates on the Earth, which are not read; give x, y, z in metres"
+    named = f"{shown(found[False])} and {shown(found[True])}"
+    return f"{named} are coordinates on the Earth, which are not read; give x, y, z in metres"
 
 
 def without_mark(name: str) -> str:
