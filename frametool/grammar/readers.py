@@ -90,7 +90,7 @@ class Reading:
 
     def bare(self, name: str, *path: str | int) -> str:
         """Take one leading `/` off a frame's name, as tf2 does, and note it."""
-        if not name.startswith("/") or len(name) == 1:
+        if not is_slashed(name):
             return name
         self.note(slash_note(name), *path, rule="slash")
         return name[1:]
@@ -122,6 +122,11 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
 def _alike(note: Note) -> str:
     """Return what notes have in common that are told once; names with a slash are, whatever they are."""
     return note.rule if note.rule == "slash" else note.message
+
+
+def is_slashed(name: str) -> bool:
+    """Tell whether a name begins with the one `/` that tf2 has given up; of `/` and `//a`, which stay, it is a part."""
+    return name[:1] == "/" and name[1:2] not in ("", "/")
 
 
 def slash_note(name: str) -> str:

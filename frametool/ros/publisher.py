@@ -105,9 +105,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             except ValueInvalid as error:
                 options.report(FormatError(str(error), source=file.name, line=number, rule=error.rule))
                 continue
+            parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
             for note in reading.notes:
                 options.tally.note(note, number)
-            yield Edge(pose.parent, pose.name or "", pose.components, line=number)
+            yield Edge(parent, child, pose.components, line=number)
 
 
 def read_call(line: str, reading: Reading) -> Pose:
