@@ -356,6 +356,15 @@ BAD: dict[str, tuple[str, str]] = {
     "kitti, mirrored": ("1 0 0 1 0 1 0 2 0 0 1 3\n1 0 0 1 0 1 0 2 0 0 -1 3\n" * 3, "2:r11: matrix has determinant -1"),
     "colmap, a word": ("1 1 0 0 0 0 0 1 1 b.jpg\n\n2 1 0 0 0 0 x 1 1 c.jpg\n", "3: 'x' is not a number"),
     "colmap, cut short": ("1 1 0 0 0 0 0 1 1 b.jpg\n\n2 1 0 0\n", "3: expected 10 words"),
+    "colmap, a shifted line": ("# Image list with\n1 1 0 0 0 2 3 1 im 0.png\n\n", "2: expected CAMERA_ID, a whole number, found 'im'"),
+    "colmap, no id": ("# Image list with\n1.5 1 0 0 0 2 3 1 1 im 0.png\n\n", "2: expected an id, a whole number, found '1.5'"),
+    "colmap, no line of points": ("# Image list with\n1 1 0 0 0 0 0 1 1 b.jpg\n2 1 0 0 0 0 0 1 1 c.jpg\n", "3: expected points (X Y POINT3D_ID each) or an empty line"),
+    "colmap, a name apart": ("# Image list with\n1 1 0 0 0 0 0 1 1 b.jpg\n\n2 1 0 0 0 0 0 9 1 1 c.jpg\n\n", "4: only some pictures are called as '1 c.jpg'"),
+    "colmap frames, no rig": ("# Frame list with\n1 x 1 0 0 0 0 0 1\n", "2: expected RIG_ID, a whole number, found 'x'"),
+    "colmap frames, data": ("# Frame list with\n1 1 1 0 0 0 0 0 1 2 CAMERA 1 1\n", "2: expected FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .., three words of each, found 4"),
+    "g2o, no tag": ("VERTEX_SE2 0 1 2 3\n1 1 2 3\n", "2: expected a tag as VERTEX_SE3:QUAT, found '1'"),
+    "g2o, a long id": (f"VERTEX_SE2 {'1' * 5000} 1 2 3\n", "1: expected the id of a vertex, a whole number, found '1111"),
+    "open3d, no number": ("0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n1 1 x\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n", "6: expected the number of a pose, a whole number, found 'x'"),
     "g2o, cut short": ("VERTEX_SE3:QUAT 0 1 2 3 0 0 0\n", "1: expected VERTEX_SE3:QUAT id x y z qx qy qz qw, found 8 words"),
     "g2o, no number": ("VERTEX_SE2 0 1 2 3\nVERTEX_SE2 a 1 2 3\n", "2: expected the id of a vertex, a whole number, found 'a'"),
     "g2o, too large": ("VERTEX_SE2 99999999999999 1 2 3\n", "1: 99999999999999 is too large to count seconds"),
@@ -379,6 +388,16 @@ def test_a_bad_line_is_named_with_its_place(name: str, run: Run) -> None:
         assert done.status == 1
         assert any(line.startswith(f"frametool: file:{said}") for line in errors), done.err
         assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize("tag", ["VERTEX_SE3:QUAT", "EDGE_SE3:QUAT 0"])
+def test_lines_of_g2o_with_unknown_tags_are_told_with_their_count(tag: str, run: Run) -> None:
+    text = f"{tag} 0 1 2 3 0 0 0 1\n" + "VERTEX_SE3:QUIT 1 1 2 3 0 0 0 1\nFIX 0\nPARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n" * 2 + f"{tag} 2 1 2 3 0 0 0 1\n"
+    options = ("--edges",) * tag.startswith("EDGE")
+    done = run("convert", "-i", "a.g2o", *options, files={"a.g2o": text})
+    assert (done.status, done.out.count("\n")) == (0, 2)
+    assert "a.g2o:2: lines of unknown tags left out: 2 VERTEX_SE3:QUIT" in done.err
+    assert "FIX" not in done.err
 
 
 def test_images_bin_is_named_with_the_command_that_makes_text_of_it(run: Run) -> None:
