@@ -136,7 +136,7 @@ def _is_free(head: str, given: Notation | None, request: Request) -> bool:
     if (len(cells), len(lines)) == (3, 3) and matrix:
         return given is not None or _only_a_matrix(lines, request)
     if matrix:
-        return (len(cells), len(lines)) in ((4, 3), (4, 4)) or (given is None and (len(cells), len(lines)) == (12, 1))
+        return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file of one pose
     return len(cells) == 1 and len(lines) > 1
 
 

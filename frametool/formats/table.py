@@ -347,6 +347,7 @@ FORMATS = {
             ("json path", "*/type_id"),
             ("magic", rb"(?:\xef\xbb\xbf)?\s*%YAML:1\.0(?!.*\bT_(?:cam_imu|imu_cam|cn_cnm1|i_b|SC|BS) *:)"),
             ("text", ": *!!opencv-"),
+            ("yaml key", "trans_matrix"),  # of OpenLORIS-Scene
         ),
         states="target<-source as each key says, camera<-object by rvec and tvec; metres",
         asks=("direction", "frames"),

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from frametool.errors import shown
-from frametool.grammar.readers import slash_note
+from frametool.grammar.readers import is_slashed, slash_note
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class Names(dict[str, str]):
 
     def bare(self, name: str) -> str:
         """Take one leading `/` off, as tf2 does, and remember it."""
-        if not name.startswith("/") or len(name) == 1:
+        if not is_slashed(name):
             return name
         if name not in self.slashed:
             self.slashed.append(name)
@@ -249,7 +249,8 @@ class Answers(NamedTuple):
 
     def names(self, *defaults: str) -> tuple[str, ...]:
         """Return the names of a form's frames: as told, then its own."""
-        return (*self.frames[: len(defaults)], *defaults[len(self.frames) :])
+        told = (name[is_slashed(name) :] for name in self.frames[: len(defaults)])
+        return (*told, *defaults[len(self.frames) :])
 
 
 class Options(NamedTuple):

@@ -22,6 +22,9 @@ NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names the
 _STAMP = re.compile(r"[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
 _UNIT = re.compile(r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$")
 _SECONDS = ("s", "sec", "seconds", "")
+_EARTH = re.compile(
+    r"[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|(?:lon(?:gitude)?|lng))(?:[_ ]?(?:deg|rad|e7))?\s*(?:[\[(].*)?", re.IGNORECASE
+)
 
 
 def in_nanoseconds(name: str) -> bool:
@@ -49,6 +52,15 @@ def _is_known(name: str) -> bool:
     except ValueInvalid:
         return False
     return True
+
+
+def on_earth(names: Iterable[str]) -> str:
+    """Return what to say of names that are a latitude and a longitude, which are no position here; "" without both."""
+    found = {match[1] is None: name for name in names if (match := _EARTH.fullmatch(name))}
+    if len(found) < 2:
+        return ""
+    named = f"{shown(found[False])} and {shown(found[True])}"
+    return f"{named} are coordinates on the Earth, which are not read; give x, y, z in metres"
 
 
 def without_mark(name: str) -> str:

@@ -58,17 +58,22 @@ class Note(NamedTuple):
 class Reading:
     """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
 
-    __slots__ = ("degrees", "faults", "here", "normalize", "notes", "raw", "source")
+    __slots__ = ("bare_numbers", "degrees", "faults", "here", "normalize", "notes", "raw", "source")
 
-    def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False) -> None:
+    def __init__(
+        self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False,
+        bare_numbers: bool = False,
+    ) -> None:  # fmt: skip
         """Begin at the top of a document of `source`; `notes` collects what is odd.
 
-        raw: take messages as they are; whoever gets them judges.
+        raw: take messages as they are; whoever gets them judges.  bare_numbers: the text is in the form of another
+        tool, which reads neither `90deg` nor `pi/2`.
         """
         self.source = source
         self.degrees = degrees
         self.normalize = normalize
         self.raw = raw
+        self.bare_numbers = bare_numbers
         self.here: Path = ()
         self.notes: list[Note] = []
         self.faults: list[Misfit] | None = None
@@ -85,7 +90,7 @@ class Reading:
 
     def bare(self, name: str, *path: str | int) -> str:
         """Take one leading `/` off a frame's name, as tf2 does, and note it."""
-        if not name.startswith("/") or len(name) == 1:
+        if not is_slashed(name):
             return name
         self.note(slash_note(name), *path, rule="slash")
         return name[1:]
@@ -117,6 +122,11 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
 def _alike(note: Note) -> str:
     """Return what notes have in common that are told once; names with a slash are, whatever they are."""
     return note.rule if note.rule == "slash" else note.message
+
+
+def is_slashed(name: str) -> bool:
+    """Tell whether a name begins with the one `/` that tf2 has given up; of `/` and `//a`, which stay, it is a part."""
+    return name[:1] == "/" and name[1:2] not in ("", "/")
 
 
 def slash_note(name: str) -> str:

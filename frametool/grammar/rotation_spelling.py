@@ -140,17 +140,17 @@ def read_components(
     try:
         numbers = list(map(parse_number, texts))
     except (ValueInvalid, TypeError):
-        return _read_one_by_one(notation, texts, places, degrees=degrees)
+        angles = () if reading.bare_numbers else notation.representation.angles
+        return _read_one_by_one(notation, texts, places, angles, degrees=degrees)
     if notation.degrees is None and not degrees and notation.representation.angles:
         _note_degrees(notation, numbers, places, reading)
     return numbers, degrees
 
 
 def _read_one_by_one(
-    notation: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], angles: Sequence[int], *, degrees: bool
 ) -> tuple[list[float], bool]:
     """Read components among which an angle says its own unit, or one is no number: then say where."""
-    angles = notation.representation.angles
     numbers, units = [], []
     for index, text in enumerate(texts):
         try:

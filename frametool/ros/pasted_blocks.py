@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.json import dump, looks_like_json, parse_json
 from frametool.documents.source import Pasted, Source, Verbatim
-from frametool.errors import FormatError, ValueInvalid, warn
+from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.pasted import DECIMAL, NUMBER, pasted_poses
 from frametool.grammar.readers import Reading
@@ -31,13 +31,18 @@ if TYPE_CHECKING:
 
 MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
+<<<<<<< HEAD
 _TRANSLATION = re.compile(rf"(?m)^[ \t]*+-\s+Translation:\s*{_LIST}")
 _TIME = re.compile(rf"(?m)^[ \t]*+At time ({NUMBER})")
+=======
+_TRANSLATION = re.compile(r"(?m)^\s*-\s+Translation:")
+_TIME = re.compile(rf"(?m)^\s*At time ({NUMBER})")
+>>>>>>> readers
 _HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _ROTATIONS = (
-    ("xyzw", re.compile(rf"in Quaternion(?: \(xyzw\))?\s*{_LIST}")),
-    ("rpy", re.compile(rf"in RPY \(radian\)\s*{_LIST}")),
-    ("rpy_deg", re.compile(rf"in RPY \(degree\)\s*{_LIST}")),
+    ("xyzw", re.compile(r"in Quaternion(?: \(xyzw\))?")),
+    ("rpy", re.compile(r"in RPY \(radian\)")),
+    ("rpy_deg", re.compile(r"in RPY \(degree\)")),
 )
 _TRIPLE = rf"\[({NUMBER}(?:[ |]+{NUMBER}){{2}})\]"
 _GAZEBO = re.compile(rf"Pose \[ XYZ \(m\) \] \[ RPY \(rad\) \]:\s*{_TRIPLE}\s*{_TRIPLE}")
@@ -130,12 +135,16 @@ def _blocks(text: str) -> list[Any]:
 
 def _block(text: str) -> dict[str, Any]:
     """Read position and rotation of one block; of several notations the first that is there."""
+    turned = next(((key, found) for key, heading in _ROTATIONS if (found := heading.search(text))), None)
+    moved = _TRANSLATION.search(text)
     value: dict[str, Any] = {}
-    if moved := _TRANSLATION.search(text):
-        value["xyz"] = moved[1].replace(",", " ").split()
-    for key, pattern in _ROTATIONS:
-        if turned := pattern.search(text):
-            return {**value, key: turned[1].replace(",", " ").split()}
+    for key, heading in (("xyz", moved), *((turned,) if turned else ())):
+        if heading:
+            numbers = re.compile(rf"\s*{_LIST}").match(text, heading.end())
+            if not numbers:
+                line = text[heading.start() :].strip().partition("\n")[0]
+                raise ValueInvalid(f"expected a list of numbers, found {shown(line)}")
+            value[key] = numbers[1].replace(",", " ").split()
     return value
 
 

@@ -93,8 +93,10 @@ def _line(pose: Pose, style: Style) -> str:
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the pose that each line publishes."""
+    number = 0
     for piece in lines(file.stream, file.name):
-        for number, line in enumerate(piece.text.split("\n"), piece.line):
+        for line in piece.text.removesuffix("\n").replace("\r", "\n").split("\n"):
+            number += 1
             if not line.strip() or line.lstrip().startswith("#"):
                 continue
             reading = Reading(Source(file.name, line), normalize=options.normalize)
@@ -103,9 +105,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             except ValueInvalid as error:
                 options.report(FormatError(str(error), source=file.name, line=number, rule=error.rule))
                 continue
+            parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
             for note in reading.notes:
                 options.tally.note(note, number)
-            yield Edge(pose.parent, pose.name or "", pose.components, line=number)
+            yield Edge(parent, child, pose.components, line=number)
 
 
 def read_call(line: str, reading: Reading) -> Pose:
@@ -116,7 +119,7 @@ def read_call(line: str, reading: Reading) -> Pose:
     from shlex import split
 
     try:
-        words = split(line, comments=True)
+        words = split(line, comments=re.search(r"(?:^|\s)#", line) is not None)  # in a word it is part of it
     except ValueError as error:
         raise ValueInvalid(f"a quote is not closed ({str(error).lower()})") from None
     return read_words(words, reading)
@@ -128,7 +131,9 @@ def read_words(words: Sequence[str], reading: Reading) -> Pose:
     Raises ValueInvalid.
     """
     starts = [index for index, word in enumerate(words) if word.rsplit("/", 1)[-1] == CALL]
-    words = list(words[starts[-1] + 1 :] if starts else words)
+    if len(starts) > 1:
+        raise ValueInvalid(f"{len(starts)} calls of {CALL} in one line; write one a line")
+    words = list(words[starts[0] + 1 :] if starts else words)
     if ROS_ARGUMENTS in words:
         del words[words.index(ROS_ARGUMENTS) :]
     if words[-1:] == ["&"]:  # a script starts the tool in the background
@@ -183,7 +188,8 @@ def read_positional(words: Sequence[str], reading: Reading) -> Pose:
 def _pose(
     position: Sequence[str], key: str, rotation: Sequence[str], parent: str, child: str, reading: Reading
 ) -> Pose:
-    """Check the numbers of a call."""
+    """Check the numbers of a call, which have no units of their own."""
+    reading.bare_numbers = True
     x, y, z = map(read_number, position)
     turned = rotation_of(ROTATION_KEYS[key], rotation, INDICES, reading)
     if not parent or not child:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, shown
 from frametool.geometry.representations import NAMED, REPRESENTATIONS
 from frametool.geometry.representations import notation as parse_notation
+from frametool.grammar.names import on_earth
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, Shape
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
@@ -296,6 +297,8 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
     """Find so many points or poses; raises FormatError that lists the candidates, or the columns there are."""
     header = Header(names)
     positions, rotations = find_positions(header), find_rotations(header, given)
+    if not positions and (problem := on_earth(names)):
+        raise _refusal(problem, source)
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
         return [_only_pose(header, positions, rotations, given, source)]
     poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []
@@ -475,6 +478,8 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notati
     if count == len(places):
         return PoseColumns(None, rotation)
     match = _chosen(header, places[: len(places) - count])
+    if problem := on_earth(header.names[place] for place, _ in filter(None, match.spots)):
+        raise Misused(f"--columns: {problem}")
     if len(match.spots) == len(XYZ):
         return PoseColumns(_position(header, match), rotation)
     return PoseColumns(_position(header, match._replace(spots=(*match.spots, None)))._replace(absent=(2,)), rotation)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
-from frametool.grammar.names import NAME_KEYS, PARENT_KEYS
+from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, on_earth
 from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position, unknown_keys
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
@@ -436,6 +436,9 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if len(positions) > 1 and not _is_pose(positions, rotations or (flat and flat.rotation)):
         raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
+    formula = request.operation.formula
+    if not there and "header" not in value and (formula is None or formula.reads_row) and (problem := on_earth(value)):
+        raise Misfit(problem)
     _refuse_typos(value, rotations=bool(turned), position=bool(there))
     key = positions[0] if positions else ""
     record = Record(path, Shape(_kind(key, turned, request), None), key=key)

@@ -98,7 +98,8 @@ def _pieces(
     world, body = options.answers.names(*form.frames)
     count = len(poses)
     parents, names = _spread(block.parents, count, world), _spread(block.names, count, body)
-    for (parent, name), group in groupby(range(count), key=lambda at: (parents[at], names[at])):
+    bare = options.tally.names.bare
+    for (parent, name), group in groupby(range(count), key=lambda at: (bare(parents[at]), bare(names[at]))):
         some = list(group)
         part = slice(some[0], some[-1] + 1)
         if times is not None:

@@ -84,7 +84,7 @@ def parse_length(text: str) -> float:
     if match := re.fullmatch(_LENGTH, text):
         return parse_number(match[1]) / LENGTHS[match[2]]  # dividing rounds once: 0.02 from 2cm
     reason = _reason(text)
-    raise _refusal(text, f"{shown(text)} {_NO_LENGTH if reason in {_UNKNOWN, _UNIT} else reason}")
+    raise _refusal(text, f"{shown(text)} {_NO_LENGTH if reason in {_UNKNOWN, _UNIT, _ANGLE} else reason}")
 
 
 def read_number_or_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
@@ -124,7 +124,7 @@ def explain_number(text: str) -> str:
 def explain_angle(text: str) -> str:
     """Say why a text is no angle, and what to write instead."""
     reason = _reason(text)
-    if reason in {_UNKNOWN, _UNIT} and re.search("deg|rad|pi|°|π", text, re.IGNORECASE):
+    if reason in {_UNKNOWN, _UNIT, _ANGLE} and re.search("deg|rad|pi|°|π", text, re.IGNORECASE):
         reason = "is not an angle; write a number, 90deg, 1.57rad or pi/2"
     elif reason == _UNIT:
         reason = "is not an angle: the units are deg and rad"
@@ -134,6 +134,7 @@ def explain_angle(text: str) -> str:
 _UNKNOWN = "is not a number"
 _NO_LENGTH = "is not a length; write metres, or a unit: 2cm, 20mm, 0.02m"
 _UNIT = "has a unit; lengths are in metres (or use xyz_mm)"
+_ANGLE = "is an angle with a unit where a bare number is expected"
 
 
 def _reason(text: str) -> str:
@@ -160,6 +161,7 @@ _MISTAKES = (
     (r"true|false|yes|no|on|off", "is a truth value where a number is expected"),
     (r"null|~", "is empty where a number is expected"),
     (rf"[-+]?{_DECIMAL}e[-+]?", _UNKNOWN),
+    (rf"[-+]?{_DECIMAL}\s*(deg|rad|°)(rees|ians?)?|{_MULTIPLE_OF_PI}", _ANGLE),
     (rf"[-+]?{_DECIMAL}\s*[a-zµ°%\"'].*", _UNIT),
 )
 

@@ -105,3 +105,16 @@ def test_a_print_that_leaves_its_meaning_open_is_refused_with_what_does_not(run:
 def test_a_name_around_four_numbers_is_no_hindrance_where_their_order_is_said(run: Run, text: str) -> None:
     outcome = run("convert", "--from", "wxyz", text, "-f", "json")
     assert json.loads(outcome.out)["quaternion"] == {"x": 0.0, "y": 0.0, "z": 0.8, "w": 0.6}
+
+
+@pytest.mark.parametrize(
+    ("block", "found"),
+    [
+        ("- Translation: [0, x, 1]\n- Rotation: in Quaternion [0, 0, 0, 1]\n", "- Translation: [0, x, 1]"),
+        ("- Translation: [0, 0, 1]\n- Rotation: in Quaternion [0, 0, 0, x]\n            in RPY (radian) [0.000, -0.000, 0.000]\n", "in Quaternion [0, 0, 0, x]"),
+        ("- Translation: [0, 0, 1]\n- Rotation: in RPY (radian) [0, 0, 90deg]\n", "in RPY (radian) [0, 0, 90deg]"),
+    ],
+)  # fmt: skip
+def test_a_damaged_part_of_a_block_is_refused_and_not_left_out(block: str, found: str, run: Callable[..., Any]) -> None:
+    done = run("convert", "-i", "a", files={"a": "At time 1.5\n" + block})
+    assert (done.status, done.out, done.err) == (1, "", f"frametool: a: expected a list of numbers, found '{found}'\n")

@@ -53,7 +53,7 @@ WAYS = {
     "d.txt": "# i  alpha_i-1  a_(i-1)  theta_i  d_i\n" + "".join(f"{n} {p!r} {a!r} {t!r} {d!r}\n" for n, (t, d, a, p) in enumerate(ROWS, 1)),
     "e.csv": "θ_deg,d (mm),a [cm],alpha [deg]\n" + "".join(f"{np.degrees(t)!r},{d * 1000!r},{a * 100!r},{np.degrees(p)!r}\n" for t, d, a, p in ROWS).replace("np.float64(", "").replace(")", ""),
     "f.yaml": "dh_parameters:\n" + "".join(f"  - {{theta: {t!r}, d: {d!r}, a: {a!r}, alpha: {p!r}}}\n" for t, d, a, p in ROWS),
-    "g.yaml": "robot:\n  joints:\n" + "".join(f"    j{n}: {{d: {d!r}, a: {a!r}, alpha: {p!r}, offset: {t!r}, qmin: -3}}\n" for n, (t, d, a, p) in enumerate(ROWS)),
+    "g.yaml": "robot:\n  joints:\n" + "".join(f"    j{n}: {{d: {d!r}, a: {a!r}, alpha: {p!r}, offset: {t!r}}}\n" for n, (t, d, a, p) in enumerate(ROWS)),
     "h.json": "{" + ", ".join(f'"{name}": {[row[at] for row in ROWS]}' for at, name in enumerate(("theta", "d", "a", "alpha"))) + "}",
     "i.csv": "theta,d,a,alpha,offset\n0.3,0.1,0.05,pi/2,0\n0,0,-0.4,0,-0.7rad\n1,20cm,30mm,-90deg,0.1\n",
 }
@@ -128,6 +128,19 @@ def test_headers_have_many_names(written: str, column: tuple[str, str] | None) -
         ("- {theta: 0, d: 0, a: 1, alpha: 0}\n- {theta: 0, d: [1], a: 1, alpha: 0}\n", "a.csv:2:17: expected a number, found a list"),
         ("- {theta: 0, d: 0, a: 1, alpha: 0}\n- {theta: 0, d: O, a: 1, alpha: 0x}\n", "a.csv:2:33: '0x'"),
         ("frames: []\n", "no table in it"),
+        ("- {theta: 0.1, theta_deg: 50, d: 1, a: 2, alpha: 0}\n", "a.csv:1:16: two keys for theta; keep one"),
+        ("- {theta: 0.1, d: 1,5, a: 2, alpha: 0}\n", "a.csv:1:21: unknown key '5'; a row has theta, d, a, alpha, offset, type, name"),
+        ("- {thta: 0.1, d: 1, a: 2, alpha: 0}\n", "a.csv:1:4: unknown key 'thta'; did you mean 'theta'?"),
+        ("- {theta: , d: 1, a: 2, alpha: 0}\n", "a.csv:1:11: expected a number, found nothing"),
+        ("- {d: 1, aa: 2, alpha: 0}\n- {d: 1, a: 2, alpha: 0}\n", "a.csv:1:10: unknown key 'aa'"),
+        ("- {d: 1, a: 2, alpha: 0}\n- 5\n", "a.csv:2:3: expected a row {theta, d, a, alpha}, found '5'"),
+        ("one: [{d: 1, a: 2, alpha: 0}]\ntwo: [{d: 1, a: 2, alpha: 0}]\n", "a.csv:1:1: 2 tables in it; keep one"),
+        ("d: [1, 2]\na: [1, 2]\nalpha: [0, 0]\ntheta: [0]\n", "a.csv:4:8: theta: expected 2 numbers as d has, found 1"),
+        ("d: [1, 2]\na: [1, 2]\nalpha: 0\n", "a.csv:3:8: alpha: expected 2 numbers as d has, found '0'"),
+        ("- {theta: 0, d: 90deg, a: 2, alpha: 0}\n", "a.csv:1:17: '90deg' is not a length"),
+        ("- {theta: 0, d: 1, a: 2, alpha: 2cm}\n", "a.csv:1:33: '2cm' is not an angle"),
+        ("thta,d,a,alpha\n0,1,2,3\n", "a.csv:1:1: unknown column 'thta'; did you mean 'theta'?"),
+        ("theta,d,a,alpha\n,1,2,3\n", "a.csv:2:1: '' is empty where a number is expected"),
     ],
 )
 def test_what_is_wrong_is_one_placed_line(tmp_path: Path, text: str, said: str) -> None:
@@ -139,6 +152,17 @@ def test_what_is_wrong_is_one_placed_line(tmp_path: Path, text: str, said: str) 
 def test_bare_angles_beyond_a_turn_are_told(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match=r"a.csv:2: alpha 90 is more than a full turn in radians; degrees\? write alpha_deg"):
         read(tmp_path, "theta,d,a,alpha\n0,0,0,90\n", dh="standard")
+
+
+@pytest.mark.parametrize("text", ["theta,d,a,alpha,qmin\n0,1,2,3,-3\n", "- {theta: 0, d: 1, a: 2, alpha: 3, qmin: -3}\n"])
+def test_what_is_about_something_else_is_told_by_its_name(tmp_path: Path, text: str) -> None:
+    with pytest.warns(UserWarning, match=r"a.csv:1: left out, about something else: qmin"):
+        read(tmp_path, text, dh="standard")
+
+
+def test_a_name_beside_columns_is_that_of_the_robot(tmp_path: Path) -> None:
+    text = "name: arm\nd: [1, 2]\na: [1, 2]\nalpha: [0, 0]\n"
+    assert read(tmp_path, text, dh="standard", format="dh").frames == ("link0", "link1", "link2")
 
 
 def test_a_joint_that_is_not_there_is_named(tmp_path: Path) -> None:

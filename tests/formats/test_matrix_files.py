@@ -346,3 +346,46 @@ def test_what_a_form_cannot_hold_is_an_error(run: Callable[..., Any], tree: str,
     done = run("tree", tree, "-f", form)
     assert (done.status, done.out) == (1, "")
     assert said in done.err
+
+
+# --- frames named by keys beside a matrix ---
+
+STORED = "!!opencv-matrix {rows: 4, cols: 4, dt: d, data: [1, 0, 0, 0.1, 0, 1, 0, 0.2, 0, 0, 1, 0.3, 0, 0, 0, 1]}"
+LORIS = '%YAML:1.0\n---\ntrans_matrix:\n   -\n      {0}: base_link\n      {1}: "d400_color"\n      matrix: {2}\n'
+
+
+@pytest.mark.parametrize("keys", [("parent_frame", "child_frame"), ("frame_id", "child_frame_id"), ("parent", "child")])
+def test_frames_named_beside_a_matrix_are_parent_and_child(keys: tuple[str, str], tmp_path: Path) -> None:
+    tree = read(tmp_path, LORIS.format(*keys, STORED))
+    assert tree.frames == ("base_link", "d400_color")
+    assert matrix(tree, "base_link", "d400_color")[:3, 3] == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_they_are_so_alone_in_a_file_without_its_head_and_beside_a_rotation_and_a_translation(tmp_path: Path) -> None:
+    plain = LORIS.format("parent_frame", "child_frame", STORED.removeprefix("!!opencv-matrix ")).removeprefix("%YAML:1.0\n---\n")
+    assert read(tmp_path, plain).frames == ("base_link", "d400_color")
+    assert read(tmp_path, f"%YAML:1.0\nparent_frame: a\nchild_frame: b\nmatrix: {STORED}\n").frames == ("a", "b")
+    pair = "%YAML:1.0\nparent_frame: a\nchild_frame: b\nR: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [1, 2, 3]\n"
+    assert matrix(read(tmp_path, pair), "a", "b")[:3, 3] == pytest.approx([1, 2, 3])
+
+
+@pytest.mark.parametrize(("direction", "root"), [("parent-from-child", "d400_color"), ("child-from-parent", "d400_color")])
+def test_source_and_target_name_frames_and_their_direction_is_asked(tmp_path: Path, direction: str, root: str) -> None:
+    text = LORIS.format("source_frame", "target_frame", STORED)
+    with pytest.raises(Unanswered, match=r"'target_frame and source_frame beside matrix': .* give --direction parent-from-child"):
+        read(tmp_path, text)
+    tree = read(tmp_path, text, direction=direction)
+    assert tree.frames == (root, "base_link")
+    sign = 1.0 if direction == "parent-from-child" else -1.0
+    assert matrix(tree, "d400_color", "base_link")[:3, 3] == pytest.approx([sign * 0.1, sign * 0.2, sign * 0.3])
+
+
+@pytest.mark.parametrize(("kept", "missing"), [("parent_frame", "child_frame"), ("child_frame", "parent_frame"), ("child_frame_id", "parent_frame_id")])
+def test_one_of_the_two_alone_is_refused(tmp_path: Path, kept: str, missing: str) -> None:
+    with pytest.raises(FormatError, match=rf"{kept} without {missing}, so nothing says what the matrix is between"):
+        read(tmp_path, LORIS.format(kept, "note", STORED))
+
+
+def test_a_key_with_letters_that_patterns_know_is_a_key(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match="no pose in it"):
+        read(tmp_path, '%YAML:1.0\n---\n"rvec[": [0, 0, 0]\nrvec(: [0, 0, 0]\n', format="opencv")

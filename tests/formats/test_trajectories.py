@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import random
+import re
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -354,8 +356,17 @@ BAD: dict[str, tuple[str, str]] = {
     "kitti, mirrored": ("1 0 0 1 0 1 0 2 0 0 1 3\n1 0 0 1 0 1 0 2 0 0 -1 3\n" * 3, "2:r11: matrix has determinant -1"),
     "colmap, a word": ("1 1 0 0 0 0 0 1 1 b.jpg\n\n2 1 0 0 0 0 x 1 1 c.jpg\n", "3: 'x' is not a number"),
     "colmap, cut short": ("1 1 0 0 0 0 0 1 1 b.jpg\n\n2 1 0 0\n", "3: expected 10 words"),
+    "colmap, a shifted line": ("# Image list with\n1 1 0 0 0 2 3 1 im 0.png\n\n", "2: expected CAMERA_ID, a whole number, found 'im'"),
+    "colmap, no id": ("# Image list with\n1.5 1 0 0 0 2 3 1 1 im 0.png\n\n", "2: expected an id, a whole number, found '1.5'"),
+    "colmap, no line of points": ("# Image list with\n1 1 0 0 0 0 0 1 1 b.jpg\n2 1 0 0 0 0 0 1 1 c.jpg\n", "3: expected points (X Y POINT3D_ID each) or an empty line"),
+    "colmap, a name apart": ("# Image list with\n1 1 0 0 0 0 0 1 1 b.jpg\n\n2 1 0 0 0 0 0 9 1 1 c.jpg\n\n", "4: only some pictures are called as '1 c.jpg'"),
+    "colmap frames, no rig": ("# Frame list with\n1 x 1 0 0 0 0 0 1\n", "2: expected RIG_ID, a whole number, found 'x'"),
+    "colmap frames, data": ("# Frame list with\n1 1 1 0 0 0 0 0 1 2 CAMERA 1 1\n", "2: expected FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .., three words of each, found 4"),
+    "g2o, no tag": ("VERTEX_SE2 0 1 2 3\n1 1 2 3\n", "2: expected a tag as VERTEX_SE3:QUAT, found '1'"),
+    "g2o, a long id": (f"VERTEX_SE2 {'1' * 5000} 1 2 3\n", "1: expected the id of a vertex, a whole number, found '1111"),
+    "open3d, no number": ("0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n1 1 x\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n", "6: expected the number of a pose, a whole number, found 'x'"),
     "g2o, cut short": ("VERTEX_SE3:QUAT 0 1 2 3 0 0 0\n", "1: expected VERTEX_SE3:QUAT id x y z qx qy qz qw, found 8 words"),
-    "g2o, no number": ("VERTEX_SE2 0 1 2 3\nVERTEX_SE2 a 1 2 3\n", "2: expected the id of a vertex, found 'a'"),
+    "g2o, no number": ("VERTEX_SE2 0 1 2 3\nVERTEX_SE2 a 1 2 3\n", "2: expected the id of a vertex, a whole number, found 'a'"),
     "g2o, too large": ("VERTEX_SE2 99999999999999 1 2 3\n", "1: 99999999999999 is too large to count seconds"),
     "open3d, cut short": ("0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n", "4: expected four rows of four numbers"),
     "open3d, last row": ("0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 1 1\n", "5: the last row of a pose is 0 0 0 1"),
@@ -377,6 +388,16 @@ def test_a_bad_line_is_named_with_its_place(name: str, run: Run) -> None:
         assert done.status == 1
         assert any(line.startswith(f"frametool: file:{said}") for line in errors), done.err
         assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize("tag", ["VERTEX_SE3:QUAT", "EDGE_SE3:QUAT 0"])
+def test_lines_of_g2o_with_unknown_tags_are_told_with_their_count(tag: str, run: Run) -> None:
+    text = f"{tag} 0 1 2 3 0 0 0 1\n" + "VERTEX_SE3:QUIT 1 1 2 3 0 0 0 1\nFIX 0\nPARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n" * 2 + f"{tag} 2 1 2 3 0 0 0 1\n"
+    options = ("--edges",) * tag.startswith("EDGE")
+    done = run("convert", "-i", "a.g2o", *options, files={"a.g2o": text})
+    assert (done.status, done.out.count("\n")) == (0, 2)
+    assert "a.g2o:2: lines of unknown tags left out: 2 VERTEX_SE3:QUIT" in done.err
+    assert "FIX" not in done.err
 
 
 def test_images_bin_is_named_with_the_command_that_makes_text_of_it(run: Run) -> None:
@@ -678,3 +699,60 @@ def test_every_command_that_takes_a_tree_takes_a_trajectory(command: tuple[str, 
 @pytest.mark.parametrize("name", [name for name in FORMATS if is_trajectory(name)])
 def test_a_trajectory_states_what_its_numbers_mean(name: str) -> None:
     assert "<-" in FORMATS[name].states
+
+
+# --- lines that somebody damaged ---
+
+MORE_FORMS = {
+    "colmap frames": "# Frame list with one line of data per frame:\n" + "".join(f"{at} {at + 5} 1 0 0 0 {at} 2 3 1 CAMERA 1 {at}\n" for at in range(1, 5)),
+    "colmap, bare": "".join(f"{at} 1 0 0 0 {at} 2 3 1 im {at}.png\n1 2 -1 3 4 7\n" for at in range(1, 5)),
+    "g2o edges": "".join(f"EDGE_SE3:QUAT {at} {at + 1} {at} 2 3 0 0 0 1 {'1 ' * 21}\n" for at in range(1, 5)),
+    "g2o plane": "".join(f"VERTEX_SE2 {at} {at} 2 0.5\n" for at in range(1, 5)),
+    "semicolon": "t;x;y;z;qx;qy;qz;qw\n" + "".join(f"{at};{at + 4};2;3;0;0;0;1\n" for at in range(1, 5)),
+    "tsv": "t\tx\ty\tz\tqx\tqy\tqz\tqw\n" + "".join(f"{at}\t{at + 4}\t2\t3\t0\t0\t0\t1\n" for at in range(1, 5)),
+    "bare euroc": "".join(f"140363658083855564{at},{at},2,3,1,0,0,0\n" for at in range(1, 5)),
+    "calls": "".join(f"--x {at} --y 2 --z 3 --frame-id map --child-frame-id body{at}\n" for at in range(1, 5)),
+}  # fmt: skip
+IN = {"g2o edges": ("--edges",), "tsv": ("--in", "tsv"), "semicolon": ("--in", "semicolon")}
+
+
+def damaged(text: str, draw: random.Random) -> str:
+    """Drop a word of a line, add one, double one, or write another separator."""
+    lines = text.splitlines(keepends=True)
+    at = draw.choice([at for at, line in enumerate(lines) if len(re.findall(r"[\s,;]", line)) > 2])
+    parts = re.split(r"([ ,;\t]+)", lines[at])  # words at even places, what stands between them at odd ones
+    word = draw.randrange(0, len(parts) - (lines[at].endswith(" \n")), 2)
+    match draw.choice(["drop", "add", "double", "swap", "glue"]):
+        case "drop":
+            del parts[word : word + 2]
+        case "add":
+            parts[word:word] = [draw.choice(["7", "x", "-0.5", "1e3"]), " " if " " in lines[at] else draw.choice(",;\t")]
+        case "double":
+            parts[word:word] = parts[word : word + 2]
+        case "swap":
+            parts[draw.randrange(1, len(parts), 2)] = draw.choice([",", ";", "\t", " ", "  ", ", "])
+        case _:
+            parts[draw.randrange(1, len(parts), 2)] = ""
+    return "".join([*lines[:at], "".join(parts), "" if "".join(parts).endswith("\n") else "\n", *lines[at + 1 :]])
+
+
+def poses_in(out: str) -> list[str]:
+    """Return the position and rotation of every line of JSON."""
+    return [repr((row["xyz"], row["quaternion"])) for row in map(json.loads, out.splitlines())]
+
+
+@pytest.mark.parametrize("form", [*FORMS, *MORE_FORMS])
+def test_a_damaged_line_is_refused_or_told_and_never_shifts_a_pose(form: str, run: Run) -> None:
+    draw = random.Random(form)  # noqa: S311 - not for secrets
+    text = MORE_FORMS.get(form) or text_of(form, matrices(4))
+    command = ("convert", "-i", "file", "-f", "json", *IN.get(form, ()))
+    whole = poses_in(run(*command, files={"file": text}).out)
+    assert len(whole) == 4
+    for _ in range(40):
+        made = damaged(text, draw)
+        done = run(*command, files={"file": made})
+        assert "Traceback" not in done.err
+        if done.status == 0:
+            found = poses_in(done.out)
+            assert set(found) <= set(whole), made
+            assert len(found) == len(whole) or "left out" in done.err, made

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pytest
 
 from frametool.documents.source import Source
-from frametool.errors import ValueInvalid
+from frametool.errors import FormatError, ValueInvalid
+from frametool.formats.load import load
 from frametool.geometry.representations import notation
 from frametool.geometry.rotation import Rotation
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import Reading
 from frametool.grammar.result import Result, Style
 from frametool.ros.publisher import read_call, write_poses
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 TURN = Rotation.from_rpy([0.2, 0.1, 1.5])
 POSE = Pose((0.1, 0.0, -0.2), TURN.components, "camera:é", "base")
@@ -80,3 +86,21 @@ def test_a_name_that_cannot_be_read_back_is_not_written(name: str, form: str) ->
 def test_a_name_with_a_blank_is_quoted_in_flags() -> None:
     pose = Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), "cam 1", "map")
     assert read(write_poses([Result(pose)], Style("static2"))).name == "cam 1"
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("begin", ["", "static_transform_publisher ", "ros2 run tf2_ros static_transform_publisher "])
+def test_calls_are_parted_by_any_line_end(begin: str, end: str, tmp_path: Path) -> None:
+    lines = [f"{begin}{at} 0 0 0 0 0 f{at} f{at + 1}" for at in range(3)]
+    (tmp_path / "a").write_bytes(end.join([*lines, "", "# nothing", ""]).encode())
+    assert load(tmp_path / "a", format="calls").frames == ("f0", "f1", "f2", "f3")
+    (tmp_path / "a").write_bytes(end.join([*lines, "oops"]).encode())
+    with pytest.raises(FormatError, match=r"a:4: static_transform_publisher takes .* found 1 words"):
+        load(tmp_path / "a", format="calls")
+
+
+def test_two_calls_in_one_line_are_refused_and_a_hash_within_a_name_is_part_of_it() -> None:
+    with pytest.raises(ValueInvalid, match="2 calls of static_transform_publisher in one line; write one a line"):
+        read("static_transform_publisher 1 0 0 0 0 0 a b & static_transform_publisher 1 0 0 0 0 0 b c")
+    assert read("1 0 0 0 0 0 a b#c").name == "b#c"
+    assert read("1 0 0 0 0 0 a b # c").name == "b"

@@ -16,9 +16,9 @@ from functools import partial
 from math import radians
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.document import format_error, parse_documents
+from frametool.documents.document import format_error, locate_many, parse_documents
 from frametool.documents.json import looks_like_json
-from frametool.errors import FormatError, Unanswered, ValueInvalid, shown
+from frametool.errors import FormatError, Unanswered, ValueInvalid, did_you_mean, listing, shown
 from frametool.formats.robots.model import Joint, Link
 from frametool.formats.robots.posture import Posture
 from frametool.formats.trees.tree_reader import line_error
@@ -29,10 +29,10 @@ from frametool.text.csv_line import LineCell, split_line
 from frametool.text.numbers import LENGTHS, NotFinite, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.grammar.edges import Edge, Options
+    from frametool.grammar.edges import Edge, Options, Tally
     from frametool.grammar.readers import Path
 
     Fail = Callable[[str], FormatError]
@@ -47,6 +47,13 @@ COLUMNS = {
     "type": ("type", "joint_type", "kind", "sigma"),
     "name": ("name", "joint", "joint_name", "link", "i", "j", "id", "#", "no", "frame", "index"),
 }
+NAME = "name"
+# keys about something else, which are told and left out; any other key is an error, as it may be a misspelt one
+OTHERS = frozenset((
+    "min", "max", "qmin", "qmax", "q_min", "q_max", "lower", "upper", "limit", "limits", "qlim", "range", "home",
+    "axis", "mass", "m", "com", "inertia", "jm", "b", "tc", "g", "velocity", "effort", "parent", "child", "flip", "mdh",
+    "convention", "comment", "note", "description", "model", "robot", "color",
+))  # fmt: skip
 NEEDED = ("d", "a", "alpha")
 UNITS = {
     "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radians": "rad",
@@ -95,7 +102,7 @@ class Amount(NamedTuple):
 
 
 class DhRow(NamedTuple):
-    """One joint: theta and d with their offsets, and what makes the error for its place."""
+    """One joint: theta and d with their offsets, and its line."""
 
     name: str
     kind: str
@@ -103,20 +110,20 @@ class DhRow(NamedTuple):
     d: Amount
     a: float
     alpha: Amount
-    fail: Fail
+    line: int = 0
 
 
-def rows_of(file: InputFile) -> list[DhRow]:
-    """Return the rows of a table; raises FormatError with the place."""
+def rows_of(file: InputFile, tally: Tally) -> list[DhRow]:
+    """Return the rows of a table, and note what else stands in them; raises FormatError with the place."""
     text = file.text
     is_document = looks_like_json(text) or re.search(r"(?m)^ *(?:- *)?[{\[]|^ *(?:- +)?[\w.-]+:(?:\s|$)", text)
-    cells = _of_documents(file) if is_document else _of_lines(file)
+    cells = _of_documents(file, tally) if is_document else _of_lines(file, tally)
     rows: dict[str, DhRow] = {}
-    for number, (each, fail) in enumerate(cells, 1):
+    for number, (each, fail, line) in enumerate(cells, 1):
         row = _row(number, each, fail)
         if row.name in rows:
             raise fail(f"two joints are called {shown(row.name)}: rows {[*rows].index(row.name) + 1} and {number}")
-        rows[row.name] = row
+        rows[row.name] = row._replace(line=line)
     if not rows:
         raise FormatError("a table without rows", source=file.name)
     return [*rows.values()]
@@ -159,7 +166,7 @@ def _row(number: int, cells: dict[str, Cell], fail: Fail) -> DhRow:
     for column, amount in (("a", a), ("alpha", alpha)):
         if amount.variable is not None:
             raise cells[column].fail(f"{shown(cells[column].text)} is not a number; only theta or d vary")
-    return DhRow(name, kind, theta, d, a.number, alpha, fail)
+    return DhRow(name, kind, theta, d, a.number, alpha)
 
 
 def _read(cell: Cell, read: Callable[[str, str], Amount]) -> Amount:
@@ -197,7 +204,19 @@ def _length(text: str, unit: str) -> Amount:
     return Amount(parse_number(text) / LENGTHS[unit] if is_bare else parse_length(text))
 
 
-def _of_lines(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
+def _tell_others(names: Iterable[str], line: int, tally: Tally) -> None:
+    """Note the columns or keys that are about something else."""
+    if others := list(dict.fromkeys(names)):
+        tally.note_each(f"left out, about something else: {listing(others)}", line)
+
+
+def _misspelt(name: str) -> str:
+    """Return the nearest of the known names for what is none of them, as ` did you mean 'x'?`."""
+    known = [each for names in COLUMNS.values() for each in names if len(each) > 1]
+    return did_you_mean(name.strip().lower(), known, cutoff=0.75)
+
+
+def _of_lines(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
     """Yield the rows of a text with a line a row, below a header."""
     lines = [(number, line) for number, line in enumerate(file.text.split("\n"), 1) if line.strip()]
     begin = next((at for at, (_, line) in enumerate(lines) if _columns(line)), None)
@@ -210,6 +229,11 @@ def _of_lines(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
     names = [column.name for column in columns.values()]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise line_error(file, number, 1, f"two columns for {twice}; keep one")
+    others = [word for at, word in enumerate(_split(header)) if at not in columns]
+    for word in others:
+        if near := _misspelt(word.text):
+            raise line_error(file, number, word.column, f"unknown column {shown(word.text)}{near}")
+    _tell_others((word.text for word in others), number, tally)
     for number, line in lines[begin + 1 :]:
         if line.lstrip().startswith("#"):
             continue
@@ -220,7 +244,7 @@ def _of_lines(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
             column.name: Cell(words[at].text, column.unit, partial(line_error, file, number, words[at].column))
             for at, column in columns.items()
         }
-        yield cells, partial(line_error, file, number, 1)
+        yield cells, partial(line_error, file, number, 1), number
 
 
 def _columns(line: str) -> dict[int, Column]:
@@ -240,52 +264,74 @@ def _split(line: str) -> list[LineCell]:
     return found[:: 2 if mark and line.count(mark) + 1 < len(found) else 1]
 
 
-def _of_documents(file: InputFile) -> Iterator[tuple[dict[str, Cell], Fail]]:
+def _of_documents(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
     """Yield the rows of YAML or JSON."""
     source = file.source
     for document in parse_documents(source.text, source.name):
-        rows = _find_rows(document.value, ())
-        if rows is None:
-            message = "no table in it: expected a list of {theta, d, a, alpha}, a map of them, or a list a column"
-            raise format_error(source, (document.index,), message)
-        for name, row in rows:
-            cells = {}
-            for key, (value, path) in row.items():
-                fail = partial(format_error, source, (document.index, *path))
+
+        def fail(message: str, *path: str | int, key: bool = False, index: int = document.index) -> FormatError:
+            return format_error(source, (index, *path), message, key=key)
+
+        tables = list(_tables(document.value, (), fail))
+        if len(tables) != 1:
+            expected = "expected a list of {theta, d, a, alpha}, a map of them, or a list a column"
+            raise fail(f"{len(tables)} tables in it; keep one" if tables else f"no table in it: {expected}")
+        (rows,) = tables
+        lines = locate_many(source.text, [(document.index, *path) for _, path, _ in rows])
+        _tell_others((key for _, _, row in rows for key in row if key.lower() in OTHERS), lines[0][0], tally)
+        for (name, path, row), (line, _) in zip(rows, lines, strict=True):
+            cells: dict[str, Cell] = {}
+            for key, (value, place) in row.items():
                 column = column_of(key)
-                if column is not None and value is not None and type(value) is not str:
-                    raise fail(f"expected a number, found {kind(value)}")
-                if column is not None:
-                    cells[column.name] = Cell(value or "0", column.unit, fail)
-            fail = partial(format_error, source, (document.index, *next(iter(row.values()))[1][:-1]))
+                if key.lower() in OTHERS:
+                    continue
+                if column is None:
+                    message = f"unknown key {shown(key)}{_misspelt(key)}; a row has {', '.join(COLUMNS)}"
+                    raise fail(message, *place, key=True)
+                if column.name in cells:
+                    raise fail(f"two keys for {column.name}; keep one", *place, key=True)
+                if type(value) is not str:
+                    raise fail(f"expected a number, found {kind(value)}", *place)
+                cells[column.name] = Cell(value, column.unit, partial(format_error, source, (document.index, *place)))
             if name and "name" not in cells:
-                cells["name"] = Cell(name, "", fail)
-            yield cells, fail
+                cells["name"] = Cell(name, "", partial(format_error, source, (document.index, *path)))
+            yield cells, partial(format_error, source, (document.index, *path)), line
 
 
-def _find_rows(value: Any, path: Path, depth: int = 0) -> list[tuple[str, dict[str, tuple[Any, Path]]]] | None:
-    """Return the rows as (name, key -> value and its place); None where there are none."""
-    if depth > 4 or type(value) not in (dict, list) or not value:
-        return None
+def _tables(
+    value: Any, path: Path, fail: Callable[..., FormatError]
+) -> Iterator[list[tuple[str, Path, dict[str, tuple[Any, Path]]]]]:
+    """Yield each table as its rows: name, place, and key -> value and its place; raises what `fail` makes."""
+    if len(path) > 4 or type(value) not in (dict, list) or not value:
+        return
     items = list(value.items() if type(value) is dict else enumerate(value))
-    if _is_row(items[0][1]) and all(type(each) is dict for _, each in items):
+    if any(_is_row(each) for _, each in items):
         rows = []
         for name, row in items:
-            cells = {key: (cell, (*path, name, key)) for key, cell in row.items()}
-            rows.append((name if type(value) is dict else "", cells))
-        return rows
-    if _is_row(value):  # a map of columns, or of the numbers of one row
-        columns: dict[str, list[tuple[Any, Path]]] = {}
+            if type(row) is dict:
+                cells = {key: (cell, (*path, name, key)) for key, cell in row.items()}
+                rows.append((name if type(value) is dict else "", (*path, name), cells))
+            elif type(value) is list:
+                raise fail(f"expected a row {{theta, d, a, alpha}}, found {kind(row)}", *path, name)
+        yield rows
+    elif _is_row(value):  # a map of columns, or of the numbers of one row
+        listed = [key for key, each in items if type(each) is list]
+        size = len(value[listed[0]]) if listed else 1
+        # one name beside columns is that of the robot
+        alone = {key for key, each in items if listed and type(each) is str and column_of(key) == (NAME, "")}
+        columns = {key: each for key, each in items if key not in alone}
+        for key, each in columns.items():
+            if listed and column_of(key) and (type(each) is not list or len(each) != size):
+                found = len(each) if type(each) is list else kind(each)
+                raise fail(f"{key}: expected {size} numbers as {listed[0]} has, found {found}", *path, key)
+        places = [(key, each, (*path, key)) for key, each in columns.items()]
+        yield [
+            ("", path, {key: (each[at], (*way, at)) if key in listed else (each, way) for key, each, way in places})
+            for at in range(size)
+        ]
+    else:
         for key, each in items:
-            if column_of(key):
-                listed = type(each) is list
-                columns[key] = (
-                    [(cell, (*path, key, at)) for at, cell in enumerate(each)] if listed else [(each, (*path, key))]
-                )
-        count = max(map(len, columns.values()))
-        return [("", {key: cells[at] for key, cells in columns.items() if at < len(cells)}) for at in range(count)]
-    found = (_find_rows(each, (*path, key), depth + 1) for key, each in items)
-    return next((rows for rows in found if rows is not None), None)
+            yield from _tables(each, (*path, key), fail)
 
 
 def _is_row(value: Any) -> bool:
@@ -299,11 +345,11 @@ TURN = 6.283185307179586
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield an edge a row, its joint as options say, else at 0."""
-    rows = rows_of(file)
+    rows = rows_of(file, options.tally)
     if not options.answers.dh:
         choice = "--dh standard (a and alpha behind the joint) or --dh modified (Craig: before it)"
-        error = rows[0].fail(f"nothing in a table of Denavit-Hartenberg parameters says which they are: give {choice}")
-        raise Unanswered(error.message, source=error.source, line=error.line, column=error.column)
+        message = f"nothing in a table of Denavit-Hartenberg parameters says which they are: give {choice}"
+        raise Unanswered(message, source=file.name, line=rows[0].line, column=1)
     frames = options.answers.names(*(f"link{number}" for number in range(len(rows) + 1)))
     links = [_link(row, parent, child, options) for row, parent, child in zip(rows, frames, frames[1:], strict=False)]
     posture = Posture.of(links, options)
@@ -313,7 +359,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 def _link(row: DhRow, parent: str, child: str, options: Options) -> Link:
     """Make a link of one row; its joint turns about z or shifts along it."""
-    line = row.fail("").line
+    line = row.line
     for name, amount in (("theta", row.theta), ("alpha", row.alpha)):
         if not amount.degrees and abs(amount.number) > TURN:
             message = f"{name} {amount.number:g} is more than a full turn in radians; degrees? write {name}_deg"

@@ -111,7 +111,8 @@ class _Scene:
         values = {}
         for joint, position in positions.items():
             numbers = position if type(position) is list else [position]
-            if len(numbers) == 1 and type(numbers[0]) is str and len(found.scopes) == 1:
+            if len(numbers) == 1 and len(found.scopes) == 1:
+                within((JOINTS, joint), read_numbers, numbers, (joint,))
                 values[joint] = numbers[0]
             else:
                 self.reading.here = path

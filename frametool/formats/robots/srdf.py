@@ -79,7 +79,7 @@ def _value(xml: XmlFile, element: Element, text: str) -> Any:
     """Return a value as the grammar of joints has it: one number, or a pose."""
     words = text.split()
     if len(words) <= 1:
-        return words[0] if words else ""
+        return repr(xml.numbers(element, "value", 1)[0])
     texts = [repr(number) for number in xml.numbers(element, "value", 3 if len(words) == 3 else 7)]
     if len(texts) == 3:
         return {"xyz": [*texts[:2], "0"], "rpy": ["0", "0", texts[2]]}

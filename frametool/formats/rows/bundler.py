@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
-from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
+from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import Poses
 from frametool.grammar.readers import Note
 
@@ -32,11 +32,12 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
     """Yield the poses of the cameras that were estimated; those with a focal length of 0 are counted and told."""
     lines = ((number, line.split()) for number, line in text_lines(file) if line.strip() and not line.startswith("#"))
     first, head = next(lines, (1, []))
-    if len(head) != 2 or not head[0].isdecimal():
+    if len(head) != 2:
         message = f"expected how many cameras and points, found {shown(' '.join(head))}"
         raise FormatError(message, source=file.name, line=first)
+    count, _ = (whole_in(file, first, word, "how many cameras and points") for word in head)
     missing = 0
-    for camera in range(int(head[0])):
+    for camera in range(count):
         rows, at = [], first
         for _ in range(LINES):
             at, words = next(lines, (at, []))
@@ -50,7 +51,7 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
             turn = [number for row in rows[1:4] for number in row]
             yield Written((*rows[4], *turn), camera, at - LINES + 1)
     if missing:
-        message = f"{missing} of {head[0]} cameras were not estimated (f = 0): left out"
+        message = f"{missing} of {count} cameras were not estimated (f = 0): left out"
         options.tally.note(Note("odd", message, ()), first)
 
 

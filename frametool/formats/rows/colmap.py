@@ -11,11 +11,12 @@ of frames that a rig has since 2025, frames.txt, holds the pose of the world in 
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
 from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm
-from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
+from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import Poses
 from frametool.geometry import rigid
 
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Options, Samples
 
 IMAGE_LINE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
-FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ"
+NUMBER_BEFORE = r"[-+.\d]+(?:[eE][-+]?\d+)?\s"
+POINTS = "X Y POINT3D_ID each"
+FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .."
 POSES = Poses("wxyz", inverse=True, axes="optical", frames=("world", "camera"), counted="image ids")
 
 
@@ -52,15 +55,27 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:  # noqa: ARG0
     """Yield the poses of images.txt, or of frames.txt, as they are written."""
     comments, lines = True, text_lines(file)
     of_frames = False
+    begins_so: bool | None = None  # whether names of pictures begin with a number and a blank
     for number, line in lines:
         bare = line.strip()
         if not bare or bare.startswith("#"):
             of_frames |= comments and "Frame list" in bare
             continue
         comments = False
-        yield _pose(file, number, bare, of_frame=of_frames)
+        pose = _pose(file, number, bare, of_frame=of_frames)
+        begins = re.match(NUMBER_BEFORE, pose.image) is not None
+        if begins_so is None:
+            begins_so = begins
+        elif begins != begins_so:
+            message = f"only some pictures are called as {shown(pose.image)}; a number too many or too few in the line?"
+            raise FormatError(message, source=file.name, line=number)
+        yield pose
         if not of_frames:
-            next(lines, None)
+            below, points = next(lines, (0, ""))
+            words = points.split()
+            if len(words) % 3 or not all(re.fullmatch("-1|[0-9]+", word) for word in words[2::3]):
+                message = f"expected points ({POINTS}) or an empty line below an image, found {len(words)} words"
+                raise FormatError(message, source=file.name, line=below)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Samples]:
@@ -70,11 +85,13 @@ def read(file: InputFile, options: Options) -> Iterator[Samples]:
 
 def _pose(file: InputFile, line: int, text: str, *, of_frame: bool) -> Written:
     words = text.split(maxsplit=9)  # the name of a picture may hold blanks
-    if of_frame and len(words) < 9:
-        raise FormatError(f"expected {FRAME_LINE} .., found {len(words)} words", source=file.name, line=line)
-    if not of_frame and len(words) != 10:
-        raise FormatError(f"expected 10 words ({IMAGE_LINE}), found {len(words)}", source=file.name, line=line)
+    data = text.split()[9:] if of_frame else []  # how many, and three words of each
+    expected = FRAME_LINE if of_frame else f"10 words ({IMAGE_LINE})"
+    if len(words) < 9 or (len(words) < 10 and not of_frame):
+        raise FormatError(f"expected {expected}, found {len(words)} words", source=file.name, line=line)
+    number = whole_in(file, line, words[0], "an id")
+    whole_in(file, line, *((words[1], "RIG_ID") if of_frame else (words[8], "CAMERA_ID")))
+    if data and len(data) != 1 + 3 * whole_in(file, line, data[0], "NUM_DATA_IDS"):
+        raise FormatError(f"expected {expected}, three words of each, found {len(data)}", source=file.name, line=line)
     w, x, y, z, *position = numbers_in(file, line, words[1 + of_frame : 8 + of_frame])
-    if not words[0].isdecimal():
-        raise FormatError(f"expected an id, found {shown(words[0])}", source=file.name, line=line)
-    return Written((*position, w, x, y, z), int(words[0]), line, "" if of_frame else words[9])
+    return Written((*position, w, x, y, z), number, line, "" if of_frame else words[9])

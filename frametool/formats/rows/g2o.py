@@ -9,13 +9,16 @@ Edges measure, and contradict each other: they are no tree; the vertices are wha
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, shown
+from frametool.errors import FormatError, did_you_mean, listing, shown
 from frametool.formats.rows.pose_rows import Numbers, RowForm
-from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
+from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import Poses
 from frametool.geometry import euler, floats
+from frametool.grammar.readers import Note
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,6 +29,11 @@ if TYPE_CHECKING:
 POSES = Poses("quaternion", counted="ids of vertices")
 ROWS = RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=())
 EDGES = Poses("quaternion", counted="")
+# what else g2o writes: landmarks, parameters, measurements between others
+NO_POSE = re.compile(
+    r"FIX|PARAMS_\w+|ROBOTLASER\d|VERTEX_(?:XY|TRACKXYZ|POINTXYZ?|CAM|SWITCH\w*)"
+    r"|EDGE_(?:SE[23]_\w+|PRIOR_\w+|BEARING_\w+|PROJECT_\w+|POINTXYZ?|SWITCH\w*)"
+).fullmatch
 IN_SPACE, IN_PLANE = "x y z qx qy qz qw", "x y theta"
 VERTICES = {"VERTEX_SE3:QUAT": IN_SPACE, "VERTEX_SE2": IN_PLANE}
 MEASURED = {"EDGE_SE3:QUAT": IN_SPACE, "EDGE_SE2": IN_PLANE}
@@ -42,13 +50,26 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
     edges = options.answers.edges
     kinds, others = (MEASURED, VERTICES) if edges else (VERTICES, MEASURED)
     only_others = 0
+    unknown, first = Counter[str](), 0
     for number, line in text_lines(file):
         words = line.split()
-        if words and words[0] in others:
+        if not words or words[0].startswith("#"):
+            continue
+        if words[0] in others:
             only_others = only_others or number
-        if words and words[0] in kinds:
+        elif words[0] in kinds:
             only_others = -1
             yield _pose(file, number, words, kinds[words[0]], ids=1 + edges)
+        elif not words[0][0].isupper():
+            message = f"expected a tag as {next(iter(kinds))}, found {shown(words[0])}"
+            raise FormatError(message, source=file.name, line=number)
+        elif not NO_POSE(words[0]):
+            unknown[words[0]] += 1
+            first = first or number
+    if unknown:
+        counts = listing((f"{count} {tag}" for tag, count in unknown.items()), 3)
+        message = f"lines of unknown tags left out: {counts}{did_you_mean(next(iter(unknown)), kinds)}"
+        options.tally.note(Note("odd", message, ()), first)
     if only_others > 0:
         as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
         found = "vertices in it; leave --edges out" if edges else as_poses
@@ -62,14 +83,12 @@ def _pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int
     kind, *rest = words
     if len(rest) != size and (ids == 1 or len(rest) != size + INFORMATION[layout]):
         raise FormatError(f"expected {kind} {expected}, found {len(words)} words", source=file.name, line=line)
-    for word in rest[:ids]:
-        if not word.isdecimal():
-            raise FormatError(f"expected the id of a vertex, found {shown(word)}", source=file.name, line=line)
+    number, *_ = (whole_in(file, line, word, "the id of a vertex") for word in rest[:ids])
     numbers = numbers_in(file, line, rest[ids:size])
     if layout == IN_PLANE:
         x, y, theta = numbers
         numbers = [x, y, 0.0, *euler.to_quaternion(0.0, 0.0, theta, "sxyz", floats)]
-    return Written(tuple(numbers), int(rest[0]), line, names=(rest[0], rest[1]) if ids > 1 else None)
+    return Written(tuple(numbers), number, line, names=(rest[0], rest[1]) if ids > 1 else None)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Samples]:

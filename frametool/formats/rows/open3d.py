@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from frametool.documents.document import parse_documents
 from frametool.errors import FormatError
 from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix
-from frametool.formats.rows.trajectory import Written, numbers_in, position_and_turn, samples, text_lines
+from frametool.formats.rows.trajectory import Written, numbers_in, position_and_turn, samples, text_lines, whole_in
 from frametool.formats.table import Poses
 from frametool.grammar.readers import Misfit, as_mapping, read_numbers, within
 
@@ -59,8 +59,9 @@ def _blocks(file: InputFile) -> Iterator[Written]:
     """Yield the poses of a .log."""
     lines = ((number, line.split()) for number, line in text_lines(file) if line.strip())
     for number, words in lines:
-        if len(words) != 3 or not words[0].isdecimal():
+        if len(words) != 3:
             raise FormatError("expected three whole numbers before a matrix", source=file.name, line=number)
+        counted, *_ = (whole_in(file, number, word, "the number of a pose") for word in words)
         rows, at = [], number
         for _ in range(4):
             at, row = next(lines, (at, []))
@@ -70,7 +71,7 @@ def _blocks(file: InputFile) -> Iterator[Written]:
             rows.append(numbers_in(file, at, row))
         if rows[3] != LAST_ROW:
             raise FormatError("the last row of a pose is 0 0 0 1", source=file.name, line=at)
-        yield Written(position_and_turn(rows), int(words[0]), number)
+        yield Written(position_and_turn(rows), counted, number)
 
 
 def _parameters(file: InputFile) -> Iterator[Written]:

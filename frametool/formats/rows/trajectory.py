@@ -5,12 +5,13 @@ Says what all such forms share: checked rotations, direction, axes of cameras, s
 
 from __future__ import annotations
 
+import re
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.chunks import lines
 from frametool.documents.document import format_error
-from frametool.errors import FormatError, ValueInvalid
+from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.rows.pose_rows import with_axes_turned
 from frametool.frames.stamps import BILLION, parse_stamp, whole_stamp
 from frametool.geometry.representations import notation
@@ -194,6 +195,13 @@ def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
 def position_and_turn(rows: Sequence[Sequence[float]]) -> tuple[float, ...]:
     """Return the numbers of a pose from the rows of its matrix, as `Written` has them."""
     return (*(row[3] for row in rows[:3]), *(number for row in rows[:3] for number in row[:3]))
+
+
+def whole_in(file: InputFile, line: int, word: str, what: str) -> int:
+    """Read a word as a whole number, which `what` names; raises FormatError."""
+    if not re.fullmatch("[0-9]{1,18}", word):
+        raise FormatError(f"expected {what}, a whole number, found {shown(word)}", source=file.name, line=line)
+    return int(word)
 
 
 def numbers_in(file: InputFile, line: int, words: Sequence[str]) -> list[float]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.yaml import TAG
 from frametool.errors import bare, shown
 from frametool.formats.table import DIRECTIONS
-from frametool.formats.trees.tree_reader import Unclear, dotted
+from frametool.formats.trees.tree_reader import Unclear, dotted, named
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
@@ -60,6 +60,16 @@ PAIRS = (
     (r"R", "T", "cam1", "cam0", "R1|P1|Q|E|F"),  # stereoCalibrate, which writes one of these beside them
     (r"R", "[Tt]", "", "", ""),
     (r"(?i:rotation(?:_?matrix)?)", "(?i:translation(?:_?vector)?)", "", "", ""),
+)
+# keys beside a matrix that name its frames, target first; where they do not say the direction, it is asked for
+FRAME_KEYS = (
+    ("parent_frame", "child_frame", True),  # OpenLORIS-Scene: as tf has it
+    ("parent_frame_id", "child_frame_id", True),
+    ("frame_id", "child_frame_id", True),
+    ("parent", "child", True),
+    ("target_frame", "source_frame", False),
+    ("destination_frame", "source_frame", False),
+    ("to_frame", "from_frame", False),
 )
 # what is no pose, though some of it has the size of one
 NO_POSE = (
@@ -148,8 +158,11 @@ def partner_of(key: str, others: Collection[str]) -> Pair | None:
     for rotation, translation, target, source, needed in PAIRS:
         if not (match := re.fullmatch(rotation, key)):
             continue
-        wanted, child = (match.expand(each) if match.groups() else each for each in (translation, source))
-        found = next((other for other in others if re.fullmatch(wanted, other)), None)
+        if match.groups():  # one key belongs to it, and is not looked for among all
+            wanted, child = match.expand(translation), match.expand(source)
+            found = wanted if wanted in others else None
+        else:
+            found, child = next((other for other in others if re.fullmatch(translation, other)), None), source
         if found is not None and (not needed or any(re.fullmatch(needed, other) for other in others)):
             return Pair(found, target, child)
     return None
@@ -303,6 +316,7 @@ class _Forest:
 
     def __init__(self) -> None:
         self.edges: dict[str, Edge] = {}
+        self._groups: dict[str, str] = {}  # a frame -> one nearer to that which stands for its tree
 
     def hang(self, each: Stated) -> None:
         """Add a pose that connects two trees."""
@@ -310,6 +324,7 @@ class _Forest:
         if child in self.edges and parent not in self.edges and not each.firm:
             child, parent = parent, child
         self._make_root(child)
+        self._groups[self._group(child)] = self._group(parent)
         pose = each.components if child == each.source else rigid.inverse(*each.components)
         self.edges[child] = Edge(parent, child, pose, path=each.path)
 
@@ -323,18 +338,29 @@ class _Forest:
             parent = edge.parent or ""
             self.edges[parent] = Edge(edge.child, parent, rigid.inverse(*edge.components), path=edge.path)
 
-    def lookup(self, target: str, source: str) -> Rigid | None:
-        """Return target_from_source; None where the two are not connected."""
-        (root, root_from_target), (other, other_from_source) = map(self._above, (target, source))
-        return rigid.compose(*rigid.inverse(*root_from_target), *other_from_source) if root == other else None
+    def _group(self, frame: str) -> str:
+        """Return the frame that stands for all of a tree."""
+        while (above := self._groups.get(frame, frame)) != frame:
+            self._groups[frame] = self._groups.get(above, above)  # so that the way is half as long the next time
+            frame = above
+        return frame
 
-    def _above(self, frame: str) -> tuple[str, Rigid]:
-        """Return the root above a frame, and the pose of the frame in it."""
-        pose = IDENTITY
-        while frame in self.edges:
-            edge = self.edges[frame]
-            pose, frame = rigid.compose(*edge.components, *pose), edge.parent or ""
-        return frame, pose
+    def lookup(self, target: str, source: str) -> Rigid | None:
+        """Return target_from_source; None where the two are not connected.
+
+        Both ways up are climbed in turn until they meet: neighbours deep in a long chain cost no more than others.
+        """
+        if self._group(target) != self._group(source):
+            return None
+        ways = ({target: IDENTITY}, {source: IDENTITY})  # frames above -> the pose in them of what is below
+        tops = [target, source]
+        at = 0
+        while (top := tops[at]) not in ways[1 - at]:
+            if edge := self.edges.get(top):
+                tops[at] = edge.parent or ""
+                ways[at][tops[at]] = rigid.compose(*edge.components, *ways[at][top])
+            at = 1 - at
+        return rigid.compose(*rigid.inverse(*ways[0][top]), *ways[1][top])
 
 
 def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
@@ -404,6 +430,8 @@ class Matrices:
         self.left: list[str] = []
         self.asked = 0
         self.blocks = _renamed(_blocks(document, "", ()), naming)
+        self.before = _before(self.blocks)
+        self.bodies = [each for each in self.blocks if "T_BS" in each.entries][:2]
         self.poses = [pose for block in self.blocks for pose in self._of_block(block)]
 
     def edges(self, tally: Tally, nothing: str) -> list[Edge]:
@@ -429,7 +457,7 @@ class Matrices:
                 continue
             self.reading.here = (*block.path, key)
             grid = within(self.reading.here, grid_of, value)
-            partner = partner_of(key, [other for other in block.entries if other != key]) if grid else None
+            partner = partner_of(key, block.entries) if grid else None
             if grid is not None and partner is not None:
                 paired.add(partner.translation)
                 yield self._pair(block, key, grid, partner)
@@ -452,7 +480,7 @@ class Matrices:
             ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
             raise Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {ways}", path, key=True)
         if meaning is None or not meaning.said:
-            meaning = self._directed(block, key, path, meaning)
+            meaning = self._named(block, path) or self._directed(block, key, path, meaning)
         if "" in (meaning.target, meaning.source):
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
         position, rotation = within(path, read_spelled, MATRIX, whole.texts, whole.places, self.reading)
@@ -462,23 +490,29 @@ class Matrices:
         """Return the names that the templates of the table stand for."""
         base = self.naming.base or "imu"
         body = self.naming.base or "body"
-        inertial = next((each.name for each in self.blocks if each is not block and "T_BS" in each.entries), body)
+        inertial = next((each.name for each in self.bodies if each is not block), body)
         me = block.name or self.naming.alone
-        return {"me": me, "before": self._before(block), "imu": base, "body": body, "sensor": inertial}
+        return {"me": me, "before": self.before[block.path], "imu": base, "body": body, "sensor": inertial}
 
-    def _before(self, block: MatrixBlock) -> str:
-        """Return the camera before this one: cam0 of cam1; else the block before it; "" if there is none."""
-        around, own = block.path[:-1], block.path[-1] if block.path else ""
-        beside = {each.path[-1]: each.name for each in self.blocks if each.path and each.path[:-1] == around}
-        if match := re.fullmatch(r"(.*?)([0-9]+)", str(own)):
-            return beside.get(f"{match[1]}{int(match[2]) - 1}", "")
-        earlier = [*beside.values()][: [*beside].index(own)] if own in beside else []
-        return earlier[-1] if earlier else ""
+    def _named(self, block: MatrixBlock, path: Path) -> Meaning | None:
+        """Return what the keys beside a matrix say that name its two frames; None where there are none.
 
-    def _directed(self, block: MatrixBlock, key: str, path: Path, named: Meaning | None) -> Meaning:
+        Raises Misfit where one of the two is missing, and Unclear where nothing says the direction.
+        """
+        for target, source, said in FRAME_KEYS:
+            if target in block.entries and source in block.entries:
+                parent, child = (within(block.path, named, block.entries, key) for key in (target, source))
+                what = f"{target} and {source} beside {path[-1]}"
+                return Meaning(parent, child, child) if said else self._told(what, path, parent, child)
+        ways = ((key, other) for one, two, _ in FRAME_KEYS for key, other in ((one, two), (two, one)))
+        for key, other in ((key, other) for key, other in ways if key in block.entries):
+            raise Misfit(f"{key} without {other}, so nothing says what the matrix is between", (*block.path, key))
+        return None
+
+    def _directed(self, block: MatrixBlock, key: str, path: Path, ends: Meaning | None) -> Meaning:
         """Return what a key means that does not say its direction, as options say; raises Unclear if they do not."""
-        if named is not None:
-            parent, child = named.target, named.source
+        if ends is not None:
+            parent, child = ends.target, ends.source
         else:
             told = self.naming.told[1:]
             parent = self.naming.base or ("imu" if block.name else "body")
@@ -503,7 +537,9 @@ class Matrices:
         if shift is None:
             found = kind(block.entries[pair.translation])
             raise Misfit(f"{pair.translation}: expected 3 numbers, found {found}", place)
-        if pair.target == "cam1":  # of two cameras cam0 is told first
+        if named_by_keys := self._named(block, path):
+            meaning = named_by_keys
+        elif pair.target == "cam1":  # of two cameras cam0 is told first
             source, target = self.answers.names(pair.source, pair.target)
             meaning = Meaning(target, source, target)
         elif pair.target:
@@ -521,6 +557,22 @@ class Matrices:
         if is_matrix or (type(value) is dict and value.get(TAG) in TAGS):
             what = no_pose(str(path[-1]))
             self.left.append(f"{bare(dotted(path))} ({what})" if what else bare(dotted(path)))
+
+
+def _before(blocks: Sequence[MatrixBlock]) -> dict[Path, str]:
+    """Return the camera before each block by its path: cam0 of cam1; else the block before it; "" if there is none."""
+    beside: dict[Path, dict[str | int, str]] = {}
+    for each in blocks:
+        if each.path:
+            beside.setdefault(each.path[:-1], {})[each.path[-1]] = each.name
+    found: dict[Path, str] = {(): ""}
+    for around, names in beside.items():
+        earlier = ""
+        for own, name in names.items():
+            number = re.fullmatch(r"(.*?)([0-9]{1,9})", str(own))
+            found[(*around, own)] = names.get(f"{number[1]}{int(number[2]) - 1}", "") if number else earlier
+            earlier = name
+    return found
 
 
 def _renamed(blocks: Iterator[MatrixBlock], naming: FrameNames) -> list[MatrixBlock]:

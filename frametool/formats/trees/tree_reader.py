@@ -25,7 +25,7 @@ from frametool.grammar.rotation_spelling import rotation_of
 from frametool.ros import messages
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
@@ -321,20 +321,34 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
         options.report(error)
         return
     for document in documents:
-        reading = Reading(source, normalize=options.normalize)
+        reading = Reading(source, normalize=options.normalize, bare_numbers=True)
         reading.faults = []
         try:
             for edge in take(document.value, reading):
                 yield without_slashes(edge, reading)._replace(path=(document.index, *edge.path))
         except Misfit as misfit:
             reading.faults.append(misfit)
-        for fault in reading.faults:
-            placed = fault.placed(source, document.index)
-            if isinstance(placed, Unanswered):
-                raise placed
-            options.report(placed)
+        for fault in _placed(reading.faults, source, document.index):
+            if isinstance(fault, Unanswered):
+                raise fault
+            options.report(fault)
         paths = [(document.index, *note.path) for note in reading.notes]
         remember(reading.notes, (line for line, _ in locate_many(source.text, paths)), options.tally)
+
+
+def _placed(faults: Sequence[Misfit], source: Source, document: int) -> Iterator[FormatError]:
+    """Yield the errors for what is wrong in a document; those behind the first are looked for all at once."""
+    for fault in faults[:1]:
+        yield fault.placed(source, document)
+    others = faults[1:]
+    paths = [(document, *fault.path) for fault in others]
+    values, keys = (locate_many(source.text, paths, key=key) for key in (False, True))
+    for fault, *places in zip(others, values, keys, strict=True):
+        if isinstance(fault, Unclear):
+            yield fault.placed(source, document)
+        else:
+            line, column = places[fault.key]
+            yield FormatError(str(fault), source=source.name, line=line, column=column, rule=fault.rule)
 
 
 def remember(notes: Iterable[Note], lines: Iterable[int], tally: Tally) -> None:
