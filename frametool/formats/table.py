@@ -40,7 +40,7 @@ class Format(NamedTuple):
     instead: of a form that is known and not read: what to do
     delimiter: what stands between the cells of its rows, "" for blanks; None where it has no such rows
     columns: what its rows hold, in order, where no header says so; widths: how many of them, where others are refused
-    poses: what its rows mean, of a trajectory
+    poses: what its rows mean
     texts: whether columns of texts have a place among its `arrays`
     """
 
@@ -59,7 +59,7 @@ class Format(NamedTuple):
     delimiter: str | None = None
     columns: tuple[str, ...] = ()
     widths: tuple[int, ...] = ()
-    poses: Poses | None = None
+    poses: Poses = Poses("quaternion", counted="")
     texts: bool = False
 
     @property
@@ -98,6 +98,8 @@ def _arrays(
 DIRECTIONS = ("parent-from-child", "child-from-parent")
 CAMERA_AXES = ("optical", "opengl")
 DH = ("standard", "modified")
+CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH}
+_CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
 _TABLE = "frametool.stream.table_samples"
@@ -170,6 +172,7 @@ FORMATS = {
         suffixes=(".csv",),
         reads=("tree", "rows"),
         reader=_TABLE,
+        asks=("frames", "stamps"),
         writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.rows.csv",
         signs=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
@@ -180,6 +183,7 @@ FORMATS = {
         (".tsv", ".tab"),
         reads=("tree", "rows"),
         reader=_TABLE,
+        asks=("frames", "stamps"),
         signs=(("header", r".*\t"),),
         delimiter="\t",
     ),
@@ -187,6 +191,7 @@ FORMATS = {
         "CSV with semicolons and a header",
         reads=("tree", "rows"),
         reader=_TABLE,
+        asks=("frames", "stamps"),
         signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),),
         delimiter=";",
     ),
@@ -268,6 +273,7 @@ FORMATS = {
         "COLMAP images.txt",
         "frametool.formats.rows.colmap",
         names=("images.txt",),
+        poses=Poses("wxyz", inverse=True, axes="optical", frames=_CAMERA, counted="image ids"),
         signs=(
             ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
             ("line", rf"\d+(?:[ \t]+{_NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
@@ -278,8 +284,9 @@ FORMATS = {
         "NeRF transforms.json",
         "frametool.formats.rows.nerf",
         names=("transforms.json",),
+        poses=Poses("matrix", axes="opengl", frames=_CAMERA, counted="places in its list"),
         signs=(("json path", "frames/transform_matrix"),),
-        states="world<-camera; opengl: x right, y up, z backward",
+        states="world<-camera; opengl (y up, z back) unless told",
     ),
     "kitti": _trajectory(
         "KITTI poses",
@@ -298,6 +305,7 @@ FORMATS = {
         suffixes=(".g2o",),
         signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
         states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
+        poses=Poses("quaternion", counted="ids of vertices"),
         asks=("frames", "stamps"),
     ),
     "open3d": _trajectory(
@@ -309,13 +317,15 @@ FORMATS = {
             ("json path", "parameters/extrinsic"),
         ),
         states=".log holds world<-camera, .json camera<-world",
+        poses=Poses("matrix", axes="optical", frames=_CAMERA),  # of the .log
     ),
     "bundler": Format(
         "Bundler's bundle.out",
         reads=("tree", "trajectory", "rows"),
         reader="frametool.formats.rows.bundler",
+        poses=Poses("matrix", inverse=True, axes="opengl", frames=_CAMERA, counted="numbers of cameras"),
         signs=(("text", r"\A\ufeff?# *Bundle file v"),),
-        states="the file holds camera<-world; opengl: cameras look along -z",
+        states="holds camera<-world; opengl (along -z) unless told",
         asks=("frames", "stamps", "camera_axes"),
     ),
     "colmap-bin": Format(
@@ -362,8 +372,8 @@ FORMATS = {
         "KITTI calibration",
         "frametool.formats.trees.kitti_calib",
         signs=(("text", _KITTI),),
-        states="parent<-child, metres, optical axes of cameras",
-        asks=("frames",),
+        states="parent<-child, metres, optical axes of cameras unless told",
+        asks=("frames", "camera_axes"),
     ),
     "drake": _read_tree(
         "Drake model directives",
@@ -405,6 +415,7 @@ FORMATS = {
         reader="frametool.formats.robots.mjcf",
         signs=(("xml", "mujoco"),),
         states="parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)",
+        asks=("camera_axes",),
     ),
     "sdf": _read_tree(
         "SDF of Gazebo",

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import FormatError, shown
 from frametool.formats.rows.pose_rows import Numbers, RowForm
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines
-from frametool.formats.table import Poses
+from frametool.formats.table import FORMATS, Poses
 from frametool.geometry import euler, floats
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
 
-POSES = Poses("quaternion", counted="ids of vertices")
+POSES = FORMATS["g2o"].poses
 ROWS = RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=())
 EDGES = Poses("quaternion", counted="")
 IN_SPACE, IN_PLANE = "x y z qx qy qz qw", "x y theta"
