@@ -34,6 +34,7 @@ from frametool.frames.lookups import FrameTree
 from frametool.frames.policy import Refused
 from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, stop
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS
+from frametool.grammar.readers import alike, more_like_it
 
 TYPE_CHECKING = False
 
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Report
+    from frametool.grammar.edges import Remark, Report
 
 
 class Recording(InputFile):
@@ -147,8 +148,11 @@ class Recording(InputFile):
 
     def tell(self) -> None:
         """Warn of what was odd in the file, once it was read."""
+        found: dict[str, list[Remark]] = {}
         for told in self.tally.told():
-            warn(f"{self.name}:{told.line}: {told.message}")
+            found.setdefault(alike(told), []).append(told)
+        for first, *others in found.values():
+            warn(f"{self.name}:{first.line}: {first.message}{more_like_it(1 + len(others))}", rule=first.rule)
 
     def _scoped(self, edges: Iterable[Edge]) -> Iterator[Edge]:
         """Yield the edges under each of the scopes that another file gives them."""

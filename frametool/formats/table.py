@@ -286,7 +286,7 @@ FORMATS = {
         names=("transforms.json",),
         poses=Poses("matrix", axes="opengl", frames=_CAMERA, counted="places in its list"),
         signs=(("json path", "frames/transform_matrix"),),
-        states="world<-camera; opengl (y up, z back) unless told",
+        states="world<-camera; opengl (y up, z back)",
     ),
     "kitti": _trajectory(
         "KITTI poses",
@@ -325,7 +325,7 @@ FORMATS = {
         reader="frametool.formats.rows.bundler",
         poses=Poses("matrix", inverse=True, axes="opengl", frames=_CAMERA, counted="numbers of cameras"),
         signs=(("text", r"\A\ufeff?# *Bundle file v"),),
-        states="holds camera<-world; opengl (along -z) unless told",
+        states="holds camera<-world; opengl (along -z)",
         asks=("frames", "stamps", "camera_axes"),
     ),
     "colmap-bin": Format(
@@ -343,7 +343,8 @@ FORMATS = {
         "camera chain of Kalibr, OpenVINS or okvis; matrices by name",
         "frametool.formats.trees.camchain",
         signs=(
-            ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),
+            ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC|T_BS"),
+            ("json path", "*/T_BS/data"),
             ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
         ),
         states="target<-source as each key says; metres; intrinsics are not kept",
@@ -364,9 +365,15 @@ FORMATS = {
     "euroc-sensor": _read_tree(
         "sensor.yaml of EuRoC",
         "frametool.formats.trees.camchain",
-        signs=(("yaml key", "T_BS"),),
+        signs=(("yaml key", "T_BS"), ("json key", "T_BS")),
         states="T_BS is body<-sensor, metres",
         asks=("frames",),
+    ),
+    "apollo": _read_tree(
+        "Apollo extrinsics: a TransformStamped",
+        _TREE,
+        signs=(("yaml inner", "euler_angles_degree"),),
+        states="parent<-child, metres, quaternion by name; its euler_angles_degree are not used",
     ),
     "kitti-calib": _read_tree(
         "KITTI calibration",

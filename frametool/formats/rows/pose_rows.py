@@ -95,8 +95,9 @@ def turned(style: Style, pose: Components) -> Components:
     """Turn a camera's axes to those of a form where both are known, and those of a camera that it is seen from."""
     if not is_turned(style):
         return pose
-    tx, ty, tz, x, y, z, w = rigid.compose(*pose, *HALF_TURN)
-    return rigid.compose(*HALF_TURN, tx, ty, tz, x, y, z, w) if style.in_camera else (tx, ty, tz, x, y, z, w)
+    tx, ty, tz, x, y, z, w = pose
+    found = rigid.compose(tx, ty, tz, x, y, z, w, *HALF_TURN)
+    return rigid.compose(*HALF_TURN, *found) if style.in_camera else found
 
 
 def is_turned(style: Style) -> bool:
