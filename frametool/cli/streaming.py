@@ -164,7 +164,7 @@ class Stream:
             pasted, stream = self._pasted(stream, request)
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
-        form = form or self._detected(stream.peek())
+        form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)
@@ -183,11 +183,11 @@ class Stream:
             say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
         return status
 
-    def _detected(self, begin: bytes) -> str:
+    def _detected(self, begin: bytes, *, is_table: bool) -> str:
         """Find the form of the stream by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
-        form, known_by = detect(begin, *STREAMED, name=self.path or "")
+        form, known_by = detect(begin, *STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
         if known_by:
             say_if_verbose(f"{self.name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
         return form

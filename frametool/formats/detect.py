@@ -276,20 +276,20 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
         return empty, "nothing else"
     if not begin.text.strip():
         raise FormatError("nothing in it", source=name or "stdin")
-    if "records" in reads or not begin.has_data:
+    if "records" in reads or not begin.has_data or not re.search(r"(?m):(?:\s|$)|^\s*[-?&!{[]", begin.text):
         raise _unknown(begin, *reads, name=name)
     return "yaml", "nothing else"
 
 
 _LISTED = "`frametool formats` lists what is read"
-_NUM = r"""["']?[-+]?\.?\d[\w.+-]*["']?"""
+_NUM = r"""["']?[-+]?(?:\.?\d[\w.+-]*|nan|inf\w*)["']?"""
 _KEYS = (
     "frames?|name|parent|children|child_frame_id|transforms?|header|samples|poses?|point|vector|position|translation|"
     r"orientation|rotation|quaternion|matrix|(?:xyz|rpy|euler)\w*"
 )
 _DATA = (
     # a number that is a cell or a value, in line with others or alone; a key of ours; a header with a name of ours
-    rf"""(?im)[,;\t:=\[{{(][ \t]*{_NUM}[ \t]*(?=[,;\t\]}})]|$)|^[ \t]*(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])|"""
+    rf"""(?im)[,;\t:\[{{][ \t]*{_NUM}[ \t]*(?=[,;\t\]}}]|$)|^[ \t]*(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])|"""
     rf"""(?:^|[\s{{,-])["']?(?:{_KEYS})["']?:(?:\s|$)|^[-\s]*[{{\[]|\A[# ]*x +y\b|"""
     r"""\A[#%" ]*(?:[^\n]*[,;\t] *)?["']?(?:\w*[._])?(?:[xyz]|q[xyzw]|roll|pitch|yaw|frame|frame_id|name|parent)"""
     r"""["']?\s*(?:[,;\t(\[]|$)"""
@@ -300,15 +300,16 @@ _MOST_NAMED = 8
 def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     """Make the error for a file that shows no sign: how it begins, which forms there are."""
     likely = readers(*reads)
-    what = "text"
+    what = "this text"
     if begin.xml:
         likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].signs))
         what = f"XML with the root element {bare(''.join(begin.elements[:1]))}"
     more = f" and {len(likely) - _MOST_NAMED} more" if len(likely) > _MOST_NAMED else ""
     named = f"{', '.join(likely[:_MOST_NAMED])}{more}"
     return FormatError(
-        f"cannot tell the form of this {what}; forms: {named}; `frametool formats` lists all, --in FORM names one",
+        f"cannot tell the form of {what}; forms: {named}; `frametool formats` lists all, --in FORM names one",
         source=name or "stdin",
+        line=1,
     )
 
 
@@ -326,7 +327,8 @@ def refuse_robots(text: bytes, name: str) -> None:
 def with_hint(error: FormatError, text: bytes, name: str) -> FormatError:
     """Return the error for a text without a pose: of frames, one that points to `lookup`; no prose is quoted."""
     begin = Beginning(text[:HEAD])
-    if begin.data_line and not (begin.has_data or by_suffix(name, readers("records", "rows")) or not_text(begin.head)):
+    is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or _fitting(begin, _STRONG, (*FORMATS,))[0]
+    if begin.data_line and not (is_known or not_text(begin.head)):
         error = _unknown(begin, "records", "rows", name=name)
     return _points_to_lookup(text, name) or error
 
