@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options, one_argument, pose_stream_options
+from frametool.cli.group import settings
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import combinations, one_pose
+from frametool.cli.stderr import say
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative, relative_names
 
@@ -83,7 +85,10 @@ def command(
         operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
         beside = (time_column or "") if velocity else None
         request = task.request(operation=operation, extra_column=beside, rename=lambda _parent, name: (name, name))
-        return task.answer(a or "-", request)
+        status = task.answer(a or "-", request)
+        if velocity and not settings().quiet:
+            say("note: the first pose has none before it, so no velocity: it is left out, results begin at the second")
+        return status
     if len(given) < 2 or "-" in given:
         return task.stream.run(_with_rows(a, b, task.request()), task.output)
     if task.stream.path:
