@@ -74,7 +74,8 @@ class Beginning:
     @cached_property
     def has_data(self) -> bool:
         """Tell what may hold frames or poses from sentences."""
-        return re.search(_DATA, self.text[:LOOKED_AT]) is not None
+        is_prose = re.match(_SENTENCE, self.data_line) and not re.search(rf"(?i)\b{_OURS}\b", self.data_line)
+        return not is_prose and re.search(_DATA, self.text[:LOOKED_AT]) is not None
 
     @cached_property
     def json_paths(self) -> set[tuple[str, ...]]:
@@ -283,17 +284,19 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
 
 _LISTED = "`frametool formats` lists what is read"
 _NUM = r"""["']?[-+]?(?:\.?\d[\w.+-]*|nan|inf\w*)["']?"""
+_SENTENCE = r"\W*(?:[A-Za-z][\w'-]*[,;:]? +){3,}[A-Za-z]"
 _KEYS = (
     "frames?|name|parent|children|child_frame_id|transforms?|header|samples|poses?|point|vector|position|translation|"
     r"orientation|rotation|quaternion|matrix|(?:xyz|rpy|euler)\w*"
 )
-_DATA = (
-    # a number that is a cell or a value, in line with others or alone; a key of ours; a header with a name of ours
-    rf"""(?im)[,;\t:\[{{][ \t]*{_NUM}[ \t]*(?=[,;\t\]}}]|$)|^[ \t]*(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])|"""
-    rf"""(?:^|[\s{{,-])["']?(?:{_KEYS})["']?:(?:\s|$)|^[-\s]*[{{\[]|\A[# ]*x +y\b|"""
-    r"""\A[#%" ]*(?:[^\n]*[,;\t] *)?["']?(?:\w*[._])?(?:[xyz]|q[xyzw]|roll|pitch|yaw|frame|frame_id|name|parent)"""
-    r"""["']?\s*(?:[,;\t(\[]|$)"""
-)
+_OURS = r"(?:\w*[._])?(?:q?[xyz]|qw|roll|pitch|yaw|frame|frame_id|name|parent)"
+# a number that is a cell or a value, one at the beginning of a line, a key of ours, a list or map, a header
+_DATA = "(?im)" + "|".join((
+    rf"[,;\t:{{][ \t]*{_NUM}[ \t]*(?=[,;\t\]}}]|$)|\[[ \t]*{_NUM}[ \t]*[,;]",
+    rf"^[ \t]*(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])",
+    rf"""(?:^|[\s{{,-])["']?(?:{_KEYS})["']?:(?:\s|$)|^[-\s]*(?:\{{|\[(?![a-z ]+\]))""",
+    rf"""\A[# ]*x +y\b|\A[#%" ]*(?:[^\n]*[,;\t] *)?["']?{_OURS}["']?\s*(?:[,;\t(\[]|$)""",
+))  # fmt: skip
 _MOST_NAMED = 8
 
 

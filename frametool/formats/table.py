@@ -252,7 +252,14 @@ FORMATS = {
     "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
     "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
-    "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.trees.drawings"),
+    "dot": Format(
+        "graphviz",
+        suffixes=(".dot", ".gv"),
+        writes=("tree",),
+        writer="frametool.formats.trees.drawings",
+        signs=(("text", r"\A\s*(?:strict\s+)?digraph\b"),),
+        instead="a drawing holds no poses; give the tree or recording that it was made from",
+    ),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "euroc": _trajectory(
         "EuRoC ground truth",
