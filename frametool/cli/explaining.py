@@ -57,7 +57,9 @@ class PoseTask:
         from frametool.stream.request import Request
 
         degrees = self.output.style.degrees
-        return Request(given=self.stream.given, degrees=degrees, normalize=self.normalize, **rest)
+        made = Request(given=self.stream.given, degrees=degrees, normalize=self.normalize, **rest)
+        self.output.take_axes("", made.operation)
+        return made
 
     def has_table(self, argument: str) -> bool:
         """Tell whether an argument is a file of rows; it is then what -i FILE would be."""

@@ -34,6 +34,7 @@ class Settings:
     where the rest of the command line asks. Like click's `meta`, a command shares them with its group.
 
     reads_trees: no option, but set when files of frames are opened: --in is then about these too
+    inputs: no option either, but the forms of what was read, each with what it asked of `OPEN`
     """
 
     all_versions = False
@@ -51,6 +52,7 @@ class Settings:
     edges = False
     array: str | None = None
     reads_trees = False
+    inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
 
 
 def settings(context: click.Context | None = None) -> Settings:

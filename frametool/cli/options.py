@@ -52,6 +52,12 @@ class Command(WithHelp, Reused):
             args = _with_value(args, option, *OPTIONAL[option])
         return super().parse_args(ctx, args)
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command, then say which of its options were of no use."""
+        result = super().invoke(ctx)
+        _say_not_needed()
+        return result
+
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """End every help with the exit codes, those of most commands unless its epilog says others."""
         formatter.write_paragraph()
@@ -283,7 +289,7 @@ in_option = _setting(
 array_option = _setting("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
 _CAMERA_AXES = _setting(
     "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
-    help="turn cameras to these axes  [default: those that the form of the file has]",
+    help="what the axes of the cameras in a file are, which turns nothing  [default: those of its form]",
 )  # fmt: skip
 _STAMPS = _setting(
     "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
@@ -336,15 +342,18 @@ def say_if_verbose(text: str) -> None:
         say(text)
 
 
-def say_not_needed(forms: Collection[str], *asked: str) -> None:
-    """Say on stderr which options answer what none of these forms leaves open: they change nothing."""
-    if settings().quiet:
-        return
-    for ask in asked:
+OPEN = ("frames", "direction", "camera_axes", "dh", "stamps", "edges", "array")  # what forms may leave open
+
+
+def _say_not_needed() -> None:
+    """Say on stderr which options answer what no input leaves open: they change nothing."""
+    inputs = settings().inputs
+    forms = " and ".join(dict.fromkeys(form for form, _ in inputs if form))
+    for ask in () if settings().quiet else OPEN:
         chosen = getattr(settings(), "named_frames" if ask == "frames" else ask)
-        if chosen and not any(ask in FORMATS[form].asks for form in forms):
-            option = f"--{ask.replace('_', '-')}"
-            say(f"note: {option} changes nothing: {' and '.join(dict.fromkeys(forms))} does not leave that open")
+        if chosen and not any(ask in asks for _, asks in inputs):
+            why = f": {forms} does not leave that open" if forms else " here"
+            say(f"note: --{ask.replace('_', '-')} changes nothing{why}")
 
 
 # --- results -------------------------------------------------------------------------------------------------------

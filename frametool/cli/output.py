@@ -11,6 +11,7 @@ from itertools import islice
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
+from frametool.cli.group import settings
 from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
@@ -23,10 +24,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames, FrameTree
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
     from frametool.stream.array_writer import ArrayWriter
+    from frametool.stream.request import Operation
     from frametool.stream.writers import TextWriter
     from frametool.view.pictures import Picture
 
@@ -68,6 +70,19 @@ class Output:
         full = precision == FULL
         digits = None if full else precision
         self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
+
+    def take_axes(self, known: str, operation: Operation | None = None) -> None:
+        """Keep the axes of the camera that poses are of: as --camera-axes says, else as their form has them."""
+        stated = settings().camera_axes or ""
+        self.style.axes = (stated or known) if operation is None or operation.keeps_child else ""
+        self.style.in_camera = operation is not None and operation.looks_back
+        if stated and self.style.axes and self.style.form in FORMATS and FORMATS[self.style.form].poses.axes:
+            settings().inputs = (*settings().inputs, ("", ("camera_axes",)))
+
+    def take_axes_in(self, tree: Frames, source: str) -> None:
+        """Keep the axes of a frame of a tree: where none is known to be a camera, --camera-axes is about this one."""
+        if source in tree.camera_axes or not tree.camera_axes:
+            self.take_axes(tree.camera_axes.get(source, ""))
 
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""
@@ -139,7 +154,7 @@ class Output:
             "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
         ):
             if self.is_trajectory:
-                self.style.axes = _axes_of_only_mover(tree, self.style.form)
+                self.take_axes_in(tree, _only_mover(tree, self.style.form))
             self.poses(sample_results(tree))
             return
         if self.style.form != "text":
@@ -227,14 +242,14 @@ def _as_pose(value: Result | dict[str, Any]) -> Result:
     return value
 
 
-def _axes_of_only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
-    """Return the camera axes of the one frame of a tree, "" if it is no camera; raise ValueInvalid for several."""
+def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
+    """Return the one frame of a tree that has a parent; raise ValueInvalid for several."""
     children = [track.child for track in tree.tracks()]
     if len(children) != 1:
         frames = ", ".join(map(shown, children[:8])) or "none"
         instead = f"name two: lookup TREE TARGET SOURCE -f {form}"
         raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; {instead}")
-    return tree.camera_axes.get(children[0], "")
+    return children[0]
 
 
 PICTURES = (".svg", ".html", ".png")

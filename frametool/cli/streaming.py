@@ -20,7 +20,6 @@ from frametool.cli.options import (
     in_option,
     input_forms,
     say_if_verbose,
-    say_not_needed,
     together,
     verbose_option,
 )
@@ -165,32 +164,37 @@ class Stream:
             pasted, stream = self._pasted(stream, request)
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
-        form = form or self._detected(stream.peek())
-        say_not_needed((form,), "stamps", "edges")
+        form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)
+        output.take_axes(FORMATS[form].poses.axes, request.operation)
         if is_trajectory(form) and not output.notations:
             request = request._replace(notations=())  # its rows stay what they are
         if form in RECORDS and (output.told or form) != form and request.gathered is None:
             return self._run_as_values(stream, form, request, output)
-        outcomes, about = self._way(form, request, output)(stream, form, request, output)
+        way = self._way(form, request, output)
+        keeps = ("camera_axes",) if way == self._as_text else FORMATS[form].asks
+        asked = tuple(ask for ask in FORMATS[form].asks if ask in keeps)
+        settings().inputs = (*settings().inputs, (form, asked))
+        outcomes, about = way(stream, form, request, output)
         status = self._write(outcomes, output, gathers=request.gathered is not None, by_row=holds_arrays(form))
         if about is not None and (states := FORMATS[form].states) and not self.options["quiet"]:
             say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
         return status
 
-    def _detected(self, begin: bytes) -> str:
+    def _detected(self, begin: bytes, *, is_table: bool) -> str:
         """Find the form of the stream by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
-        form, known_by = detect(begin, *STREAMED, name=self.path or "")
+        form, known_by = detect(begin, *STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
         if known_by:
             say_if_verbose(f"{self.name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
         return form
 
     def _way(self, form: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
         """Choose how rows become results: their text edited, as columns of numbers, or as poses in another form."""
+        from frametool.formats.rows.pose_rows import is_turned
         from frametool.stream.row_layout import POSE
 
         gathers = request.gathered is not None
@@ -202,6 +206,7 @@ class Stream:
             return self._as_poses if gathers and listed else self._as_text
         # a trajectory has no room for more columns, or for other ones
         no_room = output.is_trajectory and bool(request.operation.extras(POSE) or output.notations)
+        no_room |= not output.notations and is_turned(output.style.in_form(output.told or form))
         return self._as_poses if listed or no_room or output.told not in (None, form) else self._as_text
 
     def _as_columns(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.group import settings
-from frametool.cli.options import Text, input_forms, say_not_needed
+from frametool.cli.options import Text, input_forms
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import noting_files, states_of
@@ -92,8 +92,6 @@ def _may_be_kept(files: dict[str, list[FileState]]) -> bool:
     return plain and youngest < time.time_ns() - SETTLED_NS
 
 
-OPEN_IN_TREES = ("frames", "direction", "camera_axes", "dh", "stamps")  # what forms of files of frames may leave open
-
 
 def load_tree(
     argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False
@@ -133,8 +131,6 @@ def _loaded(
 
     tree = load_sources(files, rules, places)
     state(files)
-    if places is None:  # of one of two sides, the other may need what this one does not
-        say_not_needed([file.form for file in files], *OPEN_IN_TREES)
     return tree
 
 
@@ -147,9 +143,12 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     cache = None if context is None else context.find_object(TreeCache)
     if context is None or cache is None:
         return read()
-    settings(context).reads_trees = True
+    chosen = settings(context)
+    chosen.reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    return cache.read(named, f"{options} {vars(settings(context))}", read)
+    key = {name: value for name, value in vars(chosen).items() if name != "inputs"}
+    value, chosen.inputs = cache.read(named, f"{options} {key}", lambda: (read(), chosen.inputs))
+    return value
 
 
 def state(files: Sequence[Recording]) -> None:
@@ -177,7 +176,7 @@ def opened(
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
     chosen = settings()
     chosen.reads_trees = True
-    forms, named = input_forms(streams=streams)[0], chosen.named_frames
+    forms, named = input_forms(streams=streams)[0], [*map(_frame_names, chosen.named_frames)]
     if other := [form for form in forms if "tree" not in FORMATS[form].reads]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
     files = of or len(arguments)
@@ -185,19 +184,27 @@ def opened(
         if not streams and len(values) > files:
             times = f"{len(values)} times for {files} file{'s' * (files != 1)}"
             raise click.UsageError(f"{option} is given {times}")
-    form_of_next, frames_of_next = iter(forms[behind:] or forms), iter(named[behind:] or named)
-    general = answers()
-    return opened_together(
+    form_of_next, general = iter(forms[behind:] or forms), answers()
+    found = opened_together(
         Recording.inline(source_of(each))
         if is_inline(each)
         else Recording(
             tree_file(each),
             form=next(form_of_next, None),
             topics=chosen.topics,
-            answers=general._replace(frames=_frame_names(next(frames_of_next, ""))),
+            answers=general,
         )
         for each in arguments
     )
+    lacking = [file for file in found if "frames" in file.asks]
+    if len(named) not in (0, 1, len(lacking), files):
+        raise click.UsageError(f"--frames is given {len(named)} times, {len(lacking)} of the files need names")
+    for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
+        file.answers = file.answers._replace(frames=names)
+        if file not in lacking and lacking and not chosen.quiet:
+            say(f"note: --frames {','.join(names)} changes nothing: {file.name} names its own frames")
+    chosen.inputs = (*chosen.inputs, *((file.form, file.asks) for file in found))
+    return found
 
 
 def refuse_two_readers(arguments: Sequence[str]) -> None:

@@ -95,7 +95,7 @@ class XmlFile:
                 texts[-1].append(text)
 
         def refuse(*_: object) -> NoReturn:
-            message = "XML with entities of its own is not read; expand them: xmllint --noent FILE"
+            message = "a DOCTYPE with entities is not read; expand them: xmllint --noent FILE"
             raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
 
         parser.StartElementHandler, parser.EndElementHandler = start, end
@@ -121,7 +121,7 @@ class XmlFile:
     def _check_doctype(self, parser: expat.XMLParserType, _: str, file: str | None, *_more: object) -> None:
         """Refuse entities of another file, which expat would leave out in silence."""
         if file and _OTHER_ENTITY.search(self.data.replace(b"\0", b"")):
-            message = f"XML with entities of {shown(file)} is not read; expand them: xmllint --noent --loaddtd FILE"
+            message = f"a DOCTYPE with entities of {shown(file)} is not read; expand: xmllint --noent --loaddtd FILE"
             raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
 
     def _broken(self, error: expat.ExpatError) -> FormatError:

@@ -71,7 +71,7 @@ def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
 def _broken(head: str, formula: str) -> Iterator[str]:
     """Write a formula; one that is too long goes on before its plus and minus signs."""
     line = head
-    for piece in _pieces(formula):
+    for piece in _pieces(formula, WIDTH - len(head)):
         if len(line) + len(piece) > WIDTH and line != head and line.strip():
             yield line.rstrip()
             line = " " * len(head) + piece.lstrip()
@@ -80,20 +80,21 @@ def _broken(head: str, formula: str) -> Iterator[str]:
     yield line.rstrip()
 
 
-def _pieces(formula: str) -> list[str]:
-    """Cut a formula before the signs between its terms, else between its factors, else between terms inside of one."""
-    cuts = _places(formula, 0, (" + ", " - ")) or _places(formula, 0, ("·(",)) or _places(formula, 1, (" + ", " - "))
-    return [formula[begin:end] for begin, end in zip([0, *cuts], [*cuts, len(formula)], strict=True)]
+# where a formula is cut, the best places first: signs, and how deep in parentheses they stand (None: wherever)
+CUTS = ((0, (" + ", " - ")), (0, ("·(",)), (1, (" + ", " - ")), (None, (" + ", " - ")), (None, ("·",)))
 
 
-def _places(formula: str, level: int, signs: tuple[str, ...]) -> list[int]:
-    """Return where signs stand within so many parentheses."""
-    depth, places = 0, []
+def _pieces(formula: str, room: int, cuts: Sequence[tuple[int | None, tuple[str, ...]]] = CUTS) -> Iterator[str]:
+    """Cut a formula before its signs; a piece that has no room is cut again, at the next best places."""
+    places: list[int] = []
+    depth = 0
     for at, letter in enumerate(formula):
-        if depth == level and formula.startswith(signs, at):
+        if cuts[0][0] in (depth, None) and formula.startswith(cuts[0][1], at):
             places.append(at)
         depth += (letter == "(") - (letter == ")")
-    return places
+    for begin, end in zip([0, *places], [*places, len(formula)], strict=True):
+        is_long = len(formula[begin:end].strip()) > room and len(cuts) > 1
+        yield from _pieces(formula[begin:end], room, cuts[1:]) if is_long else (formula[begin:end],)
 
 
 def _grid(grid: MatrixLine) -> list[str]:

@@ -31,7 +31,7 @@ from contextlib import suppress
 from functools import cached_property
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
-from frametool.errors import FormatError, bare, shown
+from frametool.errors import FormatError, bare
 from frametool.formats.table import FORMATS, by_suffix, readers, unread
 
 TYPE_CHECKING = False
@@ -72,6 +72,12 @@ class Beginning:
         return plain or "".join(lines[:1])
 
     @cached_property
+    def has_data(self) -> bool:
+        """Tell what may hold frames or poses from sentences."""
+        is_prose = re.match(_SENTENCE, self.data_line) and not re.search(rf"(?i)\b{_OURS}\b", self.data_line)
+        return not is_prose and re.search(_DATA, self.text[:LOOKED_AT]) is not None
+
+    @cached_property
     def json_paths(self) -> set[tuple[str, ...]]:
         """Return the ways to the keys of JSON; lists on the way do not count."""
         from frametool.documents.json import json_events, looks_like_json
@@ -102,7 +108,7 @@ class Beginning:
     @cached_property
     def yaml_inner_keys(self) -> set[str]:
         """Return the words behind the blanks or dashes of a line, and a brace, that a colon follows."""
-        return {found[2] for found in re.finditer(rf"(?m)^[ -]+\{{? *{_YAML_KEY}", self.text)}
+        return {found[2] for found in re.finditer(rf"(?m)^(?:[ -]+|[\w./-]+: *(?=\{{))\{{? *{_YAML_KEY}", self.text)}
 
     @cached_property
     def leaves(self) -> set[str]:
@@ -184,10 +190,11 @@ def _count(keys: set[str], pattern: str) -> int:
 def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> tuple[list[str], str]:
     """Return the forms that show a sign of the strongest kind that is shown at all, and that kind."""
     for kind, shows in tests.items():
-        if found := [
-            name for name in names if any(kind == of and shows(begin, what) for of, what in FORMATS[name].signs)
-        ]:
-            return found, kind
+        found = [name for name in names if any(kind == of and shows(begin, what) for of, what in FORMATS[name].signs)]
+        if found and kind == "yaml key":  # no stronger than those that stand deeper
+            found += _fitting(begin, {"yaml inner": tests["yaml inner"]}, names)[0]
+        if found:
+            return list(dict.fromkeys(found)), kind
     return [], ""
 
 
@@ -249,17 +256,20 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if form:
         return form, known_by
     if "tree" not in reads and (what := not_text(head)):
-        raise FormatError(what, source=name or "stdin")
+        raise FormatError(f"{what}; {_LISTED}", source=name or "stdin")
     if "tree" in reads and begin.xml:
         raise _unknown(begin, *reads, name=name)
+    if others := _fitting(begin, {"magic": _STRONG["magic"]}, readers("arrays"))[0]:
+        what = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
+        raise FormatError(what, source=name or "stdin")
     if form := by_suffix(name, readers(*reads)):
         return form, f"the suffix {name[name.rfind('.') :].lower()}"
     if form := by_suffix(name, unread()):
         raise not_read(form, name)
     if (what := not_text(head)) and not head.startswith(UTF16):
-        raise FormatError(what, source=name or "stdin")
+        raise FormatError(f"{what}; {_LISTED}", source=name or "stdin")
     found, _ = _fitting(begin, _WEAK, readers(*reads))
-    if found:
+    if found and (otherwise or begin.has_data):
         return found[0], "its first line"
     if otherwise:
         return otherwise, "nothing else"
@@ -267,19 +277,33 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
         return empty, "nothing else"
     if not begin.text.strip():
         raise FormatError("nothing in it", source=name or "stdin")
-    if "records" in reads or not re.search(_LIKE_YAML, begin.text):
+    if "records" in reads or not begin.has_data or not re.search(r"(?m):(?:\s|$)|^\s*[-?&!{[]", begin.text):
         raise _unknown(begin, *reads, name=name)
     return "yaml", "nothing else"
 
 
-_LIKE_YAML = r"""(?m):(?:\s|$)|^[^\S\n]*+[-?&!{[]"""  # a key, a list, or what else may begin a value
+_LISTED = "`frametool formats` lists what is read"
+_NUM = r"""["']?[-+]?(?:\.?\d[\w.+-]*|nan|inf\w*)["']?"""
+_SENTENCE = r"\W*(?:[A-Za-z][\w'-]*[,;:]? +){3,}[A-Za-z]"
+_KEYS = (
+    "frames?|name|parent|children|child_frame_id|transforms?|header|samples|poses?|point|vector|position|translation|"
+    r"orientation|rotation|quaternion|matrix|(?:xyz|rpy|euler)\w*"
+)
+_OURS = r"(?:\w*[._])?(?:q?[xyz]|qw|roll|pitch|yaw|frame|frame_id|name|parent)"
+# a number that is a cell or a value, one at the beginning of a line, a key of ours, a list or map, a header
+_DATA = "(?im)" + "|".join((
+    rf"[,;\t:{{][ \t]*{_NUM}[ \t]*(?=[,;\t\]}}]|$)|\[[ \t]*{_NUM}[ \t]*[,;]",
+    rf"^[ \t]*(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])",
+    rf"""(?:^|[\s{{,-])["']?(?:{_KEYS})["']?:(?:\s|$)|^[-\s]*(?:\{{|\[(?![a-z ]+\]))""",
+    rf"""\A[# ]*x +y\b|\A[#%" ]*(?:[^\n]*[,;\t] *)?["']?{_OURS}["']?\s*(?:[,;\t(\[]|$)""",
+))  # fmt: skip
 _MOST_NAMED = 8
 
 
 def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     """Make the error for a file that shows no sign: how it begins, which forms there are."""
     likely = readers(*reads)
-    what = shown(begin.first_line.strip()[:40])
+    what = "this text"
     if begin.xml:
         likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].signs))
         what = f"XML with the root element {bare(''.join(begin.elements[:1]))}"
@@ -304,7 +328,11 @@ def refuse_robots(text: bytes, name: str) -> None:
 
 
 def with_hint(error: FormatError, text: bytes, name: str) -> FormatError:
-    """Return the error for a text without a pose: of a file of frames, one that points to `frametool lookup`."""
+    """Return the error for a text without a pose: of frames, one that points to `lookup`; no prose is quoted."""
+    begin = Beginning(text[:HEAD])
+    is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or _fitting(begin, _STRONG, (*FORMATS,))[0]
+    if begin.data_line and not (is_known or not_text(begin.head)):
+        error = _unknown(begin, "records", "rows", name=name)
     return _points_to_lookup(text, name) or error
 
 

@@ -28,11 +28,13 @@ from frametool.errors import (
     shown,
     warn,
 )
-from frametool.formats.detect import detect, of_folder
-from frametool.formats.table import BAG, FORMATS, readers
+from frametool.formats.detect import Beginning, detect, of_folder
+from frametool.formats.table import BAG, CHOICES, FORMATS, readers
 from frametool.frames.lookups import FrameTree
 from frametool.frames.policy import Refused
 from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, stop
+from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS
+from frametool.grammar.readers import alike, more_like_it
 
 TYPE_CHECKING = False
 
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Report
+    from frametool.grammar.edges import Remark, Report
 
 
 class Recording(InputFile):
@@ -87,6 +89,15 @@ class Recording(InputFile):
     def holds_samples(self) -> bool:
         """Tell a recording from a tree in YAML or JSON."""
         return "records" not in FORMATS[self.form].reads
+
+    @property
+    def asks(self) -> tuple[str, ...]:
+        """Name what the file leaves open; of a table frames too where no columns name them, of poses in recordings."""
+        row = FORMATS[self.form]
+        if self.form in ("csv", "tsv", "semicolon"):
+            words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.delimiter)}
+            return row.asks[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
+        return (*row.asks, *["frames"] * bool(self.topics.chosen))
 
     @property
     def described(self) -> str:
@@ -137,8 +148,11 @@ class Recording(InputFile):
 
     def tell(self) -> None:
         """Warn of what was odd in the file, once it was read."""
+        found: dict[str, list[Remark]] = {}
         for told in self.tally.told():
-            warn(f"{self.name}:{told.line}: {told.message}")
+            found.setdefault(alike(told), []).append(told)
+        for first, *others in found.values():
+            warn(f"{self.name}:{first.line}: {first.message}{more_like_it(1 + len(others))}", rule=first.rule)
 
     def _scoped(self, edges: Iterable[Edge]) -> Iterator[Edge]:
         """Yield the edges under each of the scopes that another file gives them."""
@@ -480,8 +494,15 @@ def load(
     values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in given.items()}
     joint_files = () if joints is None or given is joints else (str(joints),)
     known = Answers(tuple(frames), joints=values, joint_files=joint_files, **answers)
-    files = (Recording(path, form=format, topics=chosen, answers=known) for path in paths)
-    return load_sources(opened_together(files), rules)
+    for ask, choices in CHOICES.items():
+        if (answer := answers.get(ask)) and answer not in choices:
+            raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")
+    files = opened_together(Recording(path, form=format, topics=chosen, answers=known) for path in paths)
+    for ask in ("frames", *answers):
+        if getattr(known, ask) and not any(ask in file.asks for file in files):
+            names = " and ".join(dict.fromkeys(file.form for file in files))
+            warn(f"{ask} changes nothing: {names} does not leave that open")
+    return load_sources(files, rules)
 
 
 def load_sources(
@@ -530,4 +551,4 @@ def _add(assembly: Assembly, file: Recording) -> None:
             assembly.add(piece.parent, piece.child, piece.components, piece.stamp_ns, Place(file, piece))
     if piece is None:
         raise FormatError("no frames in it", source=file.name)
-    assembly.axes |= file.tally.axes
+    assembly.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}

@@ -40,7 +40,7 @@ class Format(NamedTuple):
     instead: of a form that is known and not read: what to do
     delimiter: what stands between the cells of its rows, "" for blanks; None where it has no such rows
     columns: what its rows hold, in order, where no header says so; widths: how many of them, where others are refused
-    poses: what its rows mean, of a trajectory
+    poses: what its rows mean
     texts: whether columns of texts have a place among its `arrays`
     """
 
@@ -59,7 +59,7 @@ class Format(NamedTuple):
     delimiter: str | None = None
     columns: tuple[str, ...] = ()
     widths: tuple[int, ...] = ()
-    poses: Poses | None = None
+    poses: Poses = Poses("quaternion", counted="")
     texts: bool = False
 
     @property
@@ -98,6 +98,8 @@ def _arrays(
 DIRECTIONS = ("parent-from-child", "child-from-parent")
 CAMERA_AXES = ("optical", "opengl")
 DH = ("standard", "modified")
+CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH}
+_CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
 _TABLE = "frametool.stream.table_samples"
@@ -170,6 +172,7 @@ FORMATS = {
         suffixes=(".csv",),
         reads=("tree", "rows"),
         reader=_TABLE,
+        asks=("frames", "stamps"),
         writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.rows.csv",
         signs=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
@@ -180,6 +183,7 @@ FORMATS = {
         (".tsv", ".tab"),
         reads=("tree", "rows"),
         reader=_TABLE,
+        asks=("frames", "stamps"),
         signs=(("header", r".*\t"),),
         delimiter="\t",
     ),
@@ -187,6 +191,7 @@ FORMATS = {
         "CSV with semicolons and a header",
         reads=("tree", "rows"),
         reader=_TABLE,
+        asks=("frames", "stamps"),
         signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),),
         delimiter=";",
     ),
@@ -247,7 +252,14 @@ FORMATS = {
     "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
     "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
     "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
-    "dot": Format("graphviz", (".dot", ".gv"), writes=("tree",), writer="frametool.formats.trees.drawings"),
+    "dot": Format(
+        "graphviz",
+        suffixes=(".dot", ".gv"),
+        writes=("tree",),
+        writer="frametool.formats.trees.drawings",
+        signs=(("text", r"\A\s*(?:strict\s+)?digraph\b"),),
+        instead="a drawing holds no poses; give the tree or recording that it was made from",
+    ),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "euroc": _trajectory(
         "EuRoC ground truth",
@@ -268,6 +280,7 @@ FORMATS = {
         "COLMAP images.txt",
         "frametool.formats.rows.colmap",
         names=("images.txt",),
+        poses=Poses("wxyz", inverse=True, axes="optical", frames=_CAMERA, counted="image ids"),
         signs=(
             ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
             ("line", rf"\d+(?:[ \t]+{_NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
@@ -278,8 +291,9 @@ FORMATS = {
         "NeRF transforms.json",
         "frametool.formats.rows.nerf",
         names=("transforms.json",),
+        poses=Poses("matrix", axes="opengl", frames=_CAMERA, counted="places in its list"),
         signs=(("json path", "frames/transform_matrix"),),
-        states="world<-camera; opengl: x right, y up, z backward",
+        states="world<-camera; opengl (y up, z back)",
     ),
     "kitti": _trajectory(
         "KITTI poses",
@@ -298,6 +312,7 @@ FORMATS = {
         suffixes=(".g2o",),
         signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
         states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
+        poses=Poses("quaternion", counted="ids of vertices"),
         asks=("frames", "stamps"),
     ),
     "open3d": _trajectory(
@@ -309,13 +324,15 @@ FORMATS = {
             ("json path", "parameters/extrinsic"),
         ),
         states=".log holds world<-camera, .json camera<-world",
+        poses=Poses("matrix", axes="optical", frames=_CAMERA),  # of the .log
     ),
     "bundler": Format(
         "Bundler's bundle.out",
         reads=("tree", "trajectory", "rows"),
         reader="frametool.formats.rows.bundler",
+        poses=Poses("matrix", inverse=True, axes="opengl", frames=_CAMERA, counted="numbers of cameras"),
         signs=(("text", r"\A\ufeff?# *Bundle file v"),),
-        states="the file holds camera<-world; opengl: cameras look along -z",
+        states="holds camera<-world; opengl (along -z)",
         asks=("frames", "stamps", "camera_axes"),
     ),
     "colmap-bin": Format(
@@ -333,7 +350,8 @@ FORMATS = {
         "camera chain of Kalibr, OpenVINS or okvis; matrices by name",
         "frametool.formats.trees.camchain",
         signs=(
-            ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC"),
+            ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC|T_BS"),
+            ("json path", "*/T_BS/data"),
             ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
         ),
         states="target<-source as each key says; metres; intrinsics are not kept",
@@ -355,16 +373,22 @@ FORMATS = {
     "euroc-sensor": _read_tree(
         "sensor.yaml of EuRoC",
         "frametool.formats.trees.camchain",
-        signs=(("yaml key", "T_BS"),),
+        signs=(("yaml key", "T_BS"), ("json key", "T_BS")),
         states="T_BS is body<-sensor, metres",
         asks=("frames",),
+    ),
+    "apollo": _read_tree(
+        "Apollo extrinsics: a TransformStamped",
+        _TREE,
+        signs=(("yaml inner", "euler_angles_degree"),),
+        states="parent<-child, metres, quaternion by name; its euler_angles_degree are not used",
     ),
     "kitti-calib": _read_tree(
         "KITTI calibration",
         "frametool.formats.trees.kitti_calib",
         signs=(("text", _KITTI),),
-        states="parent<-child, metres, optical axes of cameras",
-        asks=("frames",),
+        states="parent<-child, metres, optical axes of cameras unless told",
+        asks=("frames", "camera_axes"),
     ),
     "drake": _read_tree(
         "Drake model directives",
@@ -406,6 +430,7 @@ FORMATS = {
         reader="frametool.formats.robots.mjcf",
         signs=(("xml", "mujoco"),),
         states="parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)",
+        asks=("camera_axes",),
     ),
     "sdf": _read_tree(
         "SDF of Gazebo",

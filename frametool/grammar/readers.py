@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.errors import FormatError
+    from frametool.grammar.edges import Remark
 
     Path = tuple[str | int, ...]
     Vector = tuple[float, float, float]
@@ -107,21 +108,25 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
 
     firsts: dict[str, Note] = {}
     for note in notes:
-        firsts.setdefault(_alike(note), note)
-    counts = Counter(map(_alike, notes))
+        firsts.setdefault(alike(note), note)
+    counts = Counter(map(alike, notes))
     told = list(firsts.values())[:most]
     places = locate_many(source.text, [note.path for note in told])
     for (line, column), note in zip(places, told, strict=True):
         place = ":".join(map(str, (source.name, *(() if isinstance(source, Pasted) else source.place(line, column)))))
-        again = counts.pop(_alike(note)) - 1
-        warn(f"{place}: {note.message}{f' ({again} more like it)' * (again > 0)}", rule=note.rule)
+        warn(f"{place}: {note.message}{more_like_it(counts.pop(alike(note)))}", rule=note.rule)
     if counts:
         warn(f"{source.name}: {counts.total()} more like these")
 
 
-def _alike(note: Note) -> str:
-    """Return what notes have in common that are told once; names with a slash are, whatever they are."""
-    return note.rule if note.rule == "slash" else note.message
+def alike(note: Note | Remark) -> str:
+    """Return what notes have in common that are told once, whatever the names and numbers in some are."""
+    return note.rule if note.rule in ("slash", "identity", "rounded") else note.message
+
+
+def more_like_it(count: int) -> str:
+    """Say of how many places a note is true, if of more than one."""
+    return f" ({count - 1} more like it)" if count > 1 else ""
 
 
 def is_slashed(name: str) -> bool:

@@ -30,9 +30,10 @@ class Style:
     precision: digits after the point; None for the shortest text that reads back
     full: that text for people too, who are else shown some decimals of an overview
     axes: those of the camera that the poses are of, `optical` or `opengl`; "" where that is not known
+    in_camera: whether they are seen from the same camera at another time
     """
 
-    __slots__ = ("axes", "degrees", "form", "full", "keep_sign", "notations", "precision")
+    __slots__ = ("axes", "degrees", "form", "full", "in_camera", "keep_sign", "notations", "precision")
 
     def __init__(
         self,
@@ -47,6 +48,7 @@ class Style:
         """Keep what the options of a command say."""
         self.form = form
         self.axes = ""
+        self.in_camera = False
         self.notations = notations
         self.degrees = degrees
         self.precision = precision
@@ -59,7 +61,7 @@ class Style:
             form, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
             keep_sign=self.keep_sign,
         )  # fmt: skip
-        style.axes = self.axes
+        style.axes, style.in_camera = self.axes, self.in_camera
         return style
 
     def in_notations(self, notations: tuple[Notation, ...]) -> Style:

@@ -44,6 +44,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 @contextmanager
 def opened_bag(path: str, tally: Tally) -> Iterator[Any]:
     """Open a bag and yield its reader; whatever the library raises for a broken one is one error."""
+    if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
+        raise FormatError("nothing in it: an empty file is no bag", source=path)
     try:
         from rosbags.highlevel import AnyReader
     except ImportError:
@@ -51,8 +53,6 @@ def opened_bag(path: str, tally: Tally) -> Iterator[Any]:
 
     if path == "-":
         raise FileProblem("stdin: a bag cannot be read from a pipe; name its file")
-    if Path(path).is_file() and not Path(path).stat().st_size:
-        raise FormatError("nothing in it: an empty file is no bag", source=path)
     try:
         _check_whole(path, tally)
         with AnyReader([Path(path)]) as reader:

@@ -13,9 +13,9 @@ import numpy as np
 
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import HALF_TURN, IMAGE, NUMBER
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER
 from frametool.formats.rows.trajectory import StampFile, blocks, describe
-from frametool.formats.table import FORMATS
+from frametool.formats.table import FORMATS, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
@@ -29,7 +29,6 @@ from frametool.stream.row_poses import RowPoses, TablePoses, chosen_poses, kept,
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
-from frametool.stream.table_samples import TABLE
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
 from frametool.stream.writers import TextWriter
 from frametool.text.spans import Spans, framed
@@ -111,16 +110,6 @@ class FormatConverter:
         writer = ArrayWriter if self.to_arrays else TextWriter
         return writer(self.style, kind, extras, placed=self.placed)
 
-    def _turned(self, form: Poses) -> Request:
-        """Return the request with the axes of cameras turned if that was asked for; keep what they then are."""
-        operation = self.request.operation
-        wanted = self.answers.camera_axes
-        if not (operation.inverse or operation.right or operation.of):
-            self.style.axes = wanted or form.axes
-        if wanted and form.axes and wanted != form.axes:
-            operation = operation._replace(before=HALF_TURN)
-        return self.request._replace(operation=operation)
-
     def _settle(self, shape: Shape, plan: Plan, columns: str, line: int = 0) -> None:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
         self.placed = plan.targets[0].unit is not None
@@ -135,8 +124,7 @@ class FormatConverter:
 
     def _rows(self, stream: BufferedReader, *, header: bool) -> Iterator[Step]:
         """Yield the rows of a table."""
-        form = FORMATS[self.form].poses or TABLE
-        request = self._turned(form)
+        form, request = FORMATS[self.form].poses, self.request
         begun = begin_table(stream, self.form, request, source=self.source, header=header)
         request, unasked = settle_stamps(begun.table, request, self.source)
         rows = TablePoses(begun, self.form, request, self.source)
@@ -159,7 +147,7 @@ class FormatConverter:
             )
         if self.stamps:
             self.stamps.finish(count, self.source)
-        if FORMATS[self.form].poses:
+        if is_trajectory(self.form):
             describe(Options(self.tally, Topics(), answers=self.answers), form, count, named=False)
 
     def _stamps(self, poses: RowPoses, form: Poses, before: int) -> Any:
@@ -183,7 +171,7 @@ class FormatConverter:
         """Yield the rows of columns of numbers."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
         opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
-        rows = ColumnRows(opened, self._turned(TABLE), self.source)
+        rows = ColumnRows(opened, self.request, self.source)
         move_along(opened, self.request)
         self._settle(rows.shape, rows.plan, listed(rows.table.names or ("columns without names",)))
         yield Step(rows.poses(opened.nothing()), Outcome(b""))
@@ -209,9 +197,8 @@ class FormatConverter:
         report = stop if self.request.on_error == STOP else lambda error: faults.append(_fault(error))
         options = Options(self.tally, Topics(), report, normalize=self.request.normalize, answers=self.answers)
         has_kinds = hasattr(self.module, "form_of")
-        form: Poses = self.module.form_of(file, options) if has_kinds else self.module.POSES
-        before, request = self.request, self._turned(form)
-        request = request._replace(operation=before.operation)  # the reader turns them
+        form: Poses = self.module.form_of(file, options) if has_kinds else FORMATS[self.form].poses
+        request = self.request
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
         self.placed, self.shape = True, Shape(POSE, 1.0, QUATERNION)

@@ -352,7 +352,8 @@ class ColumnRows:
 
 def _with_vectors(file: ColumnFile, request: Request) -> Request:
     """Ask for the vectors that turn with the points of a file, where its points are not named otherwise."""
-    there = [columns for columns in file.vectors if file.names and set(columns) <= set(file.names)]
+    names = set(file.names or ())
+    there = [columns for columns in file.vectors if names >= {*XYZ, *columns}]  # without x, y, z it is no point at all
     if not there or not request.operation.moves or request.columns or request.kind not in ("", POINT):
         return request
     columns = (",".join(XYZ), *(",".join(each) for each in there))

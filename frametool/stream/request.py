@@ -77,7 +77,6 @@ class Operation(NamedTuple):
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
     mirrors: the row is seen in a mirror across y, before all that stands on its left
-    before: each pose is multiplied with this one from the right before anything else: the axes of a camera
     formula: an expression, instead of all this
     """
 
@@ -90,7 +89,6 @@ class Operation(NamedTuple):
     turns: bool = False
     mirrors: bool = False
     velocity: bool = False
-    before: Rigid | None = None
     formula: Formula | None = None
 
     def extras(self, kind: str) -> tuple[str, ...]:
@@ -114,6 +112,11 @@ class Operation(NamedTuple):
         return self.formula is not None and self.formula.adds
 
     @property
+    def keeps_child(self) -> bool:
+        """Tell whether a result is the pose of what its row is the pose of: of a camera with the same axes."""
+        return not (self.inverse or self.right or self.formula) and self.of in ("", "first", START, PREVIOUS)
+
+    @property
     def looks_back(self) -> bool:
         """Tell whether a row's result depends on the rows before it."""
         return self.of in (START, PREVIOUS)
@@ -121,7 +124,7 @@ class Operation(NamedTuple):
     @property
     def changes_nothing(self) -> bool:
         """Tell whether rows only change their notation."""
-        changed = self.left or self.right or self.of or self.moves or self.mirrors or self.before
+        changed = self.left or self.right or self.of or self.moves or self.mirrors
         return not (changed or self.inverse)
 
     @property
@@ -187,8 +190,6 @@ class Operation(NamedTuple):
 
     def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
         """Return the resulting pose, and what else is known about it."""
-        if self.before is not None:
-            poses = [rigid.compose(*pose, *self.before) for pose in poses]
         result: Rigid = rigid.inverse(*poses[0]) if self.inverse else poses[0]
         if self.mirrors:
             result = rigid.mirrored(*result)

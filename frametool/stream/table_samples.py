@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import not_text
 from frametool.errors import FormatError
-from frametool.formats.rows.pose_rows import with_axes_turned
 from frametool.formats.rows.trajectory import StampFile, describe
-from frametool.formats.table import FORMATS, Poses
+from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
@@ -27,12 +26,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
+    from frametool.formats.table import Poses
     from frametool.geometry.types import Components
     from frametool.grammar.edges import Options
     from frametool.stream.row_poses import RowPoses
     from frametool.text.lines import ByteStream
-
-TABLE = Poses("quaternion", counted="")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
@@ -40,7 +38,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
 
     Raises or reports FormatError with the line of a row that is no pose.
     """
-    form = FORMATS[file.form].poses or TABLE
+    form = FORMATS[file.form].poses
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
     request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)
@@ -91,8 +89,6 @@ def _pieces(
     columns: Components = tuple(block.numbers.T)
     if len(columns) == len("xyzw"):
         columns = (*[columns[0] * 0.0] * 3, *columns)
-    if options.answers.camera_axes and form.axes and options.answers.camera_axes != form.axes:
-        columns = with_axes_turned(columns)
     poses = list(zip(*(column.tolist() for column in columns), strict=True))
     lines = (block.lines + line).tolist()
     world, body = options.answers.names(*form.frames)
@@ -106,8 +102,7 @@ def _pieces(
             yield Samples(parent, name, times[part], poses[part], lines[part])
         else:
             yield from (Edge(parent, name, poses[at], None, lines[at]) for at in some)
-    if form.axes:
-        options.tally.axes[body] = options.answers.camera_axes or form.axes
+    options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or form.axes)
 
 
 def _spread(names: Sequence[str | None], count: int, otherwise: str) -> list[str]:

@@ -137,13 +137,13 @@ class TextWriter:
             )
             dropped.counted |= "stamps" in form.holds and block.stamps_ns is None
             dropped.by_stamp |= IMAGE in form.row and images is None
-            dropped.turned = is_turned(form, self.style)
-        pose = self._canonical(block)
-        return self._joined(form, np.array(form.numbers(*turned(form, self.style, pose))).T, block)
+            dropped.turned = is_turned(self.style)
+        values = np.array(form.numbers(*self._canonical(block))).T + 0.0  # none is -0.0
+        return self._joined(form, values, block)
 
     def _canonical(self, block: RowPoses) -> Components:
-        """Return position and quaternion of a block, with the sign that is written."""
-        tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
+        """Return position and quaternion of a block as the form has a camera's axes, with the sign that is written."""
+        tx, ty, tz, x, y, z, w = turned(self.style, self._own(tuple(block.numbers.T))[:7])
         unit = quaternion.unit(x, y, z, w, arrays)
         return (tx, ty, tz, *(unit if self.style.keep_sign else quaternion.from_quaternion(*unit, arrays)))
 

@@ -8,7 +8,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import cells, printable
-from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS
+from frametool.formats.table import CHOICES, FORMATS
 from frametool.frames.stamps import format_stamp
 from frametool.view.pose_text import WIDTH, in_width
 
@@ -159,7 +159,6 @@ def short(name: str, width: int) -> str:
 
 
 LIST_LABEL = 15  # columns, the indent included
-CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH}
 
 
 def form_entry(name: str) -> dict[str, Any]:

@@ -193,3 +193,40 @@ def test_only_forms_that_are_read_are_offered_for_the_input(run: Run, monkeypatc
     monkeypatch.setenv("COMP_CWORD", "3")
     offered = {line.partition(",")[2] for line in run().out.splitlines()}
     assert offered == set(readers("tree", "records", "rows", "arrays", "joints"))
+
+
+# --- names of frames, what forms leave open ---
+
+TUM = "0 1 2 3 0 0 0 1\n1 2 2 3 0 0 0 1\n"
+OWN_NAMES = "stamp,parent,name,x,y,z,qx,qy,qz,qw\n0,a,b,0,0,0,0,0,0,1\n1,a,b,1,0,0,0,0,0,1\n"
+NO_NAMES = "stamp,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,1,0,0,0,0,0,1\n"
+
+
+@pytest.mark.parametrize(
+    ("files", "named", "frames", "told"),
+    [
+        (("r.urdf", "a.tum"), ("base,m",), ("base", "arm", "m"), ""),
+        (("a.tum", "r.urdf"), ("base,m",), ("base", "arm", "m"), ""),
+        (("r.urdf", "a.tum", "b.tum"), ("base,m", "base,n"), ("base", "arm", "m", "n"), ""),
+        (("own.csv", "a.tum"), ("a,m",), ("a", "b", "m"), ""),
+        (("r.urdf", "none.csv"), ("base,m",), ("base", "arm", "m"), ""),
+        (("r.urdf", "a.tum"), ("x,y", "base,m"), ("base", "arm", "m"), "note: --frames x,y changes nothing: r.urdf names its own frames"),
+        (("own.csv",), ("x,y",), ("a", "b"), "note: --frames changes nothing: csv does not leave that open"),
+        (("none.csv",), ("x,y",), ("x", "y"), ""),
+    ],
+)  # fmt: skip
+def test_names_of_frames_go_to_the_files_that_need_them(run: Run, files: tuple[str, ...], named: tuple[str, ...], frames: tuple[str, ...], told: str) -> None:
+    texts = {**FILES, "a.tum": TUM, "b.tum": TUM, "own.csv": OWN_NAMES, "none.csv": NO_NAMES}
+    more = [word for file in files[1:] for word in ("--with", file)]
+    done = run("tree", files[0], *more, *[word for each in named for word in ("--frames", each)], "-f", "json", files=texts)
+    assert done.status == 0, done.err
+    assert {frame for frame in frames if f'"name": "{frame}"' in done.out} == set(frames), done.out
+    assert ("changes nothing" in done.err) == bool(told)
+    assert told in done.err
+
+
+def test_names_of_frames_for_some_of_the_files_are_those_that_need_them(run: Run) -> None:
+    texts = {**FILES, "a.tum": TUM}
+    done = run("tree", "r.urdf", "--with", "a.tum", "--with", "t.yaml", "--frames", "a,b", "--frames", "c,d", files=texts)
+    assert done.status == 2
+    assert "--frames is given 2 times, 1 of the files need names" in done.err

@@ -59,3 +59,30 @@ def test_warnings_about_many_poses_are_told_of_three_and_counted(run: Run) -> No
     assert outcome.status == 0
     assert len(outcome.err.splitlines()) == 4
     assert "64 more" in outcome.err
+
+
+ENTRIES = {
+    "yaml": "frames:\n" + "".join(f"- {{name: /f{at}, parent: map, xyz: [1, 2, 3]}}\n" for at in range(12)),
+    "txt": "---\n".join(
+        f"transforms:\n- header: {{frame_id: map}}\n  child_frame_id: /f{at}\n  transform:\n    translation: {{x: 0, y: 0, z: 0}}\n"
+        "    rotation: {x: 0, y: 0, z: 0, w: 1}\n" for at in range(12)
+    ),
+    "urdf": '<robot name="r"><link name="map"/>' + "".join(
+        f'<link name="/f{at}"/><joint name="j{at}" type="fixed"><parent link="map"/><child link="/f{at}"/></joint>' for at in range(12)
+    ) + "</robot>",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", ENTRIES)
+def test_a_note_that_differs_in_names_alone_is_one_line_with_its_count(run: Run, suffix: str) -> None:
+    done = run("tree", f"a.{suffix}", files={f"a.{suffix}": ENTRIES[suffix]})
+    (line,) = (line for line in done.err.splitlines() if "warning" in line)
+    assert line.endswith("frame '/f0': the leading / is no part of a name and was left out (11 more like it)")
+
+
+def test_the_first_pose_has_no_velocity_which_is_told(run: Run) -> None:
+    rows = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,1,0,0,0,0,0,1\n"
+    done = run("relative", "--consecutive", "--velocity", stdin=rows)
+    assert done.out.count("\n") == 2
+    assert done.err == "frametool: note: the first pose has none before it, so no velocity: it is left out, results begin at the second\n"
+    assert run("relative", "--consecutive", "--velocity", "--quiet", stdin=rows).err == ""

@@ -43,7 +43,7 @@ BOMB = b'<!DOCTYPE a [<!ENTITY x "ha"><!ENTITY y "&x;&x;">]><a>&y;</a>'
         (b"<a>\n<b></a>", "a.xml:2:6: not XML: mismatched tag"),
         (b"<a>\xff</a>", "a.xml:1:4: not XML: not well-formed (invalid token)"),
         (b"<?xml version='1.0' encoding='foo'?><a/>", "a.xml:1:1: not XML: unknown encoding: foo"),
-        (BOMB, "a.xml:1:25: XML with entities of its own is not read; expand them: xmllint --noent FILE"),
+        (BOMB, "a.xml:1:25: a DOCTYPE with entities is not read; expand them: xmllint --noent FILE"),
         (b'<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><a>&x;</a>', "a.xml:1:"),
         (b'<!DOCTYPE a SYSTEM "file:///etc/passwd"><a/>', ""),
         (b"\x89PNG\r\n", "a.xml:1:1: not text but a PNG picture"),
@@ -83,7 +83,7 @@ def test_a_million_elements_inside_one_another_are_refused_in_a_line() -> None:
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 def test_an_entity_of_another_file_is_refused_and_not_left_out(encoding: str) -> None:
     text = f'<?xml version="1.0" encoding="{encoding}"?>\n<!DOCTYPE a SYSTEM "x.dtd">\n<a xyz="1 &neg;2 3"/>'
-    with pytest.raises(FormatError, match=r"^a\.xml:2:\d+: XML with entities of 'x\.dtd' is not read; expand them: xmllint"):
+    with pytest.raises(FormatError, match=r"^a\.xml:2:\d+: a DOCTYPE with entities of 'x\.dtd' is not read; expand: xmllint"):
         list(xml(text.encode(encoding)).elements())
     plain = text.replace("&neg;", "&#45;")
     assert next(xml(plain.encode(encoding)).elements()).attributes == {"xyz": "1 -2 3"}

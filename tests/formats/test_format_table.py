@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+import yaml
 
 from frametool.errors import FormatError
 from frametool.formats.detect import by_sign, detect, of_folder
@@ -350,19 +351,23 @@ def test_a_suffix_tells_of_a_form_that_is_not_read_where_no_sign_does(run: Calla
 
 
 UNKNOWN: dict[str, tuple[bytes, str]] = {
-    "prose": (b"The quick brown fox\njumps over it\n", "cannot tell the form of 'The quick brown fox'; forms: yaml, "),
-    "code": (b"import os\nprint(1)\n", "cannot tell the form of 'import os'; forms: yaml, "),
-    "a huge line": (b"abc " * 200_000, "cannot tell the form of 'abc abc"),
+    "prose": (b"The quick brown fox\njumps over it\n", "cannot tell the form of this text; forms: yaml, "),
+    "a note": (b"Note: my password is hunter2\nother: thing\n", "cannot tell the form of this text; forms: yaml, "),
+    "a letter": (b"Dear reader, my password is hunter2.\nThis is prose: it has a colon.\nbye\n", "cannot tell the form of this text"),
+    "a word": (b"hunter2", "cannot tell the form of this text"),
+    "a picture": (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), "not text but a PNG picture; `frametool formats` lists what is read"),
+    "code": (b"import os\nprint(1)\n", "cannot tell the form of this text; forms: yaml, "),
+    "a huge line": (b"abc " * 200_000, "cannot tell the form of this text"),
     "XML": (b'<?xml version="1.0"?>\n<!-- c --><note><to>Bob</to></note>', "form of XML with the root element note; forms: "),
     "HTML": (b"<!DOCTYPE html>\n<html><body>" + b"x" * 9999, "form of XML with the root element html; forms: "),
     "binary data": (bytes(range(256)) * 9, "not text but binary data"),
     "gzip": (b"\x1f\x8b\x08\0abc", "not text but gzip data; unpack it first"),
     "zip": (b"PK\x03\x04abc", "not text but a zip archive; unpack it first"),
     "UTF-16 without a mark": ("frames: {a: {b: {}}}".encode("utf-16-le"), "UTF-16LE without a byte order mark"),
-    "escapes": (b"\x1b[31mred\x1b[0m fox\n", "cannot tell the form of '\\x1b[31mred"),
+    "escapes": (b"\x1b[31mred\x1b[0m fox\n", "cannot tell the form of this text"),
     "keys of no tree": (b"".join(b"key_%d: 1\n" % each for each in range(999)), "no frame tree: "),
     "long keys of no tree": (b"{" + b"".join(b'"%d%s": 1,' % (each, b"x" * 500) for each in range(9)) + b'"a": 1}', "no frame tree: "),
-    "text under dashes": (b"--- |\n" + b"  words and more words\n" * 999, "expected a frame tree, found 'words and"),
+    "text under dashes": (b"--- |\n" + b"  words and more words\n" * 999, "cannot tell the form of this text"),
 }
 
 
@@ -403,3 +408,55 @@ def test_verbose_says_by_what_a_file_was_known(run: Callable[..., Any], data: st
     said = run("tree", "a.yaml", "-v", files={"a.yaml": data}).err
     assert said == f"frametool: a.yaml: {FORMATS['yaml'].summary}, known by {by}\n"
     assert run("tree", "a.yaml", "-v", "--in", "yaml").err == f"frametool: a.yaml: {FORMATS['yaml'].summary}\n"
+
+
+BOTH = (
+    "directives:\n- add_frame: {name: f, X_PF: {base_frame: world, translation: [1, 2, 3]}}\n"
+    "parameters:\n  eye_on_hand: false\n  robot_base_frame: base\n  tracking_base_frame: cam\n"
+    "transformation: {x: 1, y: 2, z: 3, qx: 0, qy: 0, qz: 0, qw: 1}\n"
+)
+
+
+def test_a_file_that_two_forms_fit_is_read_as_the_one_that_is_told(run: Callable[..., Any]) -> None:
+    done = run("tree", "a.yaml", files={"a.yaml": BOTH})
+    assert (done.status, done.err) == (1, "frametool: a.yaml: fits drake and handeye; give --in drake|handeye\n")
+    assert "name: f," in run("tree", "a.yaml", "--in", "drake").out
+    assert "name: cam," in run("tree", "a.yaml", "--in", "handeye").out
+
+
+MATRIX = "{cols: 4, rows: 4, data: [1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [f"cam0: {{T_BS: {MATRIX}}}\n", f"cam0:\n  T_BS: {MATRIX}\n", json.dumps({"cam0": {"T_BS": yaml.safe_load(MATRIX)}})],
+)
+def test_a_sensor_under_its_name_is_known(run: Callable[..., Any], text: str) -> None:
+    assert '"parent": "body", "xyz": [1.0, 2.0, 3.0]' in run("lookup", "-", "body", "cam0", "-f", "json", stdin=text).out
+
+
+def test_extrinsics_of_apollo_have_a_name(run: Callable[..., Any]) -> None:
+    text = (
+        "header:\n  frame_id: lidar\nchild_frame_id: camera\ntransform:\n  translation: {x: 1, y: 2, z: 3}\n"
+        "  rotation: {z: 0, y: 0, x: 0, w: 1}\n  euler_angles_degree:\n    pitch: 0\n    yaw: 5\n    roll: 0\n"
+    )
+    for told in ((), ("--in", "apollo")):
+        done = run("lookup", "-", "lidar", "camera", "-f", "json", *told, stdin=text)
+        assert '"xyz": [1.0, 2.0, 3.0]' in done.out
+        assert "Apollo extrinsics" in done.err
+        assert "euler_angles_degree differs from the quaternion by 5 degrees; the quaternion is used" in done.err
+
+
+@pytest.mark.parametrize("suffix", ["bag", "mcap", "db3"])
+def test_an_empty_recording_is_empty_whatever_is_installed(run: Callable[..., Any], suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    done = run("tree", f"a.{suffix}", files={f"a.{suffix}": b""})
+    assert (done.status, done.err) == (1, f"frametool: a.{suffix}: nothing in it: an empty file is no bag\n")
+
+
+def test_a_cloud_without_y_has_no_points(run: Callable[..., Any]) -> None:
+    head = "ply\nformat ascii 1.0\nelement vertex 1\n" + "".join(f"property float {name}\n" for name in ("x", "nx", "ny", "nz"))
+    done = run("apply", "--transform", "{xyz: [1, 2, 3]}", "-i", "a.ply", "-f", "csv", files={"a.ply": f"{head}end_header\n1 0 0 1\n"})
+    assert (done.status, done.err.count("\n")) == (1, 1)
+    assert "no columns of a point or pose among: x, nx, ny, nz" in done.err
+    assert run("tree", "a.ply").err == "frametool: a.ply: PLY point cloud or mesh: no frames in it; frametool convert and apply read it\n"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from frametool.errors import FrametoolWarning, ValueInvalid
 from frametool.formats.load import load
 from frametool.formats.table import FORMATS, is_trajectory, writers
 
@@ -219,22 +220,90 @@ def test_an_extrinsic_row_by_row_is_refused(run: Run) -> None:
 def test_a_camera_of_bundler_looks_along_minus_z(run: Run) -> None:
     # seen from the camera at the origin of its world a point ahead has z = -1; in optical axes it has z = 1
     text = "# Bundle file v0.3\n2 0\n500 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
-    done = run("lookup", "-", "world", "camera", "-f", "json", "--camera-axes", "optical", stdin=text)
-    assert json.loads(done.out)["quaternion"] == {"x": 1.0, "y": 0.0, "z": 0.0, "w": 0.0}
+    done = run("lookup", "-", "world", "camera", "-f", "kitti", stdin=text)
+    assert done.out == "1.0 0.0 0.0 0.0 0.0 -1.0 0.0 0.0 0.0 0.0 -1.0 0.0\n"
     assert "1 of 2 cameras were not estimated" in done.err
-    assert "optical axes, turned from opengl" in done.err
+    assert "camera axes turned from opengl to optical" in done.err
 
 
-def test_the_axes_of_nerf_stay_unless_others_are_asked_for(run: Run) -> None:
-    text = text_of("nerf", np.eye(4)[None])
-    plain = run("lookup", "-", "world", "camera", "-f", "json", stdin=text)
-    assert json.loads(plain.out)["quaternion"]["w"] == 1.0
-    assert "opengl" in plain.err
-    turned = run("lookup", "-", "world", "camera", "-f", "json", "--camera-axes", "optical", stdin=text)
-    assert json.loads(turned.out)["quaternion"] == {"x": 1.0, "y": 0.0, "z": 0.0, "w": 0.0}
-    for axes in ((), ("--camera-axes", "optical"), ("--camera-axes", "opengl")):
-        assert " 0.0 1.0 0.0 0.0 0.0 0.0 0.0 1 " in run("lookup", "-", "world", "camera", *axes, "-f", "colmap", stdin=text).out.replace("-", "")
-        assert run("convert", *axes, "-f", "nerf", "--in", "nerf", stdin=text).status == 0
+# --- axes of cameras ---
+
+AXES = {"nerf": "opengl", "bundler": "opengl", "kitti": "optical", "colmap": "optical", "open3d": "optical", "open3d-json": "optical"}
+INTO = {**{form: AXES[form] for form in ("nerf", "kitti", "colmap", "open3d")}, "tum": "", "csv": ""}
+WAYS: dict[str, tuple[str, ...]] = {
+    "convert": ("convert", "-i", "file"), "apply": ("apply", "--transform", "{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}", "-i", "file"),
+    "relative": ("relative", "--first", "-i", "file"), "mean": ("mean", "-i", "file"),
+    "tree": ("tree", "file"), "lookup": ("lookup", "file", "w", "c", "--frames", "w,c"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("target", INTO)
+@pytest.mark.parametrize("source", [*AXES, "tum", "csv"])
+def test_stated_axes_override_those_of_the_form_and_turn_nothing_by_themselves(source: str, target: str, way: str, run: Run, tmp_path: Path) -> None:
+    poses = matrices(5)
+    if way == "tree" and target == "csv":
+        return  # of a tree, CSV is a report too
+
+    def written(*options: str) -> tuple[Any, str]:
+        chosen = ("--in", "csv") if source == "csv" else ()
+        done = run(*WAYS[way], "-f", target, "-o", "out", "--force", *chosen, *options, files={"file": text_of(source, poses)})
+        assert done.status == 0, done.err
+        text = (tmp_path / "out").read_text()
+        if target == "csv":
+            text = run("convert", "-i", "out", "--in", "csv", "--columns", "x,y,z,qx,qy,qz,qw", "-f", "tum").out
+        (tmp_path / "read").write_text(text)
+        return samples_of(tmp_path / "read")[0], done.err
+
+    plain, _ = written()
+    usual = AXES.get(source) or INTO[target] or "optical"
+    for stated in ("optical", "opengl"):
+        found, told = written("--camera-axes", stated)
+        turn = OPTICAL_FROM_OPENGL if INTO[target] and stated != usual else np.eye(4)
+        expected = (turn @ plain if way == "relative" else plain) @ turn
+        assert abs(found - expected).max() < 1e-12, stated
+        assert ("camera axes turned" in told) == (INTO[target] not in ("", stated)), told
+        assert ("--camera-axes changes nothing" in told) == (source not in AXES and not INTO[target]), told
+
+
+@pytest.mark.parametrize("source", AXES)
+def test_what_is_seen_from_another_camera_turns_on_both_sides(source: str, run: Run, tmp_path: Path) -> None:
+    files = {"file": text_of(source, matrices(5))}
+    target = "nerf" if AXES[source] == "optical" else "kitti"
+    assert run("relative", "--first", "-i", "file", "-f", target, "-o", "one", files=files).status == 0
+    assert run("convert", "-i", "file", "-f", target, "-o", "turned").status == 0
+    assert run("relative", "--first", "-i", "turned", "-f", target, "-o", "two").status == 0
+    one, two = (samples_of(tmp_path / name)[0] for name in ("one", "two"))
+    assert abs(one - two).max() < 1e-12
+    assert abs(one[0] - np.eye(4)).max() < 1e-12
+
+
+def test_axes_that_a_change_of_axes_has_turned_are_not_turned_again(run: Run) -> None:
+    text = text_of("nerf", matrices(3))
+    by_hand = run("convert", "--axes", "optical_from_opengl", "-f", "kitti", stdin=text)
+    assert by_hand.out == run("convert", "-f", "kitti", stdin=text).out
+
+
+def test_cameras_of_robots_and_of_calibrations_have_axes_too(run: Run) -> None:
+    robot = '<mujoco><worldbody><camera name="c"/></worldbody></mujoco>'
+    assert "turned from opengl to optical" in run("lookup", "-", "world", "camera:c", "-f", "kitti", stdin=robot).err
+    calib = "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n"
+    assert "turned from optical to opengl" in run("lookup", "-", "velo", "cam0", "-f", "nerf", stdin=calib).err
+
+
+def test_in_python_stated_axes_turn_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text(text_of("nerf", matrices(1)))
+    plain, stated = load(tmp_path / "file"), load(tmp_path / "file", camera_axes="optical")
+    assert (plain.camera_axes, stated.camera_axes) == ({"camera": "opengl"}, {"camera": "optical"})
+    assert plain.lookup("world", "camera").is_close(stated.lookup("world", "camera"), angle=0.0, distance=0.0)
+    with pytest.raises(ValueInvalid, match="camera_axes is optical or opengl, not 'upright'"):
+        load(tmp_path / "file", camera_axes="upright")
+    (tmp_path / "tree.yaml").write_text("frames: {map: {base: {xyz: [1, 2, 3]}}}")
+    with pytest.warns(FrametoolWarning, match="camera_axes changes nothing: yaml does not leave that open"):
+        load(tmp_path / "tree.yaml", camera_axes="optical")
+
+
+# ---
 
 
 def test_the_quaternion_of_euroc_begins_with_w(run: Run) -> None:
@@ -291,7 +360,7 @@ def test_rough_matrices_are_projected_with_one_warning(run: Run) -> None:
 
 def test_what_was_taken_for_granted_is_told_on_one_short_line(run: Run) -> None:
     for form in FORMS:
-        done = run("lookup", "file", "world", CHILD.get(form, "body"), "--in", "csv" if form == "csv" else form.removesuffix("-json"), files={"file": text_of(form, matrices(3))})
+        done = run("lookup", "file", "world", CHILD.get(form, "body"), *["--camera-axes", "optical"] * (form in AXES), "--in", "csv" if form == "csv" else form.removesuffix("-json"), files={"file": text_of(form, matrices(3))})
         (line,) = (line for line in done.err.splitlines() if "3 poses of" in line)
         assert len(line) <= 200
         assert "in world (--frames)" in line

@@ -60,7 +60,7 @@ def command(
     out = Output("poses", output=output, otherwise=None if output else "text", **options)
     frames = load_tree(tree, more, taken)
     target, source = frame_name(target, frames), frame_name(source, frames)
-    out.style.axes = frames.camera_axes.get(source, "")
+    out.take_axes_in(frames, source)
     replayed = frames.replay(target, source, rate_hz=rate, start_ns=start, stop_ns=stop)
     skipped = Skipped(in_json=out.told == "json")
     results = skipped.counted(_results(replayed, target, source, skipped))

@@ -91,7 +91,7 @@ def command(
 
         found = derive.lookup(plan, frames, target, source, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
         return task.write(found)
-    output.style.axes = frames.camera_axes.get(source, "")
+    output.take_axes_in(frames, source)
     every = output.is_trajectory and at is None and fixed is None and frames.latest(target, source) is not None
     if times is not None or every:
         skip = stream.options["on_error"] == "skip"

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.explaining import PoseTask
+from frametool.cli.explaining import PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import is_pasted, poses_from
-from frametool.cli.streaming import stream_options
 from frametool.errors import ValueInvalid
 from frametool.text.numbers import parse_number
 
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     help="column or key of each pose's weight, or the weights of the POSEs",
 )
 @pose_result_options("poses")
-@stream_options
+@pose_stream_options
 def command(poses: tuple[str, ...], weights: str | None, **options: Any) -> int:
     """Average poses: the mean position, the mean rotation, and how far the poses lie from them.
 

@@ -7,8 +7,10 @@ from typing import Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options, one_argument, pose_stream_options
+from frametool.cli.group import settings
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import rows_among
+from frametool.cli.stderr import say
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative_names
 
@@ -80,7 +82,10 @@ def command(
         operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
         beside = (time_column or "") if velocity else None
         request = task.request(operation=operation, extra_column=beside, rename=lambda _parent, name: (name, name))
-        return task.answer(a or "-", request)
+        status = task.answer(a or "-", request)
+        if velocity and not settings().quiet:
+            say("note: the first pose has none before it, so no velocity: it is left out, results begin at the second")
+        return status
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")

@@ -127,6 +127,8 @@ class MjcfModel:
         attributes = self.classes.attributes(node, inside.around)
         pose = self.poses.pose_of_site(attributes) if node.tag == "site" else self.poses.pose(attributes)
         name = self._place(node, inside, pose)
+        if node.tag == "camera":
+            self.options.tally.axes[name] = self.options.answers.camera_axes or "opengl"
         if "mode" in attributes and (mode := attributes["mode"].text.strip()) != "fixed":
             message = f"{name} has the mode {shown(mode)}, in which MuJoCo turns it over time; it stands as written"
             self.options.tally.note_each(message, node.line)

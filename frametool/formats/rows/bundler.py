@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
-from frametool.formats.table import Poses
+from frametool.formats.table import FORMATS
 from frametool.grammar.readers import Note
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
 
-POSES = Poses("matrix", inverse=True, axes="opengl", frames=("world", "camera"), counted="numbers of cameras")
+POSES = FORMATS["bundler"].poses
 LINES = 5  # of a camera, three words each
 
 

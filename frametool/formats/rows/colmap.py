@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import FormatError, shown
 from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
-from frametool.formats.table import Poses
+from frametool.formats.table import FORMATS
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ IMAGE_LINE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
 NUMBER_BEFORE = r"[-+.\d]+(?:[eE][-+]?\d+)?\s"
 POINTS = "X Y POINT3D_ID each"
 FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .."
-POSES = Poses("wxyz", inverse=True, axes="optical", frames=("world", "camera"), counted="image ids")
+POSES = FORMATS["colmap"].poses
 
 
 def _world_in_camera(*pose: N) -> tuple[N, ...]:
@@ -45,7 +45,6 @@ ROWS = RowForm(
     head=b"# Image list with two lines of data per image:\n"
     b"#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n",
     first=1,
-    axes="optical",
     holds=(),
     beside="every camera is number 1, without points",
 )

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import FormatError, did_you_mean, listing, shown
 from frametool.formats.rows.pose_rows import Numbers, RowForm
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
-from frametool.formats.table import Poses
+from frametool.formats.table import FORMATS, Poses
 from frametool.geometry import euler, floats
 from frametool.grammar.readers import Note
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
 
-POSES = Poses("quaternion", counted="ids of vertices")
+POSES = FORMATS["g2o"].poses
 ROWS = RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=())
 EDGES = Poses("quaternion", counted="")
 # what else g2o writes: landmarks, parameters, measurements between others

@@ -9,4 +9,4 @@ from __future__ import annotations
 
 from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix
 
-ROWS = RowForm((Numbers(12), b"\n"), rows_of_matrix, axes="optical", holds=())
+ROWS = RowForm((Numbers(12), b"\n"), rows_of_matrix, holds=())

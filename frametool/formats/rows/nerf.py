@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import parse_documents
 from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, rows_of_matrix
 from frametool.formats.rows.trajectory import Written, position_and_turn, samples
-from frametool.formats.table import Poses
+from frametool.formats.table import FORMATS
 from frametool.grammar.readers import Misfit, Note, as_mapping, kind, read_numbers, within
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
 
-POSES = Poses("matrix", axes="opengl", frames=("world", "camera"), counted="places in its list")
+POSES = FORMATS["nerf"].poses
 MATRIX = "transform_matrix"
 LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 _ROW = b"], [", Numbers(4, b", ")
@@ -33,7 +33,6 @@ ROWS = RowForm(
     head=b'{\n  "frames": [\n',
     between=b",\n",
     tail=b"\n  ]\n}\n",
-    axes="opengl",
     holds=(),
 )  # fmt: skip
 

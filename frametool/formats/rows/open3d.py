@@ -20,7 +20,7 @@ from frametool.documents.document import parse_documents
 from frametool.errors import FormatError
 from frametool.formats.rows.pose_rows import Numbers, RowForm, rows_of_matrix
 from frametool.formats.rows.trajectory import Written, numbers_in, position_and_turn, samples, text_lines, whole_in
-from frametool.formats.table import Poses
+from frametool.formats.table import FORMATS, Poses
 from frametool.grammar.readers import Misfit, as_mapping, read_numbers, within
 
 if TYPE_CHECKING:
@@ -29,13 +29,12 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Samples
 
-LOG = Poses("matrix", axes="optical", frames=("world", "camera"))
+LOG = FORMATS["open3d"].poses
 EXTRINSIC = LOG._replace(inverse=True)
 LAST_ROW = [0.0, 0.0, 0.0, 1.0]
 ROWS = RowForm(
     ("number", b" ", "number", b" ", "next", b"\n", *(Numbers(4), b"\n") * 3, b"0.0 0.0 0.0 1.0\n"),
     rows_of_matrix,
-    axes="optical",
     holds=(),
 )
 

@@ -12,6 +12,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, warn
+from frametool.formats.table import FORMATS
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import quaternion, rigid
 
@@ -41,7 +42,6 @@ class RowForm(NamedTuple):
         `first`), `next` (one more), `image` (the name of its picture, else its seconds)
     numbers: from tx, ty, tz, x, y, z, w to the numbers in the order they are written
     head, between, tail: text before the first pose, between two, and behind the last
-    axes: those of a camera, where the form states them
     holds: which of `frames`, `stamps`, `extras` are written
     beside: what else a reader of the form finds in it, told whenever it is written
     """
@@ -52,7 +52,6 @@ class RowForm(NamedTuple):
     between: bytes = b""
     tail: bytes = b""
     first: int = 0
-    axes: str = ""
     holds: tuple[str, ...] = ("stamps",)
     beside: str = ""
 
@@ -83,28 +82,28 @@ class DroppedFields:
         said += [self.form.beside] * bool(self.form.beside)
         said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
         said += ["pictures are named by their stamps"] * self.by_stamp
+        axes = FORMATS[self.style.form].poses.axes
         if self.turned:
-            said.append(f"camera axes turned from {self.style.axes} to {self.form.axes}, half a turn about x")
-        elif self.form.axes and not self.style.axes:
-            said.append(f"the axes of the poses are taken for {self.form.axes}, as {self.style.form} has them")
+            said.append(f"camera axes turned from {self.style.axes} to {axes}, half a turn about x")
+        elif axes and not self.style.axes:
+            said.append(f"the axes of the poses are taken for {axes}, as {self.style.form} has them")
         if said:
             warn(f"{self.style.form}: {'; '.join(said)}")
 
 
-def with_axes_turned(pose: Components) -> Components:
-    """Turn the axes of a camera by half a turn about x: from optical to those of OpenGL, and back."""
+def turned(style: Style, pose: Components) -> Components:
+    """Turn a camera's axes to those of a form where both are known, and those of a camera that it is seen from."""
+    if not is_turned(style):
+        return pose
     tx, ty, tz, x, y, z, w = pose
-    return rigid.compose(tx, ty, tz, x, y, z, w, *HALF_TURN)
+    found = rigid.compose(tx, ty, tz, x, y, z, w, *HALF_TURN)
+    return rigid.compose(*HALF_TURN, *found) if style.in_camera else found
 
 
-def turned(form: RowForm, style: Style, pose: Components) -> Components:
-    """Turn a camera's axes to those of a form, where both are known and differ."""
-    return with_axes_turned(pose) if is_turned(form, style) else pose
-
-
-def is_turned(form: RowForm, style: Style) -> bool:
+def is_turned(style: Style) -> bool:
     """Tell whether the axes of a camera are not those of the form it is written in."""
-    return bool(form.axes and style.axes and form.axes != style.axes)
+    axes = FORMATS[style.form].poses.axes if style.form in FORMATS else ""
+    return bool(axes and style.axes and axes != style.axes)
 
 
 def field(name: str, stamp_ns: int, number: int) -> str:

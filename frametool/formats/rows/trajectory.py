@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.chunks import lines
 from frametool.documents.document import format_error
 from frametool.errors import FormatError, ValueInvalid, shown
-from frametool.formats.rows.pose_rows import with_axes_turned
 from frametool.frames.stamps import BILLION, parse_stamp, whole_stamp
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Samples
@@ -71,9 +70,7 @@ def samples(rows: Iterator[Written], form: Poses, file: InputFile, options: Opti
     for block in blocks(rows, form, file, options):
         columns = [part.tolist() for part in block.poses]
         yield Samples(parent, child, block.stamps_ns.tolist(), list(zip(*columns, strict=True)), block.lines)
-    axes = options.answers.camera_axes or form.axes
-    if axes:
-        options.tally.axes[child] = axes
+    options.tally.axes[child] = options.answers.camera_axes or form.axes
 
 
 def blocks(
@@ -102,9 +99,8 @@ def describe(options: Options, form: Poses, count: int, *, named: bool = True) -
     said = [f"{count} {'pose' if count == 1 else 'poses'}" + f" of {child} in {parent} (--frames)" * named]
     if form.counted and not options.answers.stamps:
         said.append(f"seconds are {form.counted} (--stamps)")
-    if form.axes:
-        wanted = options.answers.camera_axes or form.axes
-        said.append(f"{wanted} axes" + (f", turned from {form.axes}" if wanted != form.axes else ""))
+    if axes := options.answers.camera_axes or form.axes:
+        said.append(f"{axes} axes" + " (--camera-axes)" * bool(options.answers.camera_axes))
     options.tally.about = ", ".join(said)
 
 
@@ -126,8 +122,6 @@ def _checked(some: Sequence[Written], form: Poses, file: InputFile, options: Opt
     poses: Components = (*columns[:3], *found.quaternions)
     if form.inverse:
         poses = rigid.inverse(*poses)
-    if options.answers.camera_axes and form.axes and options.answers.camera_axes != form.axes:
-        poses = with_axes_turned(poses)
     return [at for at in range(len(some)) if at not in found.reasons], poses
 
 

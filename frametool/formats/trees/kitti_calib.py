@@ -63,7 +63,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of one file of a calibration."""
     calibration = Calibration(file, options)
     for parent, child, pose, line in calibration.edges():
-        yield Edge(calibration.named(parent), calibration.named(child), pose, line=line)
+        names = (calibration.named(parent), calibration.named(child))
+        yield Edge(*names, pose, line=line)
+        cameras = {name for name, own in zip(names, (parent, child), strict=True) if own.startswith("cam")}
+        options.tally.axes |= dict.fromkeys(cameras, options.answers.camera_axes or "optical")
 
 
 class Calibration:
