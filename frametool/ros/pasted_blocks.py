@@ -31,13 +31,8 @@ if TYPE_CHECKING:
 
 MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
-<<<<<<< HEAD
-_TRANSLATION = re.compile(rf"(?m)^[ \t]*+-\s+Translation:\s*{_LIST}")
+_TRANSLATION = re.compile(r"(?m)^[ \t]*+-\s+Translation:")
 _TIME = re.compile(rf"(?m)^[ \t]*+At time ({NUMBER})")
-=======
-_TRANSLATION = re.compile(r"(?m)^\s*-\s+Translation:")
-_TIME = re.compile(rf"(?m)^\s*At time ({NUMBER})")
->>>>>>> readers
 _HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _ROTATIONS = (
     ("xyzw", re.compile(r"in Quaternion(?: \(xyzw\))?")),
