@@ -379,7 +379,7 @@ rotation_options = together(
     click.option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
 )  # fmt: skip
 # how poses are read; commands have it with `rotation_options`
-pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation")
+pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, matrices off by 0.1")
 
 
 def pose_result_options(*what: str) -> Callable[[Function], Function]:
