@@ -139,7 +139,7 @@ def newton(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Nine[N]:
 def deviation(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
     """Return how far a matrix is from orthonormal; inf if it is none that --normalize takes."""
     off = defect(a, b, c, d, e, f, g, h, i, xp)
-    right = determinant(a, b, c, d, e, f, g, h, i) > SINGULAR
+    right: Condition = determinant(a, b, c, d, e, f, g, h, i) > SINGULAR
     if not xp.furthest(off) <= TOLERATED:
         products = gram(a, b, c, d, e, f, g, h, i)
         right, off = right & is_near(*products), xp.where(is_multiple(*products, xp), inf, off)
