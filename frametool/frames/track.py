@@ -6,8 +6,10 @@ components; knows no other frames.
 
 from __future__ import annotations
 
+from array import array
 from bisect import bisect_left, bisect_right
-from itertools import pairwise
+from collections.abc import MutableSequence
+from itertools import chain, pairwise
 from operator import itemgetter
 
 from frametool.geometry import floats, rigid
@@ -15,7 +17,7 @@ from frametool.geometry import floats, rigid
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from typing import Any, Literal, TypeAlias
 
     from frametool.geometry.types import Rigid
@@ -23,7 +25,56 @@ if TYPE_CHECKING:
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
     Track: TypeAlias = "StandingTrack | MovingTrack"  # what is known of one child frame; `standing` tells which
 
+MANY = 1 << 13  # samples that come in one piece: from so many on they are packed
 FEW = 64  # late samples: up to so many are sorted in one by one, a microsecond each; a whole page takes a hundred
+
+
+class Packed(MutableSequence["Rigid"]):
+    """Poses in one piece of memory: 56 bytes each, where tuples of floats take 290."""
+
+    __slots__ = ("numbers",)
+
+    def __init__(self, poses: Iterable[Rigid]) -> None:
+        """Pack them."""
+        self.numbers = array("d", chain.from_iterable(poses))
+
+    def __len__(self) -> int:
+        """Count them."""
+        return len(self.numbers) // 7
+
+    def __iter__(self) -> Iterator[Rigid]:
+        """Yield them as tuples."""
+        return zip(*[iter(self.numbers)] * 7, strict=True)
+
+    def _place(self, at: int | slice) -> slice:
+        begin, end, _ = (at if isinstance(at, slice) else slice(at, at + 1 or None)).indices(len(self))
+        return slice(7 * begin, 7 * end)
+
+    def __getitem__(self, at: Any) -> Any:
+        """Return one, or a list of several."""
+        if not isinstance(at, slice):
+            return tuple(self.numbers[7 * at : 7 * at + 7 or None])
+        return list(zip(*[iter(self.numbers[self._place(at)])] * 7, strict=True))
+
+    def __setitem__(self, at: Any, value: Any) -> None:
+        """Replace one, or several."""
+        self.numbers[self._place(at)] = array("d", chain.from_iterable(value) if isinstance(at, slice) else value)
+
+    def __delitem__(self, at: int | slice) -> None:
+        """Drop one, or several."""
+        del self.numbers[self._place(at)]
+
+    def insert(self, at: int, value: Rigid) -> None:
+        """Put one before another."""
+        self[at:at] = [value]
+
+    def append(self, value: Rigid) -> None:
+        """Add one."""
+        self.numbers.extend(value)
+
+    def extend(self, values: Iterable[Rigid]) -> None:
+        """Add several."""
+        self.numbers.extend(chain.from_iterable(values))
 
 
 class Page:
@@ -35,7 +86,7 @@ class Page:
 
     __slots__ = ("late", "parents", "samples", "segments", "stamps")
 
-    def __init__(self, stamps: list[int], parents: list[str], samples: list[Rigid]) -> None:
+    def __init__(self, stamps: list[int], parents: list[str], samples: MutableSequence[Rigid]) -> None:
         """Keep the lists."""
         self.stamps = stamps
         self.parents = parents
@@ -164,6 +215,8 @@ class MovingTrack:
         page = self.tail
         page.stamps.extend(stamps_ns)
         page.parents.extend([self.parent] * len(stamps_ns))
+        if type(page.samples) is list and len(page.stamps) > MANY:
+            page.samples = Packed(page.samples)
         page.samples.extend(components)
         self.last_ns = page.stamps[-1]
         self.table = None
