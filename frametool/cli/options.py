@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.group import Reused, WithHelp, keep_setting, settings
+from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, settings
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, readers, writers
@@ -36,6 +36,9 @@ READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 
+NEEDS = {"force": "output", "tolerance": "find"}  # option -> that without which it would not be used
+
+
 class Command(WithHelp, Reused):
     """A command whose arguments may be negative numbers.
 
@@ -48,7 +51,11 @@ class Command(WithHelp, Reused):
         if any(map(NEGATIVE.match, args)):
             options = {name for each in self.get_params(ctx) for name in each.opts}
             args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
-        return super().parse_args(ctx, _with_form(args) if "--explain" in args else args)
+        rest = super().parse_args(ctx, _with_form(args) if "--explain" in args else args)
+        for name, needed in NEEDS.items():
+            if ctx.params.get(needed, "") is None:
+                refuse_unused(f"is not used without --{needed}", name, ctx=ctx)
+        return rest
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """End every help with the exit codes, those of most commands unless its epilog says others."""
@@ -330,15 +337,14 @@ def say_if_verbose(text: str) -> None:
         say(text)
 
 
-def say_not_needed(forms: Collection[str], *asked: str) -> None:
-    """Say on stderr which options answer what none of these forms leaves open: they change nothing."""
-    if settings().quiet:
-        return
+def refuse_not_needed(forms: Collection[str], *asked: str) -> None:
+    """Refuse options that answer what none of these forms leaves open: they would change nothing."""
     for ask in asked:
         chosen = getattr(settings(), "named_frames" if ask == "frames" else ask)
         if chosen and not any(ask in FORMATS[form].asks for form in forms):
             option = f"--{ask.replace('_', '-')}"
-            say(f"note: {option} changes nothing: {' and '.join(dict.fromkeys(forms))} does not leave that open")
+            known = " and ".join(dict.fromkeys(forms))
+            raise click.UsageError(f"{option} changes nothing: {known} does not leave that open")
 
 
 # --- results -------------------------------------------------------------------------------------------------------

@@ -127,6 +127,7 @@ def command(
         return stream.run(request, output)
     if stream.path:
         raise click.UsageError("-i FILE and records are two inputs; give one")
+    task.only_arguments(rest, "frame_column", "time_column")
     output.values(values_of(list(_sources(rest, kind)), request, output))
     return 0
 

@@ -45,6 +45,7 @@ def command(poses: tuple[str, ...], **options: Any) -> int:
     if "-" not in given:
         if task.stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")
+        task.only_arguments(given)
         task.output.poses([Result(reduce(product, each)) for each in combinations(factors, task.request())])
         return 0
     if given.count("-") > 1:

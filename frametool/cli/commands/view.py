@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import refuse_unused
 from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules_of
 from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
@@ -76,6 +77,10 @@ def command(
     file that FRAMETOOL_TREE names.
     """
     chosen = _form(form, output, opens=opens)
+    if chosen != "text" or output is not None:
+        refuse_unused("is for a picture in the terminal", "color")
+    if chosen == "glb":
+        refuse_unused("is not used: GLB is seen from all sides", "eye")
     refuse_existing(output, force=force)
     if chosen == "png":
         from frametool.view.pictures import require_matplotlib
