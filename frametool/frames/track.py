@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import MutableSequence
 from itertools import chain, pairwise
 from operator import itemgetter
 
@@ -29,8 +28,8 @@ MANY = 1 << 13  # samples that come in one piece: from so many on they are packe
 FEW = 64  # late samples: up to so many are sorted in one by one, a microsecond each; a whole page takes a hundred
 
 
-class Packed(MutableSequence["Rigid"]):
-    """Poses in one piece of memory: 56 bytes each, where tuples of floats take 290."""
+class Packed:
+    """Poses in one piece of memory, 56 bytes each where tuples of floats take 290; one that changes becomes a list."""
 
     __slots__ = ("numbers",)
 
@@ -38,43 +37,21 @@ class Packed(MutableSequence["Rigid"]):
         """Pack them."""
         self.numbers = array("d", chain.from_iterable(poses))
 
-    def __len__(self) -> int:
-        """Count them."""
-        return len(self.numbers) // 7
-
     def __iter__(self) -> Iterator[Rigid]:
         """Yield them as tuples."""
         return zip(*[iter(self.numbers)] * 7, strict=True)
 
-    def _place(self, at: int | slice) -> slice:
-        begin, end, _ = (at if isinstance(at, slice) else slice(at, at + 1 or None)).indices(len(self))
-        return slice(7 * begin, 7 * end)
+    def __getitem__(self, at: int) -> tuple[float, ...]:
+        """Return one by its number, counted from either end."""
+        return tuple(self.numbers[7 * at : 7 * at + 7 or None])
 
-    def __getitem__(self, at: Any) -> Any:
-        """Return one, or a list of several."""
-        if not isinstance(at, slice):
-            return tuple(self.numbers[7 * at : 7 * at + 7 or None])
-        return list(zip(*[iter(self.numbers[self._place(at)])] * 7, strict=True))
-
-    def __setitem__(self, at: Any, value: Any) -> None:
-        """Replace one, or several."""
-        self.numbers[self._place(at)] = array("d", chain.from_iterable(value) if isinstance(at, slice) else value)
-
-    def __delitem__(self, at: int | slice) -> None:
-        """Drop one, or several."""
-        del self.numbers[self._place(at)]
-
-    def insert(self, at: int, value: Rigid) -> None:
-        """Put one before another."""
-        self[at:at] = [value]
-
-    def append(self, value: Rigid) -> None:
+    def append(self, pose: Rigid) -> None:
         """Add one."""
-        self.numbers.extend(value)
+        self.numbers.extend(pose)
 
-    def extend(self, values: Iterable[Rigid]) -> None:
+    def extend(self, poses: Iterable[Rigid]) -> None:
         """Add several."""
-        self.numbers.extend(chain.from_iterable(values))
+        self.numbers.extend(chain.from_iterable(poses))
 
 
 class Page:
@@ -86,16 +63,23 @@ class Page:
 
     __slots__ = ("late", "parents", "samples", "segments", "stamps")
 
-    def __init__(self, stamps: list[int], parents: list[str], samples: MutableSequence[Rigid]) -> None:
+    def __init__(self, stamps: list[int], parents: list[str], samples: list[Rigid]) -> None:
         """Keep the lists."""
         self.stamps = stamps
         self.parents = parents
-        self.samples = samples
+        self.samples = samples  # or Packed, which stands for such a list
         self.segments: dict[int, Way] = {}
         self.late: list[tuple[int, str, Rigid]] = []
 
+    def unpack(self) -> None:
+        """Make a list of the samples, which can be changed."""
+        if type(self.samples) is not list:
+            self.samples = [*self.samples]
+
     def settle(self) -> None:
         """Sort in what came late, each after those of its stamp."""
+        if self.late:
+            self.unpack()
         if len(self.late) > FEW:
             rows = [*zip(self.stamps, self.parents, self.samples, strict=True), *self.late]
             rows.sort(key=itemgetter(0))
@@ -112,6 +96,7 @@ class Page:
 
     def drop(self, count: int) -> None:
         """Drop the oldest samples."""
+        self.unpack()
         for column in (self.stamps, self.parents, self.samples):
             del column[:count]
         self.segments.clear()
@@ -216,7 +201,7 @@ class MovingTrack:
         page.stamps.extend(stamps_ns)
         page.parents.extend([self.parent] * len(stamps_ns))
         if type(page.samples) is list and len(page.stamps) > MANY:
-            page.samples = Packed(page.samples)
+            page.samples = Packed(page.samples)  # type: ignore[assignment]
         page.samples.extend(components)
         self.last_ns = page.stamps[-1]
         self.table = None
@@ -277,6 +262,7 @@ class MovingTrack:
         """Cut a page into short ones."""
         page = self.pages[number]
         page.settle()
+        page.unpack()
         count = 2 * len(page.stamps) // PAGE
         ends = [part * len(page.stamps) // count for part in range(count + 1)]
         cut = [
@@ -304,6 +290,7 @@ class MovingTrack:
         page = self._page(stamp_ns)
         at = bisect_right(page.stamps, stamp_ns) - 1
         before = page.parents[at]
+        page.unpack()
         page.parents[at], page.samples[at] = parent, components
         page.segments.pop(at, None)
         page.segments.pop(at - 1, None)

@@ -5,7 +5,7 @@ Six numbers stand for its first two columns, which say all of it (Zhou et al. 20
 
 from __future__ import annotations
 
-from math import acos, cos, frexp, inf, isfinite, ldexp, pi, sqrt
+from math import frexp, inf, isfinite, ldexp, sqrt
 
 from frametool.errors import ValueInvalid, warn
 from frametool.geometry import floats, quaternion
@@ -187,25 +187,13 @@ def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
     elif is_multiple(*products, floats, ldexp(1.0, min(-2 * exponent, 1000))):
         size = ldexp(sqrt(sum(products[:3]) / 3.0), exponent)
         problem = f"matrix is a rotation scaled by {size:.6g}: a similarity, not a pose"
-    elif not is_near(*gram(*matrix)):
-        least, most = (ldexp(each, exponent) for each in _stretches(*products))
-        problem = f"matrix is not a rotation: it is sheared or scaled unevenly, by {least:.6g} to {most:.6g}"
-    elif normalize:
-        return None
     else:
-        off_by = f"its rows are orthonormal only to {off:.2g} (normalize it with --normalize)"
-        problem = f"matrix is not a rotation: {off_by}"
+        near = is_near(*gram(*matrix))
+        if near and normalize:
+            return None
+        remedy = "(normalize it with --normalize)" if near else "(sheared or scaled unevenly)"
+        problem = f"matrix is not a rotation: its rows are orthonormal only to {off:.2g} {remedy}"
     return ValueInvalid(problem, rule="denormalized")
-
-
-def _stretches(aa: float, bb: float, cc: float, ab: float, ac: float, bc: float) -> tuple[float, float]:
-    """Return the least and the greatest singular value from the Gram matrix (Smith 1961), for people."""
-    mean = (aa + bb + cc) / 3.0
-    x, y, z = aa - mean, bb - mean, cc - mean
-    spread = sqrt((x * x + y * y + z * z + 2.0 * (ab * ab + ac * ac + bc * bc)) / 6.0)
-    ratio = determinant(x, ab, ac, ab, y, bc, ac, bc, z) / (2.0 * spread**3)
-    third = acos(min(max(ratio, -1.0), 1.0)) / 3.0
-    return sqrt(max(mean + 2.0 * spread * cos(third + 2.0 * pi / 3.0), 0.0)), sqrt(mean + 2.0 * spread * cos(third))
 
 
 def nine(values: Iterable[N]) -> Nine[N]:

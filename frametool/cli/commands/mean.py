@@ -53,8 +53,6 @@ def command(poses: tuple[str, ...], weights: str | None, **options: Any) -> int:
     if poses in ((), ("-",)):
         status = stream.run(request, task.output)
     else:
-        if stream.path:
-            raise click.UsageError("-i FILE and POSEs are two inputs; give one")
         task.only_arguments(poses)
         for each in poses:
             gathered.add(poses_from(each, request))
