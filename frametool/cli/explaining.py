@@ -77,7 +77,7 @@ class PoseTask:
             names |= {"stamps", "camera_axes"}
             if not any(each and os.path.exists(each) for each in arguments):
                 names.add("input_forms")
-        refuse_unused("is about the rows of a stream, and only arguments are read here", *names)
+        refuse_unused("is about rows; arguments are read here, and rows where - stands or nothing is", *names)
 
     def answer(self, argument: str, request: Request) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command."""

@@ -43,8 +43,6 @@ def command(poses: tuple[str, ...], **options: Any) -> int:
         turned = [each.turned() if factor.is_inverse else each for each, factor in zip(written, factors, strict=True)]
         return task.write(derive.compose(plan, *turned))
     if "-" not in given:
-        if task.stream.path:
-            raise click.UsageError("-i FILE is read where - stands among the poses")
         task.only_arguments(given)
         task.output.poses([Result(reduce(product, each)) for each in combinations(factors, task.request())])
         return 0

@@ -105,9 +105,7 @@ def command(
             raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
         values = ()
     is_alone = operation.turns and not values and (task.derives or not stream.has_input())
-    if stream.path or values == ("-",) or not (values or is_alone):
-        if values not in ((), ("-",)):
-            raise click.UsageError("-i FILE and VALUES are two inputs; give one")
+    if values == ("-",) or not (values or is_alone):
         refuse_unused("is about one rotation that is an argument", "find")
         return stream.run(request, output)
     task.only_arguments(values, *["unwrap"] * (is_numbers or all(map(is_inline, values))))

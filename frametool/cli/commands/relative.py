@@ -86,8 +86,6 @@ def command(
         return task.answer(a or "-", request)
     if len(given) < 2 or "-" in given:
         return task.stream.run(_with_rows(a, b, task.request()), task.output)
-    if task.stream.path:
-        raise click.UsageError("-i FILE is read where - stands for A or B")
     task.only_arguments(given)
     task.output.poses([relative(*pair) for pair in combinations(given, task.request())])
     return 0
