@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL, pose_reading_options, together
 from frametool.cli.output import Output
 from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of
-from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.streaming import OPTIONS, Stream, stream_options
 from frametool.errors import FormatError, heard_by
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.given import Given
@@ -65,10 +69,23 @@ class PoseTask:
         """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
         return not is_pasted(argument, self.stream.given) and self.stream.takes_rows(argument)
 
+    def only_arguments(self, arguments: Sequence[str | Source | None], *more: str) -> None:
+        """Refuse the options of streams where arguments are all that is read.
+
+        more: options of the command that are about streams too
+        """
+        names = {*OPTIONS, "array", "edges", *more} - {"given", "quiet"}
+        if not settings().reads_trees:
+            names |= {"stamps", "camera_axes"}
+            if not any(isinstance(each, str) and os.path.exists(each) for each in arguments):
+                names.add("input_forms")
+        refuse_unused("is about rows; arguments are read here, and rows where - stands or nothing is", *names)
+
     def answer(self, argument: str | Source, request: Request) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command."""
         if isinstance(argument, str) and (self.stream.is_wanted(argument) or self.has_table(argument)):
             return self.stream.run(request, self.output)
+        self.only_arguments([argument])
         self.output.values(values_of([argument], request, self.output))
         return 0
 
@@ -79,8 +96,7 @@ class PoseTask:
         if self.output.told not in (None, "text"):
             instead = f"{', '.join(FORMS)}, not {self.output.told}"
             raise click.UsageError(f"--explain writes {instead}; leave one of them out")
-        if self.stream.path is not None:
-            raise click.UsageError(f"-i FILE is a stream; {ONE_RECORD}")
+        refuse_unused(f"is about a stream; {ONE_RECORD}", *({*OPTIONS, "array", "edges"} - {"given", "quiet"}))
         return DerivationStyle(self.output.style, significant(self._precision), self._every)
 
     def written(self, argument: str | Source | None, *, warned: bool = False) -> Given:

@@ -72,6 +72,18 @@ def keep_setting(context: click.Context, option: click.Parameter, chosen: Any) -
     return chosen
 
 
+def refuse_unused(why: str, *names: str, ctx: click.Context | None = None) -> None:
+    """Stop where the command line has one of these parameters of the running command: it would not be used."""
+    ctx = ctx or click.get_current_context()
+    named = [each.opts[-1] for each in ctx.command.get_params(ctx) if each.name in names and _is_told(ctx, each.name)]
+    if named:
+        raise click.UsageError(f"{', '.join(named)} {why}", ctx)
+
+
+def _is_told(ctx: click.Context, name: str) -> bool:
+    return ctx.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+
+
 def show_help(ctx: click.Context) -> None:
     """Print the help of a command."""
     with writing(None) as write:
@@ -327,6 +339,22 @@ class Reused(click.Command):
         if self._params is None:
             self._params = super().get_params(ctx)
         return self._params
+
+    def make_parser(self, ctx: click.Context) -> Any:
+        """Make click's parser; of an option of one value that stands there twice, the first would not be used."""
+        parser: Any = super().make_parser(ctx)
+        parse = parser.parse_args
+
+        def parse_once(args: list[str]) -> Any:
+            found = parse(args=args)
+            told = [] if ctx.resilient_parsing else found[2]
+            for each in told:
+                if isinstance(each, click.Option) and not (each.multiple or each.is_flag) and told.count(each) > 1:
+                    raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
+            return found
+
+        parser.parse_args = parse_once
+        return parser
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse as click does; only parameters that stand in the arguments are processed anew."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.group import Reused, WithHelp, keep_setting, settings
+from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, settings
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, readers, writers
@@ -36,6 +36,9 @@ READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 
+NEEDS = {"force": "output", "tolerance": "find"}  # option -> that without which it would not be used
+
+
 class Command(WithHelp, Reused):
     """A command whose arguments may be negative numbers.
 
@@ -50,10 +53,14 @@ class Command(WithHelp, Reused):
             args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
         for option in {*OPTIONAL}.intersection(args):
             args = _with_value(args, option, *OPTIONAL[option])
-        return super().parse_args(ctx, args)
+        rest = super().parse_args(ctx, args)
+        for name, needed in NEEDS.items():
+            if ctx.params.get(needed, "") is None:
+                refuse_unused(f"is not used without --{needed}", name, ctx=ctx)
+        return rest
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command, then say which of its options were of no use."""
+        """Run the command, then say if --camera-axes was of no use: only a result shows whether it was."""
         result = super().invoke(ctx)
         _say_not_needed()
         return result
@@ -342,18 +349,23 @@ def say_if_verbose(text: str) -> None:
         say(text)
 
 
-OPEN = ("frames", "direction", "camera_axes", "dh", "stamps", "edges", "array")  # what forms may leave open
-
-
 def _say_not_needed() -> None:
-    """Say on stderr which options answer what no input leaves open: they change nothing."""
-    inputs = settings().inputs
-    forms = " and ".join(dict.fromkeys(form for form, _ in inputs if form))
-    for ask in () if settings().quiet else OPEN:
+    """Say on stderr that --camera-axes changes nothing: no input leaves the axes open, no result has any."""
+    inputs, chosen = settings().inputs, settings().camera_axes
+    if chosen and not settings().quiet and not any("camera_axes" in asks for _, asks in inputs):
+        forms = " and ".join(dict.fromkeys(form for form, _ in inputs if form))
+        why = f": {forms} does not leave that open" if forms else " here"
+        say(f"note: --camera-axes changes nothing{why}")
+
+
+def refuse_not_needed(forms: Collection[str], *asked: str) -> None:
+    """Refuse options that answer what none of these forms leaves open: they would change nothing."""
+    for ask in asked:
         chosen = getattr(settings(), "named_frames" if ask == "frames" else ask)
-        if chosen and not any(ask in asks for _, asks in inputs):
-            why = f": {forms} does not leave that open" if forms else " here"
-            say(f"note: --{ask.replace('_', '-')} changes nothing{why}")
+        if chosen and not any(ask in FORMATS[form].asks for form in forms):
+            option = f"--{ask.replace('_', '-')}"
+            known = " and ".join(dict.fromkeys(forms))
+            raise click.UsageError(f"{option} changes nothing: {known} does not leave that open")
 
 
 # --- results -------------------------------------------------------------------------------------------------------
@@ -394,7 +406,7 @@ rotation_options = together(
     click.option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
 )  # fmt: skip
 # how poses are read; commands have it with `rotation_options`
-pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, any near rotation")
+pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, matrices off by 0.1")
 
 
 def pose_result_options(*what: str) -> Callable[[Function], Function]:

@@ -11,7 +11,7 @@ from itertools import islice
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
-from frametool.cli.group import settings
+from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
@@ -63,6 +63,8 @@ class Output:
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
         self._holds_arrays = holds_arrays(form)
         self.is_trajectory = is_trajectory(form)  # of the poses of one frame over time
+        if self._holds_arrays:
+            refuse_unused(f"is not used: {form} holds numbers, not their text", "precision")
         if self._holds_arrays and output is None and sys.stdout.isatty():
             raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for

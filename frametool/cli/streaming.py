@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import keep_setting, settings
+from frametool.cli.group import keep_setting, refuse_unused, settings
 from frametool.cli.options import (
     FILE,
     STREAMED,
@@ -19,6 +19,7 @@ from frametool.cli.options import (
     Notations,
     in_option,
     input_forms,
+    refuse_not_needed,
     say_if_verbose,
     together,
     verbose_option,
@@ -165,6 +166,7 @@ class Stream:
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
+        refuse_not_needed((form,), "stamps", "edges", "array")
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)
@@ -308,8 +310,10 @@ class Stream:
         prefix = options["prefix"] and not request.operation.only_adds
         if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or prefix)):
             raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
-        if form in RECORDS and len(options["columns"]) > 1:
-            raise click.UsageError("--columns are those of a table; a record names its own numbers")
+        if form in RECORDS:
+            refuse_unused("is for tables; a record names its own numbers", "columns", "header")
+        if holds_arrays(output.told or form) and request.gathered is None:
+            refuse_unused(f"is not used: {output.told or form} holds numbers, not their text", "precision")
         return request._replace(
             given=request.given or self.given,
             notations=request.notations or output.notations,

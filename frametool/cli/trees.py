@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.group import settings
-from frametool.cli.options import Text, input_forms
+from frametool.cli.options import Text, input_forms, refuse_not_needed
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import noting_files, states_of
@@ -112,15 +112,20 @@ def load_sides(
 
     refuse_two_readers((*a, *b))
     count = len(a) + len(b)
+    every: list[Recording] = []
 
     def side(arguments: Sequence[str], behind: int) -> tuple[FrameTree | TransformBuffer, dict[str, Place]]:
         where: dict[str, Place] = {}
-        return _loaded(opened(arguments, behind=behind, of=count), Rules(normalize=normalize), where), where
+        every.extend(files := opened(arguments, behind=behind, of=count))
+        return _loaded(files, Rules(normalize=normalize), where), where
 
-    return [
+    sides = [
         _read_once(arguments, f"{normalize} {behind} of {count}", partial(side, arguments, behind))
         for arguments, behind in ((a, 0), (b, len(a)))
     ]
+    if len(every) == count:  # in a batch they may have been read before, and looked at
+        refuse_idle(every)
+    return sides
 
 
 def _loaded(
@@ -130,8 +135,19 @@ def _loaded(
     from frametool.formats.load import load_sources  # not every command that may read trees does
 
     tree = load_sources(files, rules, places)
-    state(files)
+    state(files, whole=places is None)
     return tree
+
+
+OPEN_IN_TREES = ("frames", "direction", "dh", "stamps")  # what forms of files of frames may leave open
+
+
+def refuse_idle(files: Sequence[Recording]) -> None:
+    """Refuse options about files that were read which none of them leaves open."""
+    refuse_not_needed([file.form for file in files], *OPEN_IN_TREES)
+    if settings().topics and not any(file.topics.counts or file.topics.seen for file in files):
+        named = " and ".join(file.name for file in files)
+        raise click.UsageError(f"--topic is not used: no topic is named in {named}")
 
 
 def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]) -> Value:
@@ -151,8 +167,13 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     return value
 
 
-def state(files: Sequence[Recording]) -> None:
-    """Say on stderr what files that were read were taken for: those of other forms than the own one, with -v all."""
+def state(files: Sequence[Recording], *, whole: bool = True) -> None:
+    """Say on stderr what files that were read were taken for: those of other forms than the own one, with -v all.
+
+    whole: these are all; of one of two sides, the other may need an option that this one does not
+    """
+    if whole:
+        refuse_idle(files)
     for file in files:
         if settings().verbose:
             say(file.known)

@@ -328,9 +328,7 @@ def nearest_rotation(sheet: Sheet, entries: Sequence[float]) -> Sequence[float]:
     sheet.heading("The nearest rotation")
     sheet.say(f"The rows are orthonormal only to {off:.1e}. Newton's way to the nearest rotation (Higham 1986): the "
               "mean of M and of its inverse transposed, again and again; each step doubles the right digits.")
-    here = rows(kernel.balanced(*kernel.nine(entries), floats))
-    if here != rows(entries):
-        sheet.say("M is divided by a power of two first; its rotation stays.")
+    here = rows(entries)
     for count in range(1, MOST_STEPS + 1):
         there = rows(kernel.newton(*kernel.nine(part for row in here for part in row)))
         other = [[2.0 * b - a for a, b in zip(*pair, strict=True)] for pair in zip(here, there, strict=True)]

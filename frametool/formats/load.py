@@ -7,6 +7,7 @@ TransformBuffer once something moves.  The forms themselves are not known here.
 from __future__ import annotations
 
 import os
+from array import array
 from bisect import bisect_left
 from importlib import import_module
 from io import BytesIO
@@ -32,6 +33,7 @@ from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import BAG, CHOICES, FORMATS, readers
 from frametool.frames.lookups import FrameTree
 from frametool.frames.policy import Refused
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, stop
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS
 from frametool.grammar.readers import alike, more_like_it
@@ -296,7 +298,8 @@ class Assembly:
             self._first.setdefault(child, (parent, components[0], placed.place(0)))
             self._stamps.setdefault(child, stamps_ns[0])
             self._moves.add(child)
-            self._whole.setdefault(child, []).append(placed)
+            known = Samples(parent, child, array("q", stamps_ns), (), array("q", placed.samples.lines))
+            self._whole.setdefault(child, []).append(SamplesOfFile(placed.file, known))
             return
         for at, (stamp_ns, pose) in enumerate(zip(stamps_ns, components, strict=True)):
             self.add(parent, child, pose, stamp_ns, placed.place(at))
@@ -461,7 +464,8 @@ class SamplesOfFile(NamedTuple):
 
     def place(self, at: int) -> Place:
         """Return where one of them was read."""
-        return Place(self.file, self.samples.edge(at))
+        parent, child, stamps_ns, _, lines = self.samples
+        return Place(self.file, Edge(parent, child, IDENTITY, stamps_ns[at], lines[at]))
 
 
 def load(

@@ -6,8 +6,9 @@ components; knows no other frames.
 
 from __future__ import annotations
 
+from array import array
 from bisect import bisect_left, bisect_right
-from itertools import pairwise
+from itertools import chain, pairwise
 from operator import itemgetter
 
 from frametool.geometry import floats, rigid
@@ -15,7 +16,7 @@ from frametool.geometry import floats, rigid
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from typing import Any, Literal, TypeAlias
 
     from frametool.geometry.types import Rigid
@@ -23,7 +24,34 @@ if TYPE_CHECKING:
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
     Track: TypeAlias = "StandingTrack | MovingTrack"  # what is known of one child frame; `standing` tells which
 
+MANY = 1 << 13  # samples that come in one piece: from so many on they are packed
 FEW = 64  # late samples: up to so many are sorted in one by one, a microsecond each; a whole page takes a hundred
+
+
+class Packed:
+    """Poses in one piece of memory, 56 bytes each where tuples of floats take 290; one that changes becomes a list."""
+
+    __slots__ = ("numbers",)
+
+    def __init__(self, poses: Iterable[Rigid]) -> None:
+        """Pack them."""
+        self.numbers = array("d", chain.from_iterable(poses))
+
+    def __iter__(self) -> Iterator[Rigid]:
+        """Yield them as tuples."""
+        return zip(*[iter(self.numbers)] * 7, strict=True)
+
+    def __getitem__(self, at: int) -> tuple[float, ...]:
+        """Return one by its number, counted from either end."""
+        return tuple(self.numbers[7 * at : 7 * at + 7 or None])
+
+    def append(self, pose: Rigid) -> None:
+        """Add one."""
+        self.numbers.extend(pose)
+
+    def extend(self, poses: Iterable[Rigid]) -> None:
+        """Add several."""
+        self.numbers.extend(chain.from_iterable(poses))
 
 
 class Page:
@@ -39,12 +67,19 @@ class Page:
         """Keep the lists."""
         self.stamps = stamps
         self.parents = parents
-        self.samples = samples
+        self.samples = samples  # or Packed, which stands for such a list
         self.segments: dict[int, Way] = {}
         self.late: list[tuple[int, str, Rigid]] = []
 
+    def unpack(self) -> None:
+        """Make a list of the samples, which can be changed."""
+        if type(self.samples) is not list:
+            self.samples = [*self.samples]
+
     def settle(self) -> None:
         """Sort in what came late, each after those of its stamp."""
+        if self.late:
+            self.unpack()
         if len(self.late) > FEW:
             rows = [*zip(self.stamps, self.parents, self.samples, strict=True), *self.late]
             rows.sort(key=itemgetter(0))
@@ -61,6 +96,7 @@ class Page:
 
     def drop(self, count: int) -> None:
         """Drop the oldest samples."""
+        self.unpack()
         for column in (self.stamps, self.parents, self.samples):
             del column[:count]
         self.segments.clear()
@@ -164,6 +200,8 @@ class MovingTrack:
         page = self.tail
         page.stamps.extend(stamps_ns)
         page.parents.extend([self.parent] * len(stamps_ns))
+        if type(page.samples) is list and len(page.stamps) > MANY:
+            page.samples = Packed(page.samples)  # type: ignore[assignment]
         page.samples.extend(components)
         self.last_ns = page.stamps[-1]
         self.table = None
@@ -224,6 +262,7 @@ class MovingTrack:
         """Cut a page into short ones."""
         page = self.pages[number]
         page.settle()
+        page.unpack()
         count = 2 * len(page.stamps) // PAGE
         ends = [part * len(page.stamps) // count for part in range(count + 1)]
         cut = [
@@ -251,6 +290,7 @@ class MovingTrack:
         page = self._page(stamp_ns)
         at = bisect_right(page.stamps, stamp_ns) - 1
         before = page.parents[at]
+        page.unpack()
         page.parents[at], page.samples[at] = parent, components
         page.segments.pop(at, None)
         page.segments.pop(at - 1, None)

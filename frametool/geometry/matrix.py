@@ -5,11 +5,11 @@ Six numbers stand for its first two columns, which say all of it (Zhou et al. 20
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import frexp, inf, isfinite, ldexp, sqrt
 
 from frametool.errors import ValueInvalid, warn
 from frametool.geometry import floats, quaternion
-from frametool.geometry.quaternion import EPS, FARTHEST, SILENT, TOLERATED, largest_of, length
+from frametool.geometry.quaternion import EPS, SILENT, TOLERATED, largest_of, length
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 ORTHONORMAL = 8 * EPS  # of the Gram matrix: what rounding alone leaves on a correctly rounded rotation
 SINGULAR = 1e-12  # of det / (|row 1| |row 2| |row 3|): below, rounding decides which rotation is nearest
+NEAREST, FURTHEST = 0.81 - 1e-9, 1.21 + 1e-9  # squares of the singular values that --normalize takes: 0.9 .. 1.1
+EQUAL = 2e-3  # of squares: singular values equal to 1e-3 are those of a multiple of a rotation
 PARALLEL = 1e-12  # sine between two columns: below, rounding decides the plane they span
 
 
@@ -50,13 +52,42 @@ def determinant(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> N:
     return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
+def gram(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Six[N]:
+    """Return R R^T: the squared lengths of the rows, then the products of the first and second, first and third .."""
+    return (
+        a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i,
+        a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i,
+    )  # fmt: skip
+
+
 def defect(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
     """Return the largest entry of |R R^T - 1|: how far the rows are from orthonormal."""
-    gram = [
-        a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0,
-        a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i,
-    ]  # fmt: skip
-    return largest_of([abs(entry) for entry in gram], xp)
+    return _beyond(1.0, *gram(a, b, c, d, e, f, g, h, i), xp)
+
+
+def _beyond(wanted: N | float, aa: N, bb: N, cc: N, ab: N, ac: N, bc: N, xp: Functions[N]) -> N:
+    """Return the largest entry by which a Gram matrix differs from `wanted` times the identity."""
+    return largest_of([abs(aa - wanted), abs(bb - wanted), abs(cc - wanted), abs(ab), abs(ac), abs(bc)], xp)
+
+
+def is_multiple(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N, xp: Functions[N], one: float = 1.0) -> Condition:
+    """Tell from its Gram matrix whether a matrix is a rotation times another number than 1, whose square is `one`."""
+    square = (aa + bb + cc) / 3.0
+    return (_beyond(square, aa, bb, cc, ab, ac, bc, xp) <= EQUAL * square) & (abs(square - one) > EQUAL * one)
+
+
+def is_near(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N) -> Condition:
+    """Tell from its Gram matrix G whether all singular values of a matrix lie in 0.9 .. 1.1.
+
+    G - 0.81 and 1.21 - G are both positive definite: so are their leading minors (Sylvester).
+    """
+    return _is_positive(aa - NEAREST, bb - NEAREST, cc - NEAREST, ab, ac, bc) & _is_positive(
+        FURTHEST - aa, FURTHEST - bb, FURTHEST - cc, -ab, -ac, -bc
+    )
+
+
+def _is_positive(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N) -> Condition:
+    return (aa > 0.0) & (aa * bb - ab * ab > 0.0) & (determinant(aa, ab, ac, ab, bb, bc, ac, bc, cc) > 0.0)
 
 
 def furthest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> float:
@@ -74,12 +105,12 @@ def furthest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions
 
 
 def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
-    """Return the rotation nearest to a matrix of positive determinant: its orthogonal polar factor.
+    """Return the rotation nearest to a matrix that is near one: its orthogonal polar factor.
 
-    Source: Higham 1986, Newton's X <- (X + X^-T)/2 with the inverse by cofactors.  A power of two brings the
-    determinant into [1/2, 4).  The convergence is quadratic: a step below 1e-9 leaves 1e-18, and is a row's last.
+    Source: Higham 1986, Newton's X <- (X + X^-T)/2 with the inverse by cofactors.
+    The convergence is quadratic: a step below 1e-9 leaves 1e-18, and is a row's last.
     """
-    x = balanced(a, b, c, d, e, f, g, h, i, xp)
+    x = a, b, c, d, e, f, g, h, i
     moving: Condition | None = None
     for _ in range(60):
         after = newton(*x)
@@ -94,13 +125,6 @@ def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[
     return x
 
 
-def balanced(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
-    """Divide a matrix by the power of two that brings its determinant into [1/2, 4); its rotation stays."""
-    x = _scaled(a, b, c, d, e, f, g, h, i, xp)
-    third = xp.frexp(determinant(*x))[1] // 3
-    return nine(xp.ldexp(part, -third) for part in x)
-
-
 def newton(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Nine[N]:
     """Take one Newton step towards the orthogonal factor."""
     cofactors = (
@@ -113,21 +137,22 @@ def newton(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Nine[N]:
 
 
 def deviation(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
-    """Return how far a matrix is from orthonormal; inf if it is mirrored, singular or not finite."""
+    """Return how far a matrix is from orthonormal; inf if it is none that --normalize takes."""
     off = defect(a, b, c, d, e, f, g, h, i, xp)
-    if xp.furthest(off) <= TOLERATED:
-        return xp.where(determinant(a, b, c, d, e, f, g, h, i) > SINGULAR, off, inf)
-    volume = relative_volume(a, b, c, d, e, f, g, h, i, xp)
-    return xp.where(volume > SINGULAR, xp.where(off < FARTHEST, off, FARTHEST), inf)
+    right: Condition = determinant(a, b, c, d, e, f, g, h, i) > SINGULAR
+    if not xp.furthest(off) <= TOLERATED:
+        products = gram(a, b, c, d, e, f, g, h, i)
+        right, off = right & is_near(*products), xp.where(is_multiple(*products, xp), inf, off)
+    return xp.where(right, off, inf)
 
 
 def check(*values: float, normalize: bool = False) -> Nine[float]:
     """Return the rotation nearest to one matrix, nine entries row-major.
 
-    Orthonormal to 1e-6 in silence, to 1e-3 with a warning; with `normalize` any of positive determinant.
+    Orthonormal to 1e-6 in silence, to 1e-3 with a warning; with `normalize` any with singular values in 0.9 .. 1.1.
 
     Raises:
-        ValueInvalid: not finite, mirrored, singular or not orthonormal.
+        ValueInvalid: not finite, mirrored, singular, a rotation that is scaled, or not orthonormal.
     """
     entries = nine(values)
     problem = complaint(*entries, normalize=normalize)
@@ -143,33 +168,32 @@ def check(*values: float, normalize: bool = False) -> Nine[float]:
 
 def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
     """Make the error for a matrix that is refused; None if it is not."""
-    matrix = nine(entries)
-    off = defect(*matrix, floats)
     if not all(map(isfinite, entries)):
         return ValueInvalid(f"matrix {_shown(entries)} is not finite; give nine finite numbers", rule="not-finite")
-    if not normalize and not off <= TOLERATED and not (off < 1.0 and determinant(*matrix) < 0.0):
-        off_by = f"its rows are orthonormal only to {off:.2g} (normalize it with --normalize)"
-        return ValueInvalid(f"matrix is not a rotation: {off_by}", rule="denormalized")
-    volume = relative_volume(*matrix, floats)
+    matrix = nine(entries)
+    exponent = frexp(max(map(abs, matrix)))[1]
+    scaled = nine(ldexp(part, -exponent) for part in matrix)  # by a power of two: no square leaves the range
+    products = gram(*scaled)
+    lengths = sqrt(products[0]) * sqrt(products[1]) * sqrt(products[2])
+    volume = determinant(*scaled) / (lengths or 1.0)  # in [-1, 1], 0 where a row is zero
     if volume < -SINGULAR:
         found = f"matrix has determinant {determinant(*matrix):.6g}"
         return ValueInvalid(f"{found}: it is left-handed (mirrored); a rotation has 1", rule="mirrored")
+    off = defect(*matrix, floats)
     if volume <= SINGULAR:
-        return ValueInvalid(f"matrix {_shown(entries)} is singular; no rotation is nearest to it", rule="denormalized")
-    return None
-
-
-def _scaled(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
-    """Scale a matrix by the power of two of its largest entry: its rotation stays, its determinant is in range."""
-    shift = -xp.frexp(largest_of([abs(part) for part in (a, b, c, d, e, f, g, h, i)], xp))[1]
-    return nine(xp.ldexp(part, shift) for part in (a, b, c, d, e, f, g, h, i))
-
-
-def relative_volume(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
-    """Return the determinant divided by the lengths of the rows: in [-1, 1], 0 where a row is zero."""
-    a, b, c, d, e, f, g, h, i = _scaled(a, b, c, d, e, f, g, h, i, xp)
-    lengths = length(a, b, c, xp) * length(d, e, f, xp) * length(g, h, i, xp)
-    return determinant(a, b, c, d, e, f, g, h, i) / xp.where(lengths == 0.0, 1.0, lengths)
+        problem = f"matrix {_shown(entries)} is singular; no rotation is nearest to it"
+    elif off <= TOLERATED:
+        return None
+    elif is_multiple(*products, floats, ldexp(1.0, min(-2 * exponent, 1000))):
+        size = ldexp(sqrt(sum(products[:3]) / 3.0), exponent)
+        problem = f"matrix is a rotation scaled by {size:.6g}: a similarity, not a pose"
+    else:
+        near = is_near(*gram(*matrix))
+        if near and normalize:
+            return None
+        remedy = "(normalize it with --normalize)" if near else "(sheared or scaled unevenly)"
+        problem = f"matrix is not a rotation: its rows are orthonormal only to {off:.2g} {remedy}"
+    return ValueInvalid(problem, rule="denormalized")
 
 
 def nine(values: Iterable[N]) -> Nine[N]:

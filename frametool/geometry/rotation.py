@@ -126,10 +126,10 @@ class Rotation(Batched):
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Rotation:
         """Take matrices of shape (..., 3, 3), rows orthonormal to 1e-6 (to 1e-3: nearest rotation and a warning).
 
-        With `normalize` the nearest rotation (the polar factor) of any matrix of positive determinant.
+        With `normalize` the nearest rotation (the polar factor) where all singular values lie in 0.9 .. 1.1.
 
         Raises:
-            ValueInvalid: wrong shape, not finite, mirrored, singular, not orthonormal; names the first such row.
+            ValueInvalid: wrong shape, not finite, mirrored, scaled, not orthonormal; names the first such row.
         """
         return cls.from_columns("matrix", validation.matrices(matrices, 3, "matrix"), "matrix", normalize=normalize)
 

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.errors import ValueInvalid, bare, did_you_mean, shown
 from frametool.geometry import rigid
 from frametool.geometry.representations import REPRESENTATIONS
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
 from frametool.grammar.rotation_spelling import AGREEMENT, AXES_KEY, ROTATION_KEYS, agreeing_rotation, read_rotation
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -32,7 +33,7 @@ DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "a
 NAMES = frozenset(("name", "parent"))
 MOST_NAMED = 5  # unknown keys in one message, if they fit into
 MOST_CHARACTERS = 80
-POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", AXES_KEY))
+POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", "scale", AXES_KEY))
 
 
 class Pose(NamedTuple):
@@ -72,6 +73,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     position: Vector | None = None
     rotation: Quaternion | None = None
     outer_degrees = reading.degrees
+    if "scale" in mapping:
+        refuse_scale(mapping["scale"])
     if "angles" in mapping:
         reading.degrees = read_angle_unit(mapping["angles"])
     key = ""
@@ -130,6 +133,19 @@ def _read_flag(value: Any) -> bool:
         found = kind(value)
         raise Misfit(f"inverse must be true or false, found {found}", ("inverse",))
     return bool(value == "true")
+
+
+def refuse_scale(value: Any) -> None:
+    """Stop at the scale of a pose unless it is 1, or three of them: what is scaled is no pose."""
+    parts = value if type(value) is list else [*value.values()] if type(value) is dict else [value]
+    try:
+        is_one = {parse_number(part) for part in parts} == {1.0}
+    except (ValueInvalid, TypeError):
+        is_one = False
+    if not is_one:
+        found = bare(" ".join(parts)) if all(type(part) is str for part in parts) else kind(value)
+        message = f"scaled by {found}: a similarity, not a pose; beside a pose scale can only be 1"
+        raise NotARotation(message, ("scale",))
 
 
 def read_position(value: Any, unit: float) -> Vector:

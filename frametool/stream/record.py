@@ -15,7 +15,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, on_earth
-from frametool.grammar.pose import POSE_KEYS, POSITION_KEYS, read_angle_unit, read_position, unknown_keys
+from frametool.grammar.pose import (
+    POSE_KEYS,
+    POSITION_KEYS,
+    read_angle_unit,
+    read_position,
+    refuse_scale,
+    unknown_keys,
+)
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
 from frametool.stream.row_layout import (
@@ -696,6 +703,8 @@ def _with_names(
         value = value_at(document, around)
         if type(value) is not dict:
             continue
+        if record.shape.kind == POSE and "scale" in value and (around == path or type(value["scale"]) is str):
+            within(around, refuse_scale, value["scale"])  # that of a Marker, around its pose, is its shape's
         parent = _named(value, PARENT_KEYS, (*above, *around), parent, request)
         if record.shape.kind == POSE or around == path:
             name = _named(value, NAME_KEYS, (*above, *around), name, request)

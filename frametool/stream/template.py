@@ -21,6 +21,7 @@ from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
 from frametool.stream.faults import RowNote
 from frametool.stream.record import POINT_KEYS
+from frametool.stream.row_layout import POSE
 from frametool.stream.splice import OURS, Splicer
 from frametool.stream.text_parts import Const, IfLocked, In, Out
 
@@ -196,6 +197,9 @@ class Template:
         """Yield the scalars that decide nothing, in order, each with the expression of what it may be."""
         around = {entry.record.path[:depth] for entry in self.entries for depth in range(len(entry.record.path) + 1)}
         around |= {(*path, "header") for path in around}
+        poses = [entry.record.path for entry in self.entries if entry.record.shape.kind == POSE]
+        around |= {(*path, "scale") for path in poses}
+        words = _WORDS if poses else _WORDS - {"scale"}  # of points that is data
         fixed = {path for entry in self.entries for path in (*entry.record.numbers, *entry.record.unknown)}
         stamps = {path: STAMP[at % 2] for entry in self.entries for at, path in enumerate(entry.record.stamps)}
         for path, leaf in _leaves(self._root, ()):
@@ -205,7 +209,7 @@ class Template:
                 yield leaf, f"{leaf.quote}[0-9]++{leaf.quote}"
             elif path in stamps:
                 yield leaf, f"{leaf.quote}{stamps[path]}{leaf.quote}"
-            elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _may_matter(key)):
+            elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _stem(key) in words):
                 continue
             else:
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
@@ -220,9 +224,9 @@ def _notes(entries: Sequence[Entry]) -> Iterator[RowNote]:
             yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
 
 
-def _may_matter(key: str) -> bool:
-    """Tell whether a scalar under this key, beside our numbers, may be one of them or change what they mean."""
-    return re.split(r"[^a-z0-9_]|_(?:deg|rad|mm)", key.casefold(), maxsplit=1)[0] in _WORDS
+def _stem(key: str) -> str:
+    """Return a key without its unit: beside our numbers its scalar may be one of them or change what they mean."""
+    return re.split(r"[^a-z0-9_]|_(?:deg|rad|mm)", key.casefold(), maxsplit=1)[0]
 
 
 def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:

@@ -111,7 +111,7 @@ class FrameScene:
             matches = _expression(only)
             chosen = {name for name in chosen if matches.search(name)}
         if not chosen:
-            raise ValueInvalid("no frame is left to draw: nothing matches")
+            raise ValueInvalid(f"no frame is left to draw: nothing matches{f' {shown(only)}' * (only is not None)}")
         return chosen
 
     def parent(self, name: str) -> str | None:

@@ -1,7 +1,7 @@
 """One HTML file in which frames can be looked at from all sides, with everything inside and no request to anywhere.
 
 Its script and style stand as plain files in the folder `page`, one after another in the order of SCRIPTS; the page
-lets nothing else run.  Poses go in as doubles, stamps as doubles of nanoseconds since the first; joints of a robot
+lets nothing else run.  Poses go in as doubles, stamps as 64-bit integers of nanoseconds; joints of a robot
 with their limits.  A run of turtles is shown as its followers saw it in tf.
 """
 
@@ -14,6 +14,7 @@ from array import array
 from base64 import b64encode
 from hashlib import sha256
 from html import escape
+from itertools import chain, islice
 from json import dumps
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,7 @@ from frametool.view.frame_scene import FrameScene
 from frametool.view.projection import EYES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.formats.robots.model import Robot, Value
     from frametool.sim.simulate import SimulationStep
@@ -33,7 +34,9 @@ if TYPE_CHECKING:
 FOLDER = os.path.join(os.path.dirname(__file__), "page")
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
 WITH_JOINTS = (*SCRIPTS[:-1], "joints", "main")
-PACKED = 48_000  # bytes of doubles, from where on they are compressed
+EACH = 8  # bytes of a number
+BLOCK = 1 << 13  # samples
+PACKED = 48_000  # bytes of numbers, from where on they are compressed
 NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -48,10 +51,7 @@ def write_page(
     other: another tree seen in the same frame, laid over this one; other_title: what it is called.
     joints: those with a slider, as `joint_sliders` makes them.
     """
-    head, numbers = _data(scene)
-    data = numbers.tobytes()
-    packed = len(data) > PACKED
-    head |= {"title": title, "file": file or title, "made": f"frametool {__version__}", "packed": packed}
+    head = _head(scene) | {"title": title, "file": file or title, "made": f"frametool {__version__}"}
     head["show"] = _shown(scene, eye)
     if joints:
         head["joints"] = list(joints)
@@ -59,10 +59,6 @@ def write_page(
         here = {name: number for number, name in enumerate(scene.names)}
         poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
         head["overlay"] = {"title": other_title, "poses": poses}
-    if packed:
-        from zlib import compress
-
-        data = compress(data, 6)
     script, style = "".join(_file(f"{name}.js") for name in (WITH_JOINTS if joints else SCRIPTS)), _file("page.css")
     parts = {
         # the page lets its own script and style run, and nothing else
@@ -72,7 +68,7 @@ def write_page(
         "STYLE": style,
         # JSON that no name in it can end
         "HEAD": dumps(head, separators=(",", ":")).replace("<", "\\u003c").replace("&", "\\u0026"),
-        "BLOB": b64encode(data).decode(),
+        "BLOB": b64encode(b"".join(_packed(_blob(scene)) if head["packed"] else _blob(scene))).decode(),
         "SCRIPT": script,
     }
     return re.sub("@([A-Z]+)@", lambda mark: parts[mark[1]], _file("page.html"))
@@ -98,28 +94,45 @@ def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]
     return shown | ({"view": eye} if eye else {})
 
 
-def _data(scene: FrameScene) -> tuple[dict[str, Any], array[float]]:
-    """Return names, parents and where each track's numbers begin, and all numbers."""
+def _head(scene: FrameScene) -> dict[str, Any]:
+    """Return names, parents and where each track's numbers begin in the blob."""
     index = {name: number for number, name in enumerate(scene.names)}
-    numbers = array("d")
-    parents = []
-    for name in scene.names:
-        track = None if name in scene.tracks else scene.tree.track(name)
-        parents.append(-1 if track is None else index[track.parent])
-        numbers.extend(NO_POSE if track is None else track.components)
-    first_ns, last_ns = scene.span_ns
-    tracks = []
+    standing = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
+    parents = [-1 if track is None else index[track.parent] for track in standing]
+    tracks: list[dict[str, Any]] = []
+    at = EACH * len(NO_POSE) * len(parents)
     for name, moving in scene.tracks.items():
-        at = numbers.itemsize * len(numbers)
         parents_then = [index[parent] for _, parent, _ in moving.walk()] if moving.varies else index[moving.parent]
         tracks.append({"frame": index[name], "count": moving.count, "at": at, "parents": parents_then})
-        numbers.extend(stamp - first_ns for stamp, _, _ in moving.walk())
-        for _, _, sample in moving.walk():
-            numbers.extend(sample)
+        at += EACH * (1 + len(NO_POSE)) * moving.count
+    first, last = map(str, scene.span_ns)
+    head = {"names": scene.names, "parents": parents, "tracks": tracks, "first": first, "last": last}
+    return head | {"packed": at > PACKED}
+
+
+def _blob(scene: FrameScene) -> Iterator[bytes]:
+    """Yield the poses of frames that stand still, then of each track its stamps and its samples."""
+    standing = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
+    yield _little(array("d", chain.from_iterable(track.components if track else NO_POSE for track in standing)))
+    for moving in scene.tracks.values():
+        yield _little(array("q", (stamp for stamp, _, _ in moving.walk())))
+        samples = moving.walk()
+        while some := array("d", chain.from_iterable(each for _, _, each in islice(samples, BLOCK))):
+            yield _little(some)
+
+
+def _little(numbers: array[Any]) -> bytes:
     if sys.byteorder == "big":
         numbers.byteswap()
-    head = {"names": scene.names, "parents": parents, "tracks": tracks}
-    return head | {"t0": str(first_ns), "first": 0, "last": last_ns - first_ns}, numbers
+    return numbers.tobytes()
+
+
+def _packed(pieces: Iterator[bytes]) -> Iterator[bytes]:
+    from zlib import compressobj
+
+    packer = compressobj(6)
+    yield from map(packer.compress, pieces)
+    yield packer.flush()
 
 
 def joint_sliders(robot: Robot, values: Mapping[str, Value], names: Sequence[str]) -> list[dict[str, Any]]:

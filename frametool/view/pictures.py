@@ -11,7 +11,7 @@ import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
-from frametool.errors import ValueInvalid, printable
+from frametool.errors import FileProblem, printable
 from frametool.view.projection import SLANTED, Projection, Size, axis_tips, nice, place_labels
 
 if TYPE_CHECKING:
@@ -166,18 +166,18 @@ ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 def require_matplotlib() -> None:
     """Say what to install if it is missing.
 
-    Raises ValueInvalid.
+    Raises FileProblem.
     """
     from importlib.util import find_spec
 
     if find_spec("matplotlib") is None:
-        raise ValueInvalid("a PNG needs matplotlib: pip install 'frametool[plot]', or write .svg, which needs nothing")
+        raise FileProblem("a PNG needs matplotlib: pip install 'frametool[plot]', or write .svg, which needs nothing")
 
 
 def write_png(picture: Picture) -> bytes:
     """Return the picture as the bytes of a PNG, without a date in them.
 
-    Raises ValueInvalid where matplotlib is missing.
+    Raises FileProblem where matplotlib is missing.
     """
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -51,9 +51,10 @@ class ProgressBar:
 
 def _bar(total: int | None) -> Any:
     from rich import progress
-    from rich.console import Console
+
+    from frametool.view.tree_text import coloured_console
 
     columns: list[Any] = [progress.TextColumn("{task.fields[rows]} rows  {task.fields[rate]} rows/s")]
     if total:
         columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]
-    return progress.Progress(*columns, console=Console(stderr=True), transient=True)
+    return progress.Progress(*columns, console=coloured_console(stderr=True), transient=True)

@@ -145,12 +145,18 @@ class TerminalPicture:
 
     def _place(self, place: Flat, names: list[str]) -> bool:
         """Write a name where it covers no other and, if that can be, no axis; False where there is no room."""
-        letters = list(_cells(words_of(names, most=1)))
-        around = _around(math.floor(place.y) // 4, math.floor(place.x) // 2, len(letters))
-        spots = ([(line, column + offset) for offset in range(-1, len(letters) + 1)] for line, column in around)
-        found = best_spot(spots, self._is_taken, lambda cells: any(self._canvas.rank(*cell) >= AXIS for cell in cells))
-        self._names |= zip(found[1:-1] if found else (), ((letter, "bold") for letter in letters), strict=False)
-        return found is not None
+        for most in range(len(names), 0, -1):
+            letters = list(_cells(words_of(names, most)))
+            around = _around(math.floor(place.y) // 4, math.floor(place.x) // 2, len(letters))
+            spots = ([(line, column + offset) for offset in range(-1, len(letters) + 1)] for line, column in around)
+            found = best_spot(spots, self._is_taken, self._is_on_axes)
+            if found:
+                self._names |= zip(found[1:-1], ((letter, "bold") for letter in letters), strict=True)
+                return True
+        return False
+
+    def _is_on_axes(self, cells: list[Spot]) -> bool:
+        return any(self._canvas.rank(*cell) >= AXIS for cell in cells)
 
     def _is_taken(self, cells: list[Spot]) -> bool:
         """Tell whether a name does not fit into cells, of which the first and the last stay free, or covers another."""
@@ -236,12 +242,11 @@ class Screen:
 
     def __init__(self, scene: Scene, *, to_stderr: bool = False, console: Console | None = None) -> None:
         """Choose where to draw; the picture takes what the terminal's height and width allow."""
-        from rich.console import Console
         from rich.live import Live
 
         from frametool.sim.simulate import SimulationStep
 
-        console = console or Console(stderr=to_stderr)
+        console = console or coloured_console(stderr=to_stderr)
         room = console.height - TALK - 3 - len(scene.followers)
         self._canvas = Canvas(max(5, min(room, (console.width - 4) // 2, 40)))
         # what goes to stdout next to the picture is data and must not be caught

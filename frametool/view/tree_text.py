@@ -48,15 +48,21 @@ def print_tree(tree: Frames, style: Style, color: str = "auto") -> None:
         console.print(Text.assemble((line.branch, "dim"), (line.frame, name), pad, ("  ".join(line.label), "cyan")))
 
 
-def coloured_console(color: str = "auto") -> Console:
-    """Return standard output, in colour where the terminal has any, or as `color` says: always or never."""
+def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
+    """Return an output, in colour where the terminal has any, or as `color` says: always or never.
+
+    Where there is no colour, also by NO_COLOR, nothing is bold or dim either.
+    """
+    import os
     import sys
 
     from rich.console import Console
 
+    plain = color == "never" or (color == "auto" and bool(os.environ.get("NO_COLOR")))
     return Console(
-        file=sys.stdout, highlight=False, soft_wrap=True, no_color=True if color == "never" else None,
-        force_terminal=True if color == "always" else None, color_system="auto" if color == "auto" else "standard",
+        file=sys.stderr if stderr else sys.stdout, highlight=False, soft_wrap=True, no_color=plain,
+        force_terminal=True if color == "always" else None,
+        color_system=None if plain else "auto" if color == "auto" else "standard",
     )  # fmt: skip
 
 

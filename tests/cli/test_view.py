@@ -12,11 +12,13 @@ import subprocess
 import termios
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import console
 import pytest
 from shell import TOOL
+
+import frametool
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,7 +52,7 @@ def test_a_png_is_written_or_says_what_to_install(run: Run, tmp_path: Path) -> N
     if find_spec("matplotlib"):
         assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
     else:
-        assert (outcome.status, outcome.err) == (1, "frametool: a PNG needs matplotlib: pip install 'frametool[plot]', or write .svg, which needs nothing\n")
+        assert (outcome.status, outcome.err) == (5, "frametool: a PNG needs matplotlib: pip install 'frametool[plot]', or write .svg, which needs nothing\n")
 
 
 def test_target_source_frame_and_time_begin_the_page(run: Run) -> None:
@@ -130,13 +132,13 @@ def test_a_crowded_picture_says_how_to_see_a_part(run: Run) -> None:
     assert run("view", ROBOT, "--below", "base_link", "-f", "svg").err == ""
 
 
-def shown_in_a_terminal(*arguments: str, **environment: str) -> bytes:
-    """Return what the command writes to a terminal of 60 columns and 20 lines."""
+def shown_in_a_terminal(*arguments: str, size: tuple[int, int] = (60, 20), command: str = "view", **environment: str) -> bytes:
+    """Return what a command writes to a terminal of so many columns and lines."""
     ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 20, 60, 0, 0))
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", *size[::-1], 0, 0))
     inherited = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "COLUMNS", "LINES")}
     environment = inherited | {"TERM": "xterm-256color", "PYTHONPATH": str(console.ROOT)} | environment
-    tool = subprocess.Popen([*TOOL, "view", *arguments], stdout=theirs, stderr=theirs, env=environment)
+    tool = subprocess.Popen([*TOOL, command, *arguments], stdout=theirs, stderr=theirs, env=environment)
     os.close(theirs)
     drawn = b""
     while True:
@@ -159,11 +161,28 @@ def test_a_moving_tree_is_played_to_its_end_and_the_cursor_comes_back() -> None:
 
 @pytest.mark.parametrize("no_color", [False, True])
 def test_a_terminal_gets_a_picture_of_its_own_size_in_colour(no_color: bool) -> None:  # noqa: FBT001
-    drawn = shown_in_a_terminal(ROBOT, **({"NO_COLOR": "1"} if no_color else {}))
+    environment: dict[str, Any] = {"NO_COLOR": "1"} if no_color else {}
+    drawn = shown_in_a_terminal(ROBOT, **environment)
     lines = re.sub(r"\x1b\[[\d;]*m", "", drawn.decode()).split("\r\n")
     assert len(lines) == 19 + 1
     assert max(map(len, lines)) <= 60
     assert (b"\x1b[31m" in drawn) != no_color
+
+
+@pytest.mark.parametrize("command", ["view", "tree"])
+@pytest.mark.parametrize("plain", ["NO_COLOR", "TERM", "--color=never"])
+def test_where_no_colour_is_wanted_nothing_is_bold_or_dim_either(command: str, plain: str) -> None:
+    environment: dict[str, Any] = {plain: "dumb"} if plain.isupper() else {}
+    drawn = shown_in_a_terminal(ROBOT, *[plain] * (not environment), command=command, **environment)
+    assert b"base_link" in drawn
+    assert b"\x1b" not in drawn
+
+
+def test_a_large_terminal_names_every_frame_whole() -> None:
+    drawn = shown_in_a_terminal(ROBOT, size=(200, 60), NO_COLOR="1").decode()
+    assert [name for name in frametool.load(ROBOT).frames if not re.search(rf"(?<!\w){name}(?!\w)", drawn)] == []
+    assert "+" not in drawn
+    assert "hidden" not in drawn
 
 
 def test_the_page_is_opened_in_the_browser(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

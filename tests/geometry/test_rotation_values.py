@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 import tracemalloc
@@ -125,8 +126,10 @@ def test_normalising_helps_neither_zero_nor_nan(given: Any) -> None:
     ("entries", "message"),
     [
         (np.diag([1.0, 1.0, -1.0]), r"left-handed \(mirrored\)"),
-        (2.0 * np.eye(3), r"orthonormal only to 3"),
-        (np.zeros((3, 3)), r"orthonormal only to 1"),
+        (2.0 * np.eye(3), r"matrix is a rotation scaled by 2: a similarity, not a pose$"),
+        (np.diag([1.0, 1.0, 2.0]), r"orthonormal only to 3 \(sheared or scaled unevenly\)$"),
+        (np.diag([1.0, 1.0, 1.1]), r"orthonormal only to 0.21 \(normalize it with --normalize\)$"),
+        (np.zeros((3, 3)), r"matrix 0 0 0, 0 0 0, 0 0 0 is singular"),
         (np.full((3, 3), math.nan), r"not finite"),
     ],
 )
@@ -299,15 +302,32 @@ def test_nothing_has_no_mean() -> None:
         batch((0,)).mean()
 
 
-def test_huge_and_flat_matrices_are_refused_or_normalised_never_believed() -> None:
+@pytest.mark.parametrize("normalize", [False, True])
+@pytest.mark.parametrize(
+    ("stretch", "message"),
+    [
+        *((each, r"sheared or scaled unevenly\)$") for each in (
+            (1.0, 1.0, 1e-9), (1.0, 1.0, 1e-3), (1.2, 1.0, 1.0), (0.89, 0.95, 1.1))),
+        *(((s, s, s), f"a rotation scaled by {re.escape(f'{s:g}')}: a similarity, not a pose$") for s in (
+            1e-300, 1e-3, 0.5, 0.9, 0.95, 0.998, 1.002, 1.05, 2.0, 1000.0, 1e200, 1e307)),
+        ((-1.0, 1.0, 1.0), r"left-handed \(mirrored\)"), ((2.0, 2.0, -2.0), r"left-handed \(mirrored\)"),
+    ],
+)  # fmt: skip
+def test_what_stretches_is_refused_by_how_much_and_normalised_by_nothing(
+    stretch: tuple[float, ...], message: str, normalize: bool  # noqa: FBT001
+) -> None:
+    entries = batch(()).as_matrix() * np.array(stretch)
+    for given in (entries, entries[None]):
+        with pytest.raises(ValueInvalid, match=message):
+            Rotation.from_matrix(given, normalize=normalize)
+
+
+@pytest.mark.parametrize("stretch", [(0.9, 1.0, 1.1), (1.1, 1.1, 0.9), (0.95, 0.95, 0.96), (1.0004, 1.0004, 1.0004)])
+def test_what_stretches_by_a_tenth_is_normalised(stretch: tuple[float, ...]) -> None:
     turned = batch(())
-    huge = 1e200 * turned.as_matrix()
-    flat = turned.as_matrix() @ np.diag([1.0, 1.0, 1e-9])
-    for entries in (huge, flat):
-        for given in (entries, entries[None]):
-            with pytest.raises(ValueInvalid, match="orthonormal"):
-                Rotation.from_matrix(given)
-            assert np.all(Rotation.from_matrix(given, normalize=True).is_close(turned, angle=1e-6))
+    entries = turned.as_matrix() * np.array(stretch)
+    for given in (entries, entries[None]):
+        assert np.all(Rotation.from_matrix(given, normalize=True).is_close(turned, angle=1e-15))
 
 
 def test_one_axis_takes_many_angles_and_one_direction_many_others() -> None:

@@ -105,9 +105,9 @@ def test_poses_and_stamps_are_in_the_page_to_the_bit() -> None:
     text = write_page(FrameScene(buffer), title="log")
     (track,) = head_of(text)["tracks"]
     numbers = numbers_of(text)[track["at"] // 8 :]
-    assert head_of(text)["t0"] == str(begin)
+    assert (head_of(text)["first"], head_of(text)["last"]) == (str(begin), str(begin + 4999 * 1_000_003))
     assert head_of(text)["packed"]
-    assert list(numbers[: track["count"]]) == [k * 1_000_003 for k in range(5000)]
+    assert list(array("q", numbers[: track["count"]].tobytes())) == [begin + k * 1_000_003 for k in range(5000)]
     assert [tuple(numbers[5000 + 7 * k : 5007 + 7 * k]) for k in range(5000)] == [each.components for each in samples]
 
 

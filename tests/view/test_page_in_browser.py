@@ -100,7 +100,7 @@ def test_every_pair_of_frames_is_what_lookup_says_to_the_bit(page_of: MakePage, 
     tab, tree = visit(page_of(name)), frametool.load(ROOT / "examples" / name)
     for at in SECONDS if name == "drive.yaml" else (0.0,):
         for target, source in itertools.product(tree.frames, repeat=2):
-            found = tab.evaluate(LOOKUP, [target, source, at * 1e9])
+            found = tab.evaluate(LOOKUP, [target, source, round(at * 1e9)])
             assert found["pose"] == list(tree.lookup(target, source, round(at * 1e9)).components), (target, source, at)
 
 
@@ -324,6 +324,20 @@ def test_one_frame_several_roots_huge_distances_and_late_stamps_are_drawn(page_o
 def test_frames_without_a_way_between_them_say_so(page_of: MakePage, visit: Visit) -> None:
     tab = visit(page_of("{frames: {a: , c: }}"), "target=a&source=c")
     assert tab.inner_text("#say") == "c seen from a: not connected"
+
+
+@browsers.NEEDS_CHROMIUM
+@pytest.mark.parametrize("asked", [1, 2, 1_699_999_999_999_999_999, 1_700_000_000_123_456_788, 1_700_000_000_123_456_789])
+def test_stamps_a_lifetime_apart_are_exact(page_of: MakePage, asked: int) -> None:
+    samples = [(1, 1.0), (2, 2.0), (1_700_000_000_123_456_787, 3.0), (1_700_000_000_123_456_789, 4.0)]
+    listed = ", ".join(f"{{stamp_ns: {stamp}, xyz: [{x}, 0, 0]}}" for stamp, x in samples)
+    tree = f"{{frames: [{{name: a}}, {{name: b, parent: a, samples: [{listed}]}}]}}"
+    second, rest = divmod(asked, 10**9)
+    seen = browsers.seen_in_chromium(page_of(tree), f"target=a&source=b&t={second}.{rest:09}")
+    assert f'id="clock">{second}.{rest:09} s<' in seen
+    path = page_of(tree).parent / "tree.yaml"
+    pose = json.loads(re.search('data-pose="([^"]*)"', seen)[1])  # type: ignore[index]
+    assert pose == pytest.approx(frametool.load(path).lookup("a", "b", asked).components, rel=1e-15)
 
 
 def test_a_time_without_data_is_named_with_what_there_is(page_of: MakePage, visit: Visit) -> None:

@@ -14,7 +14,7 @@ import pytest
 from console import ROOT
 
 import frametool
-from frametool.errors import ValueInvalid
+from frametool.errors import FileProblem
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
 from frametool.view.frame_scene import FrameScene
@@ -158,7 +158,7 @@ def test_shapes_of_a_frame_come_farthest_first() -> None:
 def test_a_png_needs_matplotlib_and_says_so(tree: str) -> None:
     scene = FrameScene(ODD["hostile names"] if tree == "hostile" else frametool.load(ROOT / "examples" / tree))
     if find_spec("matplotlib") is None:
-        with pytest.raises(ValueInvalid, match=r"pip install 'frametool\[plot\]'"):
+        with pytest.raises(FileProblem, match=r"pip install 'frametool\[plot\]'"):
             write_png(still_picture(scene).picture)
     else:
         data = write_png(still_picture(scene).picture)

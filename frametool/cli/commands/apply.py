@@ -125,8 +125,7 @@ def command(
         request = request._replace(poses=count, kinds=(kinds if len(kinds) == count else (kind or "",) * count))
     if rest in ((), ("-",)):
         return stream.run(request, output)
-    if stream.path:
-        raise click.UsageError("-i FILE and records are two inputs; give one")
+    task.only_arguments(rest, "frame_column", "time_column")
     output.values(values_of(list(_sources(rest, kind)), request, output))
     return 0
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options, one_argument, pose_stream_options
+from frametool.cli.group import refuse_unused
 from frametool.cli.options import TEXT, AxesName, Command, Number, pose_result_options
 from frametool.cli.poses import is_inline, pose_from_numbers, pose_source, rejoined, source_from_numbers, values_of
 from frametool.cli.stderr import say
@@ -103,11 +104,11 @@ def command(
         if task.derives:
             raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
         values = ()
-    is_alone = operation.turns and (task.derives or not stream.has_input())
-    if stream.path or values == ("-",) or not (values or is_alone):
-        if values not in ((), ("-",)):
-            raise click.UsageError("-i FILE and VALUES are two inputs; give one")
+    is_alone = operation.turns and not values and (task.derives or not stream.has_input())
+    if values == ("-",) or not (values or is_alone):
+        refuse_unused("is about one rotation that is an argument", "find")
         return stream.run(request, output)
+    task.only_arguments(values, *["unwrap"] * (is_numbers or all(map(is_inline, values))))
     results: list[Any]
     sources: Sequence[str | Source] = ()
     if is_numbers or not values:

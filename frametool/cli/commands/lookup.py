@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options
+from frametool.cli.group import refuse_unused
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.options import (
     FILE,
@@ -23,7 +24,7 @@ from frametool.cli.options import (
     rules_options,
     times_option,
 )
-from frametool.cli.streaming import stream_options
+from frametool.cli.streaming import OPTIONS, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.grammar.edges import stop
 from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
@@ -68,6 +69,8 @@ def command(
 
     TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp;
     nothing is extrapolated. Trajectories (-f tum, kitti ..) hold all samples of the way without --times.
+    -i FILE and the options of rows need --target-column or --source-column; --source-at needs --fixed, --at is then
+    that of TARGET; --on-error is also for --times.
     """
     by_row, task = RowFrames(options), PoseTask(options)
     stream, output = task.stream, task.output
@@ -77,6 +80,11 @@ def command(
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
+    if by_row:
+        refuse_unused("is for one lookup; the rows of a table name theirs", "times", "source_at", "fixed", "given")
+    else:
+        rows = {*OPTIONS} - {"quiet", *(["on_error"] if times is not None else [])}
+        refuse_unused("is about rows that name frames: give --target-column or --source-column", *rows)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
     chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)

@@ -52,9 +52,12 @@ def command(poses: tuple[str, ...], weights: str | None, **options: Any) -> int:
     if poses in ((), ("-",)):
         status = stream.run(request, task.output)
     else:
+        task.only_arguments(poses)
         for each in poses:
             gathered.add(poses_from(each, request))
         given = None if weights is None else _numbers(weights)
+        if given is not None and len(given) != len(gathered.transforms):
+            raise click.UsageError(f"--weights are {len(given)}, the poses {len(gathered.transforms)}")
     task.output.poses([_mean(gathered, given)])
     return status
 

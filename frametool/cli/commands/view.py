@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import refuse_unused
 from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules_of
 from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened
-from frametool.errors import shown
+from frametool.errors import listing, shown
+from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,6 +78,10 @@ def command(
     file that FRAMETOOL_TREE names.
     """
     chosen = _form(form, output, opens=opens)
+    if chosen != "text" or output is not None:
+        refuse_unused("is for a picture in the terminal", "color")
+    if chosen == "glb":
+        refuse_unused("is not used: GLB is seen from all sides", "eye")
     refuse_existing(output, force=force)
     if chosen == "png":
         from frametool.view.pictures import require_matplotlib
@@ -94,6 +100,9 @@ def command(
     names = ends | {"fixed": options["fixed"], "below": options["below"]}
     options |= {key: name and frame_name(name, frames) for key, name in names.items()}
     scene = FrameScene(frames, at_ns=stamp_ns, **options)
+    gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
+    if gone and chosen != "html":  # which goes to the nearest time
+        say(f"note: no data of {listing(gone)} at {format_stamp(scene.at_ns or 0)}: it and what hangs from it is not drawn")
     before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed) if overlay else None
     on_terminal = chosen == "text" and output is None and sys.stdout.isatty()
     if live and (not on_terminal or scene.at_ns is None):

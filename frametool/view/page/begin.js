@@ -1,4 +1,4 @@
-// What the command wrote into the page: a head as JSON, and poses and stamps as little-endian doubles, packed if many.
+// What the command wrote into the page: a head as JSON, and doubles and 64-bit stamps, packed if many.
 
 const head = JSON.parse(document.getElementById("head-data").textContent);
 const blob = await unpack(document.getElementById("blob").textContent.trim(), head.packed);

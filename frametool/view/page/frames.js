@@ -1,16 +1,16 @@
-// The tree of frames over time, as frametool.frames has it.  Times are nanoseconds since head.t0, exact in a double for
-// 104 days.  Frames are numbers: places in head.names; -1 is none.
+// The tree of frames over time, as frametool.frames has it.  Times are BigInts of nanoseconds: doubles hold 104 days.
+//  Frames are numbers: places in head.names; -1 is none.
 
 const NAMES = head.names, COUNT = NAMES.length;
 const PARENT = Int32Array.from(head.parents);  // of frames that stand still
 const POSE = new Float64Array(blob, 0, 7 * COUNT);
 const TRACKS = new Map(head.tracks.map((track) => [track.frame, {  // of those that move
   parents: track.parents, last: track.count - 1,
-  stamps: new Float64Array(blob, track.at, track.count),
+  stamps: new BigInt64Array(blob, track.at, track.count),
   samples: new Float64Array(blob, track.at + 8 * track.count, 7 * track.count),
 }]));
 const INDEX = new Map(NAMES.map((name, frame) => [name, frame]));
-const T0 = BigInt(head.t0), FIRST = head.first, LAST = head.last;
+const FIRST = BigInt(head.first), LAST = BigInt(head.last);
 
 const part_of = (array, width, at) => Array.from(array.subarray(width * at, width * at + width));
 const varies = (track) => Array.isArray(track.parents);
@@ -38,7 +38,7 @@ function edge(frame, t) {
   const parent = varies(track) ? parents[at] : parents, here = part_of(samples, 7, at);
   if (stamps[at] === t) return {parent, pose: here, moves: true};
   const next = varies(track) && parents[at + 1] !== parent ? here : part_of(samples, 7, at + 1);
-  return {parent, pose: along(here, next, (t - stamps[at]) / (stamps[at + 1] - stamps[at])), moves: true};
+  return {parent, pose: along(here, next, Number(t - stamps[at]) / Number(stamps[at + 1] - stamps[at])), moves: true};
 }
 
 // List a frame and its ancestors with the edges between them; `gap` is the moving frame whose data end the line.
@@ -83,7 +83,7 @@ function lookup(target, source, t) {
 
 function no_data(frame, t) {
   const {stamps, last} = TRACKS.get(frame), late = t > stamps[last];
-  const gap = (late ? t - stamps[last] : stamps[0] - t) / 1e9, end = late ? "late" : "early";
+  const gap = Number(late ? t - stamps[last] : stamps[0] - t) / 1e9, end = late ? "late" : "early";
   const covered = `samples cover ${stamp(stamps[0])} .. ${stamp(stamps[last])}`;
   const between = `${NAMES[first_parent(frame)]} → ${NAMES[frame]}`;
   return `no data for ${between} at ${stamp(t)}; ${covered} (${+gap.toPrecision(6)} s too ${end})`;
@@ -91,16 +91,25 @@ function no_data(frame, t) {
 
 // Write a time as seconds with nine decimals.
 function stamp(t) {
-  const nanoseconds = T0 + BigInt(Math.round(t)), size = nanoseconds < 0n ? -nanoseconds : nanoseconds;
-  return `${nanoseconds < 0n ? "-" : ""}${size / 1000000000n}.${String(size % 1000000000n).padStart(9, "0")}`;
+  const size = t < 0n ? -t : t;
+  return `${t < 0n ? "-" : ""}${size / 1000000000n}.${String(size % 1000000000n).padStart(9, "0")}`;
 }
 
-// Read seconds as nanoseconds since t0 by decimal arithmetic; NaN for anything else.
+// Read seconds as nanoseconds by decimal arithmetic; null for anything else.
 function parse_stamp(text) {
   const found = /^(-?)(\d+)(?:\.(\d{1,9}))?$/.exec(text);
-  if (!found) return NaN;
+  if (!found) return null;
   const size = BigInt(found[2] + (found[3] || "").padEnd(9, "0"));
-  return Number((found[1] ? -size : size) - T0);
+  return found[1] ? -size : size;
+}
+
+const within = (t) => (t < FIRST ? FIRST : t > LAST ? LAST : t);
+
+// Return every stamp of some tracks once, in order.
+function stamps_of(tracks) {
+  if (tracks.length === 1) return tracks[0].stamps;
+  const all = BigInt64Array.from(tracks.flatMap(({stamps}) => [...stamps])).sort();
+  return all.filter((t, at) => !at || t !== all[at - 1]);
 }
 
 // Return every frame with parents before children at a time; only changing parents can upset the order of names.

@@ -207,17 +207,17 @@ document.addEventListener("keydown", (event) => {
 });
 
 // ---- time
-const STAMPS = [...new Set([...TRACKS.values()].flatMap((track) => Array.from(track.stamps)))].sort((a, b) => a - b);
+const STAMPS = stamps_of([...TRACKS.values()]);
 
 function hop(way) {
-  const next = way > 0 ? STAMPS.find((t) => t > state.t) : STAMPS.findLast((t) => t < state.t);
+  const next = STAMPS[way > 0 ? count_until(STAMPS, state.t) : count_until(STAMPS, state.t - 1n) - 1];
   if (next !== undefined) set_time(next);
 }
 
 let last_frame = 0;
 function play(now) {
   if (!state.playing) return;
-  set_time(state.t + (now - last_frame) * 1e6 * Number($("speed").value));
+  set_time(state.t + BigInt(Math.round((now - last_frame) * 1e6 * Number($("speed").value))));
   last_frame = now;
   if (state.t >= LAST) toggle_play();
   else requestAnimationFrame(play);
@@ -274,7 +274,7 @@ function listen() {
   };
   $("copy").onclick = () => answer.pose && copy($("copy"), yaml());
   $("shell").onclick = () => copy($("shell"), command());
-  $("slide").oninput = () => set_time(FIRST + Number($("slide").value) * (LAST - FIRST));
+  $("slide").oninput = () => set_time(FIRST + BigInt(Math.round(Number($("slide").value) * Number(LAST - FIRST))));
   $("slide").onchange = remember;
   $("play").onclick = toggle_play;
 }

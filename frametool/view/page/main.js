@@ -29,7 +29,7 @@ draw();
 // what tests ask for
 window.frameview = {
   state, cam, draw, labels, notations, stamp,
-  lookup: (target, source, t = state.t) => lookup(INDEX.get(target), INDEX.get(source), t),
+  lookup: (target, source, t = state.t) => lookup(INDEX.get(target), INDEX.get(source), BigInt(t)),
   at: (name) => [x_of(INDEX.get(name)), y_of(INDEX.get(name))],
 };
 document.documentElement.dataset.ready = "1";

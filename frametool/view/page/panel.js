@@ -187,8 +187,8 @@ function update() {
 }
 
 function set_time(t) {
-  state.t = Math.min(Math.max(t, FIRST), LAST);
-  $("slide").value = String((state.t - FIRST) / (LAST - FIRST || 1));
+  state.t = within(t);
+  $("slide").value = String(Number(state.t - FIRST) / (Number(LAST - FIRST) || 1));
   $("clock").textContent = `${stamp(state.t)} s`;
   update();
 }

@@ -21,20 +21,14 @@ const named = (key) => INDEX.get(wanted.get(key) ?? head.show[key] ?? undefined)
 const HOME = named("fixed") ?? biggest_root();
 const state = {
   fixed: HOME, target: named("target") ?? HOME, source: named("source") ?? deepest(HOME), hover: -1,
-  t: 0, playing: false, exact: false, found: null, only_found: false, path_only: Boolean(head.show.path),
+  t: 0n, playing: false, exact: false, found: null, only_found: false, path_only: Boolean(head.show.path),
   hidden: new Set(chosen ? ALL.filter((frame) => !chosen.has(NAMES[frame])) : []),
   names: true, axes: true, links: true, grid: true, trails: true, perspective: false, size: 1,
 };
 
 // Begin at a time that all edges have, if there is one.
-function first_common() {
-  const begins = [...TRACKS.values()].map((track) => track.stamps[0]);
-  return Math.max(FIRST, ...begins);
-}
-{
-  const asked = parse_stamp(wanted.get("t") ?? head.show.t ?? "");
-  state.t = Math.min(Math.max(Number.isNaN(asked) ? first_common() : asked, FIRST), LAST);
-}
+const common = [...TRACKS.values()].reduce((latest, {stamps: [t]}) => (t > latest ? t : latest), FIRST);
+state.t = within(parse_stamp(wanted.get("t") ?? head.show.t ?? "") ?? common);
 
 // Where every frame is in `fixed` at state.t: origin, then the axes x, y, z.
 const WORLD = new Float64Array(12 * COUNT), SEEN = new Uint8Array(COUNT), UP = new Int32Array(COUNT);
@@ -132,9 +126,7 @@ function movers_above(frame, into) {
 
 function trail(frame) {
   const movers = movers_above(state.fixed, movers_above(frame, new Set()));
-  const all = new Set();
-  for (const mover of movers) for (const t of TRACKS.get(mover).stamps) all.add(t);
-  const stamps = [...all].sort((a, b) => a - b), every = Math.max(1, Math.ceil(stamps.length / MOST_TRAIL));
+  const stamps = stamps_of([...movers].map((mover) => TRACKS.get(mover))), every = Math.max(1, Math.ceil(stamps.length / MOST_TRAIL));
   const parts = stamps.length > 500 ? 1 : PARTS, points = [];
   let before = "";
   const visit = (t) => {
@@ -146,7 +138,7 @@ function trail(frame) {
   for (let at = 0; at < stamps.length; at += every) {
     visit(stamps[at]);
     for (let part = 1; part < parts && at + 1 < stamps.length; part++) {
-      visit(stamps[at] + (stamps[at + 1] - stamps[at]) * part / parts);
+      visit(stamps[at] + (stamps[at + 1] - stamps[at]) * BigInt(part) / BigInt(parts));
     }
   }
   const start = points.find((point) => point);
