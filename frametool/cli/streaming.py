@@ -166,6 +166,8 @@ class Stream:
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
         form = form or self._detected(stream.peek())
+        if form == "kitti" and self.given and not self.told_form():
+            form = "columns"  # --from says what the numbers are, and nothing of pictures
         say_not_needed((form,), "stamps", "edges")
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")

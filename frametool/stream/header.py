@@ -11,7 +11,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, shown
-from frametool.geometry.representations import NAMED, REPRESENTATIONS
+from frametool.geometry.representations import NAMED, REPRESENTATIONS, UPPER_ROWS
 from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, Shape
@@ -480,6 +480,13 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notati
     return PoseColumns(_position(header, match._replace(spots=(*match.spots, None)))._replace(absent=(2,)), rotation)
 
 
+def wholes_of(given: Notation | None) -> list[Notation]:
+    """Return the notations whose numbers may be those of a whole pose: without names twelve need a word for it."""
+    if given is not None:
+        return [given, *([UPPER_ROWS] if given.representation.whole else [])]
+    return [parse_notation(row.name) for row in REPRESENTATIONS.values() if row.whole]
+
+
 def _chosen(header: Header, places: Sequence[int]) -> Match:
     """Take columns as they were chosen, with the units that their names say."""
     bare = [header.names[place] for place in places]
@@ -500,16 +507,15 @@ def _chosen_rotation(header: Header, places: Sequence[int], given: Notation | No
             return count, found
     if given is None and len(places) == len(XYZ):
         return 0, None
-    for row in REPRESENTATIONS.values() if given is None else (given.representation,):
-        if row.whole and len(places) == len(row.whole.columns):
-            return len(places), _rotation(header, _chosen(header, places), row, given)._replace(whole=True, unit=1.0)
+    for form in wholes_of(given):
+        if form.representation.whole and len(places) == len(form.representation.whole.columns):
+            found = _rotation(header, _chosen(header, places), form.representation, given)
+            return len(places), found._replace(whole=True, unit=1.0, notation=form)
     if given is None:
         raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
+    if len(places) not in given.counts:
+        raise Misused(f"--columns: {given.counted}; found {len(places)}")
     size = len(given.representation.columns)
-    if len(places) not in (size, size + 3):
-        raise Misused(
-            f"--columns: {given.spec} takes {size} columns, or {size + 3} with x y z before them; found {len(places)}"
-        )
     return size, _rotation(header, _chosen(header, places[-size:]), given.representation, given)
 
 

@@ -16,6 +16,7 @@ from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import holds_arrays
+from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, tell
 from frametool.grammar.result import Result
@@ -24,6 +25,7 @@ from frametool.stream.record import PARTS, STALE, placed, value_at
 from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import COVARIANCE, POSE, checked_rotation
 from frametool.stream.splice import target_of
+from frametool.stream.stamp_source import read_stamp
 from frametool.stream.template import cut, edits_of, filled
 
 if TYPE_CHECKING:
@@ -52,10 +54,24 @@ def read_poses(source: Source, *, degrees: bool = False, normalize: bool = False
     Raises FormatError with the place.
     """
     request = Request(kind=POSE, degrees=degrees, normalize=normalize)
-    poses = [pose_of(record, request) for _, records in documents(source, request) for record in records]
+    poses = [
+        pose_of(record, request)._replace(stamp_ns=_stamp_of(document, record, source))
+        for document, records in documents(source, request)
+        for record in records
+    ]
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
     return poses
+
+
+def _stamp_of(document: Document, record: Record, source: Source) -> int | None:
+    """Return the stamp of a record, of its header or its own; raises FormatError with its place."""
+    own = value_at(document.value, record.path[1:])
+    key = _stamp_key(own) if record.stamp_ns is None and type(own) is dict else ""
+    try:
+        return _read_stamp(key, own[key]) if key else record.stamp_ns
+    except ValueInvalid as error:
+        raise placed(Misfit(str(error), (*record.path, key)), source) from None
 
 
 def pose_of(record: Record, request: Request) -> Pose:
@@ -217,10 +233,17 @@ def _values(
             yield _formula_result(node, unit, each, request)
         elif kind == POSE:
             yield _pose_result(node, unit, each, request, style)
-        elif style.form == "csv" or holds_arrays(style.form) or is_list or (style.form == "text" and kind not in PARTS):
-            yield _flat(node, unit, each)
+        elif is_list or not _stays(node, kind, style):
+            yield _flat(node, unit, each, style.form)
         else:
             yield spliced.at(unit)
+
+
+def _stays(node: Node, kind: str, style: Style) -> bool:
+    """Tell whether what is no pose is written as the mapping it is: in no table, and as a message only if it is one."""
+    if style.form == "csv" or holds_arrays(style.form) or kind in PARTS:
+        return kind in PARTS and style.form != "csv" and not holds_arrays(style.form)
+    return style.form != "text" and (style.form not in ("ros1", "ros2") or "header" in (node.value or ()))
 
 
 def _formula_result(node: Node, unit: Path, made: Answer, request: Request) -> Value:
@@ -257,20 +280,35 @@ def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: 
     if shape.covariance:
         extras["covariance"] = list(made.parts[-COVARIANCE:])
     extras |= _rest(node, unit, record)
-    return Result(pose, _header_stamp(record) | _with_stamp_ns(extras, keeps=style.form in SPELLED))
+    return Result(pose, _header_stamp(record) | _with_stamp_ns(extras, style.form))
 
 
-def _with_stamp_ns(extras: dict[str, Any], *, keeps: bool) -> dict[str, Any]:
-    """Read the stamp that a record says under `stamp_ns`, or `stamp`, unless its form keeps that as it is written.
+def _with_stamp_ns(extras: dict[str, Any], form: str) -> dict[str, Any]:
+    """Read the stamp that a record says, in whole seconds and nanoseconds too, unless its form keeps it as it is.
 
     Raises ValueInvalid for what is no time.
     """
-    if "stamp_ns" not in extras and (keeps or extras.get("stamp") is None):
+    key = _stamp_key(extras)
+    is_spelled = form in SPELLED and (form != "csv" or type(extras[key]) is not dict) if key else False
+    if not key or (key != "stamp_ns" and is_spelled):
         return extras
-    from frametool.frames.stamps import parse_stamp
+    return extras | {"stamp_ns": _read_stamp(key, extras.pop(key))}
 
-    text = f"{extras['stamp_ns']}ns" if "stamp_ns" in extras else str(extras.pop("stamp"))
-    return extras | {"stamp_ns": parse_stamp(text)}
+
+def _stamp_key(members: dict[str, Any]) -> str:
+    """Return the key of a mapping's own stamp, "" where there is none."""
+    keys = [key for key, value in members.items() if value is not None and type(value) is not list]
+    at = None if "stamp_ns" in keys else stamp_column(keys)
+    return "stamp_ns" if "stamp_ns" in keys else "" if at is None else keys[at]
+
+
+def _read_stamp(key: str, value: Any) -> int:
+    """Read a stamp as its key says, or as whole seconds and nanoseconds; raises ValueInvalid."""
+    if type(value) is dict:
+        from frametool.ros import messages
+
+        return messages.read_stamp(value)
+    return read_stamp(str(value), in_ns=in_nanoseconds(key))
 
 
 def _used_keys(record: Record) -> set[str]:
@@ -305,7 +343,7 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     return rest
 
 
-def _flat(node: Node, unit: Path, made: Answer) -> dict[str, Any]:
+def _flat(node: Node, unit: Path, made: Answer, form: str) -> dict[str, Any]:
     """Return a point, vector, twist or wrench as a mapping without levels, with what else its record says."""
     entry = made.entry
     kind = entry.record.shape.kind
@@ -315,7 +353,7 @@ def _flat(node: Node, unit: Path, made: Answer) -> dict[str, Any]:
         named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
     else:
         named[kind] = numbers
-    return named | _header_stamp(entry.record) | _rest(node, unit, entry.record)
+    return named | _header_stamp(entry.record) | _with_stamp_ns(_rest(node, unit, entry.record), form)
 
 
 def plain(node: Node, number: Callable[[str], float | None] = lambda _: None) -> Any:

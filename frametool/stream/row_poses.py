@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from frametool.documents.json import JSON_NUMBER
+from frametool.documents.json import JSON_NUMBER, dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
-from frametool.formats.rows.pose_rows import IMAGE
-from frametool.grammar.names import in_nanoseconds, stamp_column
+from frametool.grammar.names import in_nanoseconds, stamp_places
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.evaluate import Run, State
@@ -24,10 +23,11 @@ from frametool.stream.layout import NAMED
 from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
-from frametool.stream.stamp_columns import parse_stamps
+from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.table import UNCLOSED, Naming, coded, rename_of, table_block
 from frametool.stream.table_plan import plan_table
 from frametool.text.cells import torn_record, without_quotes
+from frametool.text.csv_line import quoted
 from frametool.text.spans import MARGIN, Spans, framed
 from frametool.text.write import rounded_to_single, shortest_spans
 
@@ -84,10 +84,13 @@ class TablePoses:
         rename = rename_of(named)
         self.unnamed = (None, None) if rename is None else rename(None, None)
         self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
+        if layout.time is None:
+            time, below = stamp_places(self.table.names)
+            if not self.table.names and not request.columns and min(layout.places, default=0) == 1:
+                time = 0  # what stands before the numbers that --from speaks of
+            layout = layout._replace(time=None if time in layout.frames else time, below=below)
         self.stamp_at = layout.time
-        if layout.time is None and (found := stamp_column(self.table.names)) not in layout.frames:
-            self.stamp_at = found
-        used = {self.stamp_at, *layout.places, *self.naming.places}
+        used = {layout.time, layout.below, *layout.places, *self.naming.places}
         self.kept = [place for place in range(self.table.width) if place not in used]
         self.layout = self._with_stretches(layout)
         self.state = State()
@@ -99,7 +102,7 @@ class TablePoses:
         """Ask for the stamps, the columns that are not ours, one by one, and the names of the results."""
         stretches = [(place, place, "cell", "cell") for place in self.kept]
         stretches += [(role, role, NAMED, NAMED) for role in self.roles]
-        return layout._replace(stretches=tuple(stretches), time=self.stamp_at, pieces=())
+        return layout._replace(stretches=tuple(stretches), pieces=())
 
     @property
     def columns(self) -> str:
@@ -138,7 +141,7 @@ class TablePoses:
         if self.stamp_at is None or not cells:
             return None, {}
         name = self.table.name(self.stamp_at)
-        times, reasons = parse_stamps(*cells[0], in_ns=in_nanoseconds(name))
+        times, reasons = read_stamps(cells[0], in_ns=in_nanoseconds(name))
         return times, {row: (name, reason) for row, reason in reasons.items()}
 
 
@@ -198,9 +201,8 @@ def block_of(results: Sequence[Result]) -> RowPoses:
     if any(result.pose.rotation is None for result in results):
         raise ValueInvalid("a trajectory holds poses; a point has no rotation")
     stamps = [result.extras.get("stamp_ns") for result in results]
-    others = {name for result in results for name in result.extras} - {"stamp_ns"}
-    images = [str(result.extras.get(IMAGE, "")).encode() for result in results]
-    blank = [b""] * len(results)
+    if 0 < stamps.count(None) < len(stamps):
+        raise ValueInvalid("some poses have a stamp and some have none; add it, or leave it out of all")
     names = {(result.pose.parent, result.pose.name) for result in results}
     parent, name = next(iter(names))
     return RowPoses(
@@ -209,7 +211,7 @@ def block_of(results: Sequence[Result]) -> RowPoses:
         np.arange(len(results)),
         [parent],
         [name],
-        {each: spans_of(images if each == IMAGE else blank) for each in sorted(others)},
+        _extras_of([result.extras for result in results]),
     )
 
 
@@ -217,15 +219,22 @@ def block_of_points(records: Sequence[dict[str, Any]]) -> RowPoses:
     """Return mappings of points or vectors as a block; raises ValueInvalid for what is neither."""
     kind = next((kind for kind in ("point", "vector") if records and kind in records[0]), "point")
     rows = [_coordinates(record, kind) for record in records]
-    others = list(dict.fromkeys(key for record in records for key in record if key not in (kind, "frame", *"xyz")))
+    stamps = [record.get("stamp_ns") for record in records]
+    timed = all(type(stamp) is int for stamp in stamps)
     return RowPoses(
         np.array(rows, np.float64).reshape(-1, 3),
-        None,
+        np.array(stamps, np.int64) if timed else None,
         np.arange(len(rows)),
         [record.get("frame") for record in records],
         [None],
-        {each: spans_of([_cell(record.get(each)) for record in records]) for each in others},
+        _extras_of(records, kind, "frame", *"xyz", *["stamp_ns"] * timed),
     )
+
+
+def _extras_of(records: Sequence[dict[str, Any]], *used: str) -> dict[str, Spans]:
+    """Return what records say besides, as a column of cells for each key."""
+    others = dict.fromkeys(key for record in records for key in record if key not in (used or ("stamp_ns",)))
+    return {each: spans_of([_cell(record.get(each)) for record in records]) for each in others}
 
 
 def _coordinates(record: dict[str, Any], kind: str) -> list[float]:
@@ -238,7 +247,8 @@ def _coordinates(record: dict[str, Any], kind: str) -> list[float]:
 
 
 def _cell(value: Any) -> bytes:
-    return b"" if value is None else str(value).encode()
+    text = dump(value) if isinstance(value, (dict, list)) else "" if value is None else str(value)
+    return (quoted(text) if text == text.strip() else text).encode()
 
 
 def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:

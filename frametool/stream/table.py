@@ -402,7 +402,8 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming, *, nu
         names.spans[begin] if kind == NAMED else _stretch(cells, begin, end, kind, until)
         for begin, end, kind, until in layout.stretches
     ]
-    stamps = [] if layout.time is None else [(without_quotes(cells.column(layout.time)),)]
+    times = [place for place in (layout.time, layout.below) if place is not None]
+    stamps = [tuple(without_quotes(cells.column(place)) for place in times)] if times else []
     odd, broken = [], []
     lines_before = _line_counter(cells)
     if len(cells.rows) < len(cells.counts):

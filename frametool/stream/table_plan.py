@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
-from frametool.geometry.representations import REPRESENTATIONS
-from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, without_mark
+from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, nanoseconds_beside, without_mark
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
-from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape
+from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape, wholes_of
 from frametool.stream.layout import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
 from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.table import rename_of
@@ -51,7 +50,9 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     if table.header:
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
-    layout = layout._replace(time=_time_column(table, request, source), name=name)
+    time = _time_column(table, request, source)
+    below = None if time is None or not table.names else nanoseconds_beside(table.names, time)
+    layout = layout._replace(time=time, below=below, name=name)
     return Plan(
         shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
@@ -75,11 +76,10 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         return find_poses(names, request.given, request.poses, source)
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
         return [named_pose(spec, None, table.width, request.given)]
-    raise FormatError(
-        f"{table.width} columns without names do not say what they are; give --from REP, or --columns",
-        source=source,
-        line=1,
-    )
+    reason = f"{table.width} columns without names do not say what they are; give --from REP, or --columns"
+    if request.poses == 1 and request.given:
+        reason = f"{request.given.counted}; found {table.width} columns without names; or give --columns"
+    raise FormatError(reason, source=source, line=1)
 
 
 def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:
@@ -104,14 +104,12 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
 
 def _by_width(width: int, given: Notation | None) -> str:
     """Take all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not."""
-    rows = REPRESENTATIONS.values() if given is None else [given.representation]
-    wholes = [len(row.whole.columns) for row in rows if row.whole]
     if given is None:
-        return f"1-{width}" if width in (len(XYZ), *wholes) else ""
-    size = len(given.representation.columns)
-    if width in (size, size + 3, *wholes):
+        wholes = [form.representation.whole for form in wholes_of(None)]
+        return f"1-{width}" if width in (len(XYZ), *(len(whole.columns) for whole in wholes if whole)) else ""
+    if width in given.counts:
         return f"1-{width}"
-    return f"2-{width}" if width - 1 in (size + 3, *wholes) else ""
+    return f"2-{width}" if width - 1 in given.counts[1:] else ""
 
 
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, FrametoolError, listing
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import stamp_column
+from frametool.grammar.names import stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault, Misused, RowNote
 from frametool.stream.rows import written
@@ -123,13 +123,13 @@ def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request,
         return request._replace(timed=timed._replace(name=name)), None
     if timed.name:
         return request, None
-    found = stamp_column(table.names)  # rows have no header
+    found, _ = stamp_places(table.names)
     return request._replace(timed=None), None if found is None else timed._replace(name=table.name(found))
 
 
 def _stamp_column(table: Table, source: str, who: str) -> str:
     """Name the column of stamps that somebody asks for; raises Misused where none looks so."""
-    found = stamp_column(table.names)
+    found, _ = stamp_places(table.names)
     if found is None:
         known = f"; columns: {listing(table.names)}" if table.names else ""
         raise Misused(f"{who}: no column looks like stamps; name it with --time-column{known}", source=source, line=1)

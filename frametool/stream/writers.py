@@ -19,6 +19,7 @@ from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows.column_file import STAMP_NS, Made, OutColumn, not_finite
 from frametool.formats.rows.pose_rows import (
     IMAGE,
+    MOST_NAMED,
     NUMBER,
     DroppedFields,
     Numbers,
@@ -89,7 +90,7 @@ class TextWriter:
         self.placed = placed
         self.target = target_in(style, kind, placed=placed)
         self.count = 0
-        self.dropped = False
+        self.dropped: dict[str, None] = {}
         self.rows: RowForm | None = None
         self.order: list[int] = []
         self.first: Any = None
@@ -99,7 +100,8 @@ class TextWriter:
         if not len(block.numbers):
             return b""
         text = self._fixed(self.fixed, block) if self.fixed else self._free(block)
-        self.dropped |= self.style.form not in LEARNED and bool(self.extras or block.extras)
+        if self.style.form not in LEARNED:
+            self.dropped |= dict.fromkeys((*self.extras, *block.extras))
         self.count += len(block.numbers)
         return text
 
@@ -107,7 +109,7 @@ class TextWriter:
         """Yield what comes behind the last pose, and tell what was left out."""
         if self.fixed is None or self.dropped_fields is None:
             if self.dropped:
-                warn(f"{self.style.form}: other columns left out")
+                warn(f"{self.style.form}: {listing(self.dropped, MOST_NAMED)} left out")
             return
         self.dropped_fields.tell()
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
@@ -122,7 +124,7 @@ class TextWriter:
             dropped.record(
                 frames=bool(there),
                 stamps=block.stamps_ns is not None and NUMBER not in block.extras,
-                extras=bool(self.extras or block.extras.keys() - {IMAGE, NUMBER}),
+                extras=[*self.extras, *(name for name in block.extras if name not in (IMAGE, NUMBER))],
             )
             dropped.counted |= "stamps" in form.holds and block.stamps_ns is None
             dropped.by_stamp |= IMAGE in form.row and images is None

@@ -11,7 +11,7 @@ from frametool.cli.explaining import PoseTask, explain_options, pose_stream_opti
 from frametool.cli.options import TEXT, Command, pose_result_options
 from frametool.cli.poses import combinations, factors_of, one_pose
 from frametool.grammar.pose import Pose
-from frametool.grammar.pose_algebra import product
+from frametool.grammar.pose_algebra import product, shared_stamp
 from frametool.grammar.result import Result
 
 
@@ -45,7 +45,8 @@ def command(poses: tuple[str, ...], **options: Any) -> int:
     if "-" not in given:
         if task.stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")
-        task.output.poses([Result(reduce(product, each)) for each in combinations(factors, task.request())])
+        several = combinations(factors, task.request())
+        task.output.poses([Result(reduce(product, each), shared_stamp(each)) for each in several])
         return 0
     if given.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
