@@ -31,7 +31,7 @@ from frametool.formats.rows.pose_rows import (
 )
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
-from frametool.geometry import arrays, floats, quaternion
+from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -129,14 +129,13 @@ class TextWriter:
             dropped.counted |= "stamps" in form.holds and block.stamps_ns is None
             dropped.by_stamp |= IMAGE in form.row and images is None
             dropped.turned = is_turned(form, self.style)
-        pose = self._canonical(block)
-        return self._joined(form, np.array(form.numbers(*turned(form, self.style, pose))).T, block)
-
-    def _canonical(self, block: RowPoses) -> Components:
-        """Return position and quaternion of a block, with the sign that is written."""
         tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
-        unit = quaternion.unit(x, y, z, w, arrays)
-        return (tx, ty, tz, *(unit if self.style.keep_sign else quaternion.from_quaternion(*unit, arrays)))
+        pose = turned(form, self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
+        if form.inverse:
+            pose = rigid.inverse(*pose)
+        if not self.style.keep_sign:
+            pose = (*pose[:3], *quaternion.from_quaternion(*pose[3:], arrays))
+        return self._joined(form, np.array(form.numbers(*pose)).T + 0.0, block)  # none is -0.0
 
     def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
         """Put the rows of a block together."""

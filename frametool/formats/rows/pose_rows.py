@@ -42,7 +42,7 @@ class RowForm(NamedTuple):
         `first`), `next` (one more), `image` (the name of its picture, else its seconds)
     numbers: from tx, ty, tz, x, y, z, w to the numbers in the order they are written
     head, between, tail: text before the first pose, between two, and behind the last
-    axes: those of a camera, where the form states them
+    axes: those of a camera, where the form states them; inverse: the pose of the world in it is written
     holds: which of `frames`, `stamps` are written; other columns are not
     beside: what else a reader of the form finds in it, told whenever it is written
     """
@@ -54,6 +54,7 @@ class RowForm(NamedTuple):
     tail: bytes = b""
     first: int = 0
     axes: str = ""
+    inverse: bool = False
     holds: tuple[str, ...] = ("stamps",)
     beside: str = ""
 
