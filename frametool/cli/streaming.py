@@ -28,7 +28,7 @@ from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
 from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, readers
-from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
+from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -286,6 +286,8 @@ class Stream:
         from frametool.stream.record_values import stream_results
 
         self._jobs(f"records become {output.told} one after the other")
+        if self.options["on_error"] == NULL and output.told not in ("csv", *RECORDS):
+            raise click.UsageError(f"--on-error null: {output.told} has no place for a row without a result; give skip")
         bad = self.policy(self.name)
         output.values(stream_results(stream, form, request, output.style, bad))
         return ROWS_SKIPPED if bad.count else 0

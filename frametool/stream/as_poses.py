@@ -29,7 +29,7 @@ from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_samples import TABLE
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
-from frametool.stream.writers import ArrayWriter, TextWriter
+from frametool.stream.writers import LEARNED, ArrayWriter, TextWriter
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ class FormatConverter:
 
     def __init__(self, form: str, request: Request, style: Style, source: str, answers: Answers) -> None:
         """Take what is asked for; raises Misused for what only a table can hold."""
-        if request.keep or (request.prefix and request.operation.formula is None) or request.on_error == NULL:
-            raise Misused("--keep, --prefix and --on-error null are for tables that stay in their form")
+        if request.keep or (request.prefix and request.operation.formula is None):
+            raise Misused("--keep and --prefix are for tables that stay in their form")
         self.form = form
         self.source = source
         self.answers = answers
@@ -69,6 +69,8 @@ class FormatConverter:
         self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
         self.to_arrays = "arrays" in FORMATS[style.form].writes
+        if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.form in LEARNED)):
+            raise Misused(f"--on-error null: {style.form} of {form} has no place for a row without a result; give skip")
         self.without = 0  # rows of an array that stand for no point or pose, and have no place in a text
 
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:

@@ -19,7 +19,7 @@ from frametool.formats.table import holds_arrays
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, tell
-from frametool.grammar.result import Result
+from frametool.grammar.result import NoResult, Result
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import PARTS, STALE, placed, value_at
 from frametool.stream.request import Memory, Request
@@ -378,11 +378,30 @@ def _at(nodes: list[Node], path: Path) -> Node:
     return nodes[int(path[0])].at(path[1:])
 
 
+def _no_result(record: bytes, form: str, style: Style) -> NoResult:
+    """Return what a bad record says beside its numbers; in a table those are empty cells under names of their own."""
+    from frametool.stream.template import nulled
+
+    try:
+        text = record.decode()
+        said = plain(parse_nodes(nulled(text, json=form == "json") or text)[0])
+    except (FormatError, UnicodeDecodeError, IndexError):
+        said = None
+    kept = said if type(said) is dict else {}
+    return NoResult(Pose(), {key: value for key, value in kept.items() if style.form != "csv" or _says(value)})
+
+
+def _says(value: Any) -> bool:
+    """Tell whether there is more than null in a value."""
+    inner = value.values() if type(value) is dict else value if type(value) is list else None
+    return value is not None if inner is None else any(map(_says, inner))
+
+
 def stream_results(
     stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows
 ) -> Iterator[Value]:
     """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
-    from frametool.stream.faults import Fault
+    from frametool.stream.faults import NULL, Fault
     from frametool.stream.record_text import column_in, without_noise
     from frametool.stream.run import tell_of_rounding
     from frametool.stream.splitter import Splitter
@@ -395,20 +414,23 @@ def stream_results(
         for part in splitter.parts(block).parts:
             rows += 1
             at = line + block.count(b"\n", 0, part.start)
+            before = bad.count
             if part.problem:
                 bad.take([Fault(at, "", part.problem)])
-                continue
             source = Source(bad.source, "", at)
             try:
-                text = decode(block[part.start : part.end], bad.source)
-                plain_text = without_noise(text) if form == "yaml" else text
-                source = Source(bad.source, plain_text, at, column_in(block, part.start))
-                yield from results(source, request, style, memory, teller)
+                if not part.problem:
+                    text = decode(block[part.start : part.end], bad.source)
+                    plain_text = without_noise(text) if form == "yaml" else text
+                    source = Source(bad.source, plain_text, at, column_in(block, part.start))
+                    yield from results(source, request, style, memory, teller)
             except FormatError as error:
                 below, column = source.place(max(error.line, 1), error.column)
                 bad.take([Fault(below, str(column) if error.column else "", error.message)])
             except FrametoolError as error:
                 bad.take([Fault.of(at, "", error)])
+            if bad.count > before and bad.on_error == NULL and not part.outside:
+                yield _no_result(block[part.start : part.end], form, style)
         line += block.count(b"\n")
     tell_of_rounding(bad.source, teller.counts["rounded"], rows)
     bad.finish(rows)

@@ -297,7 +297,7 @@ def open_table(block: bytes, form: str, *, header: bool, source: str) -> tuple[T
     line = _first_record(rest, delimiter)
     if delimiter and torn_record(line, delimiter) is not None:
         raise FormatError(UNCLOSED, source=source, line=1)
-    cells = _cells(line, delimiter)
+    cells = cells_of(line, delimiter)
     named = _named_comment(comments, delimiter, len(cells)) if header else None
     if not cells and not (delimiter and comments):
         raise FormatError("no rows in it", source=source)
@@ -339,7 +339,7 @@ def _named_comment(
     start = comments.rindex(lines[-1])
     text = lines[-1].rstrip(b"\r\n")
     words = text.lstrip(b"# \t")
-    cells = _cells(words, delimiter)
+    cells = cells_of(words, delimiter)
     if not cells or (width and len(cells) != width) or not has_pose_column(map(_unquoted, cells)):
         return None
     before = comments[: start + len(text) - len(words)]
@@ -363,7 +363,7 @@ def _first_record(text: bytes, delimiter: bytes) -> bytes:
     return text[: int(ends[0]) - MARGIN] if len(ends) else text
 
 
-def _cells(line: bytes, delimiter: bytes) -> list[bytes]:
+def cells_of(line: bytes, delimiter: bytes) -> list[bytes]:
     """Return the raw cells of one line."""
     if not delimiter:
         return line.split()
@@ -461,5 +461,5 @@ def _ragged(table: Table, count: int) -> str:
 
 def _null_row(table: Table, layout: Layout, raw: bytes) -> bytes:
     body = raw.rstrip(b"\r\n")
-    cells = _cells(raw, table.delimiter) if b'"' in raw or not table.delimiter else body.split(table.delimiter)
+    cells = cells_of(raw, table.delimiter) if b'"' in raw or not table.delimiter else body.split(table.delimiter)
     return layout.null_row(cells) + raw[len(body) :]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
-from itertools import chain
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +37,17 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.header import XYZ
 from frametool.stream.row_layout import POSE, Target
-from frametool.stream.row_poses import block_of, first_of, plain_cell, points_of, results_of, spans_of, texts_of
+from frametool.stream.row_poses import (
+    NO_STAMP,
+    block_of,
+    first_of,
+    kept,
+    plain_cell,
+    points_of,
+    results_of,
+    spans_of,
+    texts_of,
+)
 from frametool.stream.rows import number_spans
 from frametool.text.csv_line import quoted
 from frametool.text.parse import parse_floats
@@ -92,6 +102,7 @@ class TextWriter:
         self.count = 0
         self.dropped: dict[str, None] = {}
         self.rows: RowForm | None = None
+        self.looked = False  # whether the form was seen to write a row
         self.order: list[int] = []
         self.first: Any = None
 
@@ -99,10 +110,15 @@ class TextWriter:
         """Return the text of a block of poses; numbers are metres and x y z w."""
         if not len(block.numbers):
             return b""
-        text = self._fixed(self.fixed, block) if self.fixed else self._free(block)
         if self.style.form not in LEARNED:
             self.dropped |= dict.fromkeys((*self.extras, *block.extras))
-        self.count += len(block.numbers)
+        absent = np.isnan(block.numbers[:, 0])
+        cuts = [0, *(np.flatnonzero(np.diff(absent)) + 1).tolist(), len(absent)]
+        text = b""
+        for start, end in pairwise(cuts):
+            run = block if len(cuts) == 2 else kept(block, slice(start, end))
+            text += self._fixed(self.fixed, run) if self.fixed else self._free(run, is_null=bool(absent[start]))
+            self.count += end - start
         return text
 
     def end(self) -> Iterator[bytes]:
@@ -131,11 +147,10 @@ class TextWriter:
             dropped.turned = is_turned(form, self.style)
         tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
         pose = turned(form, self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
-        if form.inverse:
-            pose = rigid.inverse(*pose)
+        tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if form.inverse else pose
         if not self.style.keep_sign:
-            pose = (*pose[:3], *quaternion.from_quaternion(*pose[3:], arrays))
-        return self._joined(form, np.array(form.numbers(*pose)).T + 0.0, block)  # none is -0.0
+            x, y, z, w = quaternion.from_quaternion(x, y, z, w, arrays)
+        return self._joined(form, np.array(form.numbers(tx, ty, tz, x, y, z, w)).T + 0.0, block)  # none is -0.0
 
     def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
         """Put the rows of a block together."""
@@ -197,9 +212,12 @@ class TextWriter:
 
     # --- forms whose rows depend on what is written ---
 
-    def _free(self, block: RowPoses) -> bytes:
+    def _free(self, block: RowPoses, *, is_null: bool) -> bytes:
         """Write a block as the form was seen to write poses; one by one where it was not, or angles are not unique."""
-        if self.rows is None and self.count == 0:
+        if is_null:
+            return self._one_by_one(block)
+        if not self.looked:
+            self.looked = True
             self._learn(block)
             if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
                 self.rows = None
@@ -393,7 +411,8 @@ class ArrayWriter:
         for name, column in zip(self._numbers(), self._written(block), strict=True):
             made[name] = Made(column, not_finite(column))
         if block.stamps_ns is not None:
-            made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS))
+            none = block.stamps_ns == NO_STAMP
+            made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS), none if none.any() else None)
         for name, cells in block.extras.items():
             made.setdefault(name, self._extra(name, cells))
         return made
