@@ -22,7 +22,7 @@ from frametool.grammar.edges import Options, Tally, Topics, stop
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
-from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, Target
+from frametool.stream.row_layout import POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, chosen_poses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
@@ -103,7 +103,7 @@ class FormatConverter:
         operation = self.request.operation
         kind = operation.result_kind(self.shape.kind)
         extras = [self.request.prefix + name for name in operation.extras(self.shape.kind)]
-        if operation.only_adds or kind not in (POSE, POINT, VECTOR) or (extras and kind != POSE):
+        if operation.only_adds or not kind or (extras and kind != POSE):
             raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
         writer = ArrayWriter if self.to_arrays else TextWriter
         return writer(self.style, kind, extras, placed=self.placed)

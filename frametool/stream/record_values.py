@@ -21,9 +21,9 @@ from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, tell
 from frametool.grammar.result import NoResult, Result
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
-from frametool.stream.record import PARTS, STALE, placed, value_at
+from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.request import Memory, Request
-from frametool.stream.row_layout import COVARIANCE, POSE, checked_rotation
+from frametool.stream.row_layout import COVARIANCE, PARTS, POSE, checked_rotation
 from frametool.stream.splice import target_of
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.template import cut, edits_of, filled

@@ -131,6 +131,11 @@ class Operation(NamedTuple):
         return self.of in (START, PREVIOUS)
 
     @property
+    def takes_points(self) -> bool:
+        """Tell whether points and vectors have a result: where they are moved, and where they get other axes."""
+        return self.moves or self.turns
+
+    @property
     def changes_nothing(self) -> bool:
         """Tell whether rows only change their notation."""
         changed = self.left or self.right or self.of or self.moves or self.mirrors or self.before
@@ -144,6 +149,8 @@ class Operation(NamedTuple):
     def move(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
         """Move a point, a vector, a twist or a wrench with its covariance by `edge`, else by `left`."""
         mover = edge or self.left
+        if self.mirrors:
+            numbers = (numbers[0], -numbers[1], *numbers[2:])
         if mover is None:
             return numbers
         own = shape.own_size

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 POINT, VECTOR, POSE, TWIST, WRENCH = "point", "vector", "pose", "twist", "wrench"
 SIX = (TWIST, WRENCH)  # two vectors, linear part first
+PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque")}
 COVARIANCE = 36
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 TURN = 6.283185307179586
@@ -26,6 +27,11 @@ TO_DEGREES = 180.0 / 3.141592653589793
 FLAT = 1e-9  # radians, metres: what a number without a column may be
 LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
 Unit: TypeAlias = float | tuple[float, float, float]  # how many make a metre, where they differ of x, y, z each
+
+
+def six_names(kind: str) -> list[str]:
+    """Name the numbers of a twist or wrench as columns."""
+    return [f"{part}_{axis}" for part in PARTS[kind] for axis in "xyz"]
 
 
 class Shape(NamedTuple):

@@ -21,7 +21,7 @@ from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault
 from frametool.stream.header import listed
 from frametool.stream.layout import NAMED, Kept
-from frametool.stream.row_layout import POSE, Shape
+from frametool.stream.row_layout import PARTS, POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
@@ -311,9 +311,17 @@ def points_of(block: RowPoses, kind: str) -> list[dict[str, Any]]:
     for at, numbers in enumerate(block.numbers.tolist()):
         named: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
         stamp = {} if stamps is None else {"stamp_ns": None if stamps[at] == NO_STAMP else stamps[at]}
-        own = {kind: None if isnan(numbers[0]) else numbers}
+        own = spelled(kind, None if isnan(numbers[0]) else numbers)
         made.append(named | own | stamp | {name: texts[at] for name, texts in others.items()})
     return made
+
+
+def spelled(kind: str, numbers: Sequence[float] | None) -> dict[str, Any]:
+    """Return the numbers of a point, vector, twist or wrench under its keys; None in their place if there are none."""
+    if kind not in PARTS:
+        return {kind: numbers if numbers is None else list(numbers)}
+    halves = (None, None) if numbers is None else (list(numbers[:3]), list(numbers[3:]))
+    return {kind: dict(zip(PARTS[kind], halves, strict=True))}
 
 
 def spans_of(texts: list[bytes]) -> Spans:

@@ -8,9 +8,19 @@ from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, nanoseconds_beside, without_mark
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
-from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape, wholes_of
+from frametool.stream.header import (
+    XYZ,
+    PoseColumns,
+    find_poses,
+    find_six,
+    has_pose_column,
+    listed,
+    named_pose,
+    row_shape,
+    wholes_of,
+)
 from frametool.stream.layout import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
-from frametool.stream.row_layout import POSE, Shape
+from frametool.stream.row_layout import POSE, SIX, Shape, six_names
 from frametool.stream.table import rename_of
 
 if TYPE_CHECKING:
@@ -28,6 +38,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find_if_read(table, request, source)
     only_turned = not request.operation.moves and request.operation.keeps_position and request.gathered is None
+    only_turned = only_turned and not (request.operation.turns and poses and poses[0].rotation is None)  # a point
     if request.poses == 1 and only_turned and not request.all_numbers:
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
@@ -68,18 +79,42 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if request.columns:
         if len(request.columns) != request.poses:
             raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
-        return [named_pose(spec, table.names, table.width, request.given) for spec in request.columns]
+        kinds = request.kinds or (request.kind,) * request.poses
+        return [
+            named_pose(spec, table.names, table.width, request.given, kind)
+            for spec, kind in zip(request.columns, kinds, strict=True)
+        ]
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
         names = ["" if name == request.extra_column else name for name in table.names]  # what it is for is known
-        return find_poses(names, request.given, request.poses, source)
+        return _find_named(names, request, source)
+    if request.kind in SIX and table.width == len(six_names(request.kind)):
+        return [named_pose(f"1-{table.width}", None, table.width, None, request.kind)]
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
-        return [named_pose(spec, None, table.width, request.given)]
+        return [named_pose(spec, None, table.width, request.given, request.kind)]
     reason = f"{table.width} columns without names do not say what they are; give --from REP, or --columns"
     if request.poses == 1 and request.given:
         reason = f"{request.given.counted}; found {table.width} columns without names; or give --columns"
     raise FormatError(reason, source=source, line=1)
+
+
+def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
+    """Find points, poses, a twist or a wrench by their names; beside a pose a twist is another column."""
+    six = find_six(names, request.kind if request.kind in SIX else "")
+    if request.kind in SIX and six is None:
+        wanted = " ".join(six_names(request.kind))
+        raise FormatError(
+            f"no columns of a {request.kind} ({wanted}) among: {listed(names)}; name them with --columns",
+            source=source,
+            line=1,
+        )
+    stays = request.operation.moves or request.operation.changes_nothing  # the twist of what a pose is the pose of
+    taken = six.places if six is not None and stays else ()
+    others = ["" if place in taken else name for place, name in enumerate(names)]
+    if six is not None and (request.kind in SIX or not has_pose_column(others)):
+        return [PoseColumns(six, None)]
+    return find_poses(others, request.given, request.poses, source)
 
 
 def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:
@@ -276,6 +311,8 @@ def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request,
     else:
         turned = _affixed(target.names, rotation, request, len(poses))
     moved = [] if target.unit is None else [request.prefix + name for name in XYZ]
+    if target.plain and pose.position:
+        moved = [request.prefix + name for name in pose.position.names]
     if moved and pose.position and alone:
         moved = list(pose.position.names)
         moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)

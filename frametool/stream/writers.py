@@ -36,7 +36,7 @@ from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.header import XYZ
-from frametool.stream.row_layout import POSE, Target
+from frametool.stream.row_layout import POSE, SIX, Target, six_names
 from frametool.stream.row_poses import (
     NO_STAMP,
     block_of,
@@ -46,6 +46,7 @@ from frametool.stream.row_poses import (
     points_of,
     results_of,
     spans_of,
+    spelled,
     texts_of,
 )
 from frametool.stream.rows import number_spans
@@ -72,7 +73,7 @@ MARK = "@@{}@@"
 def target_in(style: Style, kind: str, *, placed: bool) -> Target:
     """Say which numbers of a result of some kind are written in a style; placed: whether poses have a position."""
     if kind != POSE:
-        return Target(1.0, ())
+        return Target(None, (), plain=True) if kind in SIX else Target(1.0, ())
     forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
     whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
     return Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
@@ -87,6 +88,8 @@ class TextWriter:
         kind: pose, point or vector; extras: the numbers beside each; placed: whether poses have a position
         Raises ValueInvalid for what the form does not hold, and for notations that it does not have.
         """
+        if kind in SIX and style.form not in LEARNED:
+            raise ValueInvalid(f"{style.form} is not written of rows of a {kind}; write csv, json or yaml")
         if kind != POSE and "points" not in FORMATS[style.form].writes:
             raise ValueInvalid(f"{style.form} holds poses; a {kind} has no rotation")
         self.style = style
@@ -270,7 +273,7 @@ class TextWriter:
 
     @property
     def _size(self) -> int:
-        return len(PROBE) if self.kind == POSE else len(XYZ)
+        return len(PROBE) if self.kind == POSE else 6 if self.kind in SIX else len(XYZ)
 
     def _probe(self, block: RowPoses) -> Any:
         """Make a result with what this block's have; what differs from row to row is marked."""
@@ -280,7 +283,7 @@ class TextWriter:
         )
         if self.kind != POSE:
             named = {} if parent is None else {"frame": parent}
-            return named | {self.kind: list(PROBE[: len(XYZ)])} | self._probe_extras(block)
+            return named | spelled(self.kind, PROBE[: self._size]) | self._probe_extras(block)
         pose = Pose.of(PROBE, name, parent)
         return Result(pose if self.placed else pose._replace(position=None), self._probe_extras(block))
 
@@ -398,6 +401,7 @@ class ArrayWriter:
     def _numbers(self) -> list[str]:
         """Name the numbers of a result."""
         position = list(XYZ) if self.target.unit is not None else []
+        position = six_names(self.kind) if self.kind in SIX else position
         return [*position, *self.target.names, *self.extras]
 
     def _made(self, block: RowPoses) -> dict[str, Made]:
@@ -422,7 +426,7 @@ class ArrayWriter:
         columns = [np.ascontiguousarray(column) for column in block.numbers.T]
         if self.kind == POSE and not self.placed:
             columns = [columns[0] * 0.0] * 3 + columns
-        own = 7 if self.kind == POSE else 3
+        own = 7 if self.kind == POSE else 6 if self.kind in SIX else 3
         with np.errstate(invalid="ignore"):
             return [*self.target.numbers(tuple(columns[:own]), arrays), *columns[own:]]
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
+SIX = ("twist", "wrench")
 HALVES = ("linear", "angular", "force", "torque")
 
 
@@ -55,7 +56,12 @@ def _pose_row(result: Result, style: Style) -> dict[str, Any]:
         cells |= rotation
     if isinstance(result, NoResult):
         cells |= dict.fromkeys(cells.keys() - NAMES)
-    return cells | {key: value for key, value in result.extras.items() if key not in cells}
+    extras = {
+        name: cell
+        for key, value in result.extras.items()
+        for name, cell in (_record_cells({key: value}) if key in SIX else ((key, value),))
+    }
+    return cells | {key: value for key, value in extras.items() if key not in cells}
 
 
 def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -64,6 +70,9 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         if key in (*PLAIN, *HALVES) and (value is None or isinstance(value, (dict, list))):
             numbers = value.values() if isinstance(value, dict) else value or [None] * 3
             yield from zip("xyz" if key in PLAIN else [f"{key}_{axis}" for axis in "xyz"], numbers, strict=False)
+        elif key in SIX and isinstance(value, dict):
+            for name, cell in _record_cells(value):
+                yield name if name.startswith(HALVES) else f"{key}_{name}", cell
         else:
             yield key, value
 
