@@ -109,11 +109,12 @@ def _find_named(names: Sequence[str], request: Request, source: str) -> list[Pos
             source=source,
             line=1,
         )
-    stays = request.operation.moves or request.operation.changes_nothing  # the twist of what a pose is the pose of
-    taken = six.places if six is not None and stays else ()
+    taken = () if six is None else six.places
     others = ["" if place in taken else name for place, name in enumerate(names)]
     if six is not None and (request.kind in SIX or not has_pose_column(others)):
         return [PoseColumns(six, None)]
+    if not (request.operation.moves or request.operation.changes_nothing):
+        others = list(names)  # what a pose has beside it would no longer be true
     return find_poses(others, request.given, request.poses, source)
 
 
