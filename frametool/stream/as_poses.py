@@ -23,7 +23,7 @@ from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
 from frametool.stream.row_layout import POSE, Shape, Target
-from frametool.stream.row_poses import RowPoses, TablePoses, chosen_poses, kept, spans_of
+from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
@@ -185,10 +185,10 @@ class FormatConverter:
         yield Step(_none(), Outcome(b""))
         for batch in opened.batches():
             poses = rows.poses(batch)
-            if not self.to_arrays:
+            if not self.to_arrays and self.request.on_error != NULL:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 self.without += len(poses.numbers) - len(there)
-                poses = chosen_poses(poses, there)
+                poses = kept(poses, there)
             yield Step(
                 poses, Outcome(b"", rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read)
             )
@@ -202,7 +202,9 @@ class FormatConverter:
         """Yield the poses of a form whose lines are no table."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
         faults: list[Fault] = []
-        report = stop if self.request.on_error == STOP else lambda error: faults.append(_fault(error))
+        report = stop
+        if self.request.on_error != STOP:
+            report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
         options = Options(self.tally, Topics(), report, normalize=self.request.normalize, answers=self.answers)
         has_kinds = hasattr(self.module, "form_of")
         form: Poses = self.module.form_of(file, options) if has_kinds else self.module.POSES
@@ -231,11 +233,6 @@ class FormatConverter:
             found = sorted(faults + run.faults())
             yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
             faults.clear()
-
-
-def _fault(error: FormatError) -> Fault:
-    """Make the fault of a pose that was refused; lines from 0."""
-    return Fault(max(error.line, 1) - 1, "", error.message)
 
 
 def _none() -> RowPoses:

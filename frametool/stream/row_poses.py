@@ -188,29 +188,12 @@ def first_of(block: RowPoses) -> RowPoses:
     return kept(block, slice(0, 1))
 
 
-def kept(block: RowPoses, rows: slice) -> RowPoses:
-    """Return some poses of a block that follow one another."""
-    size = len(block.numbers)
-    return _with_cells(
-        block, rows, *(each[rows] if len(each) == size else each for each in (block.parents, block.names))
-    )
-
-
-def chosen_poses(block: RowPoses, rows: Ints) -> RowPoses:
+def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
     """Return some poses of a block."""
-    size = len(block.numbers)
-    if len(rows) == size:
-        return block
-    names = [
-        [each[row] for row in rows.tolist()] if len(each) == size else each for each in (block.parents, block.names)
-    ]
-    return _with_cells(block, rows, *names)
-
-
-def _with_cells(
-    block: RowPoses, rows: slice | Ints, parents: Sequence[str | None], names: Sequence[str | None]
-) -> RowPoses:
-    """Return some poses of a block with these names."""
+    at = np.arange(len(block.numbers))[rows].tolist()
+    parents, names = (
+        [each[row] for row in at] if len(each) == len(block.numbers) else each for each in (block.parents, block.names)
+    )
     return block._replace(
         numbers=block.numbers[rows],
         stamps_ns=None if block.stamps_ns is None else block.stamps_ns[rows],
@@ -233,14 +216,12 @@ def block_of(results: Sequence[Result]) -> RowPoses:
     stamps = [result.extras.get("stamp_ns") for result in results]
     if 0 < stamps.count(None) < len(stamps):
         raise ValueInvalid("some poses have a stamp and some have none; add it, or leave it out of all")
-    names = {(result.pose.parent, result.pose.name) for result in results}
-    parent, name = next(iter(names))
     return RowPoses(
         np.array([result.pose.components for result in results]),
         None if None in stamps else np.array(stamps, np.int64),
         np.arange(len(results)),
-        [parent],
-        [name],
+        [result.pose.parent for result in results],
+        [result.pose.name for result in results],
         _extras_of([result.extras for result in results]),
     )
 

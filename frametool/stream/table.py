@@ -85,7 +85,7 @@ class Naming:
         bad: dict[int, tuple[str, str | FrametoolError]] = {}
         for row in np.flatnonzero(np.array([isinstance(each, FrametoolError) for each in results])[of_row]).tolist():
             bad[row] = self.column, results[of_row[row]]
-        emptied = np.array([self._loses(*each) for each in zip(pairs, results, strict=True)])[of_row]
+        emptied = np.array([bool(self._lost(*each)) for each in zip(pairs, results, strict=True)])[of_row]
         lost = [
             (row, self._lost(pairs[of_row[row]], results[of_row[row]])) for row in np.flatnonzero(emptied)[:1].tolist()
         ]
@@ -118,10 +118,6 @@ class Naming:
         except FrametoolError as error:
             return error
         return parent if counter else new[0] or "", new[1] or ""
-
-    def _loses(self, pair: Texts, result: Texts | FrametoolError) -> bool:
-        """Tell whether a cell that named a frame is empty in the result."""
-        return bool(self._lost(pair, result))
 
     def _lost(self, pair: Texts, result: Texts | FrametoolError) -> str:
         """Return the frame that a cell named and the result does not; "" if there is none."""

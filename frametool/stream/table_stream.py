@@ -80,7 +80,8 @@ def begin_table(
     stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True, size: int = 0
 ) -> Begun:
     """Read the head of a table in a form; raises FormatError."""
-    blocks = _blocks(stream, (FORMATS[form].delimiter or "").encode(), size)
+    ends = _record_ends((FORMATS[form].delimiter or "").encode())
+    blocks = read_blocks(stream, size=size or BLOCK_BYTES, whole=ends())
     first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
@@ -88,11 +89,6 @@ def begin_table(
     table = as_trajectory(table, form, request, source)
     taken = len(first) - len(rest)
     return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))
-
-
-def _blocks(stream: ByteStream, delimiter: bytes, size: int) -> Iterator[bytes]:
-    """Return blocks of whole rows."""
-    return read_blocks(stream, size=size or BLOCK_BYTES, whole=_record_ends(delimiter)())
 
 
 def _record_ends(delimiter: bytes) -> Callable[[], Callable[[bytes], int]]:

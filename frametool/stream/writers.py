@@ -209,8 +209,8 @@ class TextWriter:
             texts = list(texts) * (len(block.numbers) if len(texts) == 1 else 1)
         else:
             texts = texts_of(list(block.extras.values())[int(what)])
-        write: Callable[[str | None], bytes] = _csv_cell if self.style.form == "csv" else _json_cell
-        known = {text: write(text) for text in dict.fromkeys(texts)}
+        in_csv = self.style.form == "csv"
+        known = {text: (quoted(text or "") if in_csv else dump(plain_cell(text or ""))).encode() for text in {*texts}}
         return spans_of([known[text] for text in texts])
 
     # --- forms whose rows depend on what is written ---
@@ -248,7 +248,8 @@ class TextWriter:
         """See how the form writes a pose whose numbers are all different, and take them for places to fill in."""
         style = self.style.in_form(self.style.form)
         style.precision = None
-        if style.form not in LEARNED or (style.form == "yaml" and (block.extras or _vary(block))):
+        varies = block.extras or {len(block.names), len(block.parents)} != {1}
+        if style.form not in LEARNED or (style.form == "yaml" and varies):
             return
         probe = self._probe(block)
         alone, twice = (self.write([probe] * count, style) for count in (1, 2))
@@ -317,10 +318,6 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
     return b"".join((writer.of_block(block_of(list(results))), *writer.end())).decode()
 
 
-def _vary(block: RowPoses) -> bool:
-    return len(block.names) != 1 or len(block.parents) != 1
-
-
 def _constant(text: bytes, size: int) -> Spans:
     starts = np.full(size, MARGIN, np.int64)
     return Spans(framed(text), starts, starts + len(text))
@@ -337,14 +334,6 @@ def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
     each = [Spans(numbers.data, numbers.starts[:, at], ends[:, at - first]) for at in range(first, last)]
     between = _constant(piece.between, len(ends))
     return list(chain(*([part, between] for part in each)))[:-1]
-
-
-def _csv_cell(text: str | None) -> bytes:
-    return quoted(text or "").encode()
-
-
-def _json_cell(text: str | None) -> bytes:
-    return dump(plain_cell(text or "")).encode()
 
 
 DOUBLE = np.dtype(np.float64)

@@ -94,7 +94,7 @@ def test_poses_of_which_some_have_a_stamp_are_no_trajectory(run: Run) -> None:
     assert "some poses have a stamp and some have none" in done.err
 
 
-THINGS = {
+THINGS: dict[str, tuple[dict[str, Any], str, str]] = {
     "point": ({"point": [1, 2, 3]}, "x,y,z", "1,2,3"),
     "pose": ({"xyz": [1, 2, 3], "rpy": [0, 0, 0]}, NAMES, "1,2,3,0,0,0,1"),
     "twist": (
@@ -108,7 +108,7 @@ THINGS = {
         "1,2,3,0,0,1",
     ),
 }
-OTHERS = {"id": 7, "label": 'a "b", c', "much": {"k": [1, 2]}}
+OTHERS: dict[str, Any] = {"id": 7, "label": 'a "b", c', "much": {"k": [1, 2]}}
 ROW = '7,"a ""b"", c","{""k"": [1, 2]}"'
 HOLDING = ("csv", "json", "yaml")
 DROPPING = ("tum", "euroc", "kitti", "colmap", "g2o", "nerf", "open3d", "ros1", "ros2", "foxglove")
