@@ -15,7 +15,7 @@ from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid, printable, shown
+from frametool.errors import ValueInvalid, listing, printable, shown, warn
 from frametool.formats.table import FORMATS, by_name, holds_arrays, is_trajectory, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
@@ -91,7 +91,15 @@ class Output:
         if self._holds_arrays or self.is_trajectory:
             self.pieces(self._blocks(iter(results)))
         else:
-            self.text(self._module("frametool.view.pose_text").write_poses(results, self.style))
+            found = list(results)
+            self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
+            self._tell_dropped(key for each in found for key in each.extras)
+
+    def _tell_dropped(self, keys: Iterable[str]) -> None:
+        """Name what results say besides where the form has no place for it."""
+        others = {*keys} - {"stamp_ns", "point", "vector", "frame"}
+        if others and self.style.form not in ("text", "yaml", "json", "csv"):
+            warn(f"{self.style.form}: {listing(others)} left out")
 
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
@@ -188,6 +196,8 @@ class Output:
             writer = self._writer(kind)
             self.pieces([writer.of_block(block), *writer.end()])
             return
+        placed = [each for each in found if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
+        self._tell_dropped(key for each in placed for key in each)
         is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in found)
         text_module = "frametool.view.pose_text" if is_plain else FORMATS["yaml"].writer
         self.text(self._module(text_module).write_points(found, self.style))

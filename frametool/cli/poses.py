@@ -386,9 +386,8 @@ def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
             return read_pose(matrix_pose([list(texts)], form, told=request.given is not None) or {}, reading)
         if whole and len(texts) == len(whole.columns):
             return Pose(*read_spelled(form, texts, INDICES, reading))
-        if len(texts) not in (size, size + 3):
-            expected = f"{size} numbers ({' '.join(form.columns)}), or {size + 3} with x y z before them"
-            raise click.UsageError(f"{form.spec} has {expected}; found {len(texts)}")
+        if len(texts) not in form.counts:
+            raise click.UsageError(f"{form.counted}; found {len(texts)}")
         x, y, z = map(read_number, texts[:-size] or ("0", "0", "0"))
         rotation = rotation_of(form, texts[-size:], INDICES, reading)
     return Pose((x, y, z) if len(texts) > size else None, rotation)

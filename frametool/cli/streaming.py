@@ -28,7 +28,7 @@ from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
 from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, readers
-from frametool.stream.faults import MOST, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
+from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -166,6 +166,8 @@ class Stream:
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
+        if form == "kitti" and self.given and not self.told_form():
+            form = "columns"  # --from says what the numbers are, and nothing of pictures
         refuse_not_needed((form,), "stamps", "edges", "array")
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
@@ -293,6 +295,8 @@ class Stream:
         from frametool.stream.record_values import stream_results
 
         self._jobs(f"records become {output.told} one after the other")
+        if self.options["on_error"] == NULL and output.told not in ("csv", *RECORDS):
+            raise click.UsageError(f"--on-error null: {output.told} has no place for a row without a result; give skip")
         bad = self.policy(self.name)
         request = request._replace(by_default=holds_arrays(output.told or "") and not output.notations)
         output.values(stream_results(stream, form, request, output.style, bad))

@@ -337,6 +337,20 @@ class Notation:
         fixed = self.representation.axes
         return self.axes if fixed == NAMED_AXES else fixed or None
 
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Return how many numbers say a rotation, and how many a whole pose."""
+        size, whole = len(self.representation.columns), self.representation.whole
+        return (size, size + 3, len(whole.columns)) if whole else (size, size + 3)
+
+    @property
+    def counted(self) -> str:
+        """Say how many numbers it takes, for messages."""
+        size, placed, *whole = self.counts
+        if whole:
+            return f"{self.spec} has {size} numbers, {placed} (three rows of a pose) or {whole[0]}"
+        return f"{self.spec} has {size} numbers ({' '.join(self.columns)}), or {placed} with x y z before them"
+
     def in_degrees(self, default: bool) -> bool:  # noqa: FBT001 - the one thing it is about
         """Tell whether angles are degrees: as the notation says, else as `default`."""
         return default if self.degrees is None else self.degrees

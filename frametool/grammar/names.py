@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import ValueInvalid, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 HEADER_FRAME = "header.frame_id"
 PARENT_KEYS = ("parent", "parent_frame_id", "frame_id", "frame")  # the frame that something is given in
@@ -21,6 +21,7 @@ STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
 _STAMP = re.compile(r"[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
 _UNIT = re.compile(r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$")
+_WHOLE_SECONDS = re.compile(r"(|.*[._])(?:secs?|seconds)")
 _SECONDS = ("s", "sec", "seconds", "")
 _EARTH = re.compile(
     r"[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|(?:lon(?:gitude)?|lng))(?:[_ ]?(?:deg|rad|e7))?\s*(?:[\[(].*)?", re.IGNORECASE
@@ -44,6 +45,23 @@ def in_nanoseconds(name: str) -> bool:
 def stamp_column(names: Iterable[str] | None) -> int | None:
     """Return the place of the first column that is called as stamps are, in a unit that is known."""
     return next((at for at, name in enumerate(names or ()) if _STAMP.fullmatch(name) and _is_known(name)), None)
+
+
+def stamp_places(names: Iterable[str] | None) -> tuple[int | None, int | None]:
+    """Return the place of the stamps as `stamp_column` does, or of whole seconds and the nanoseconds beside them."""
+    known = tuple(names or ())
+    if (found := stamp_column(known)) is not None:
+        return found, None
+    pairs = ((at, below) for at in range(len(known)) if (below := nanoseconds_beside(known, at)) is not None)
+    return next(pairs, (None, None))
+
+
+def nanoseconds_beside(names: Sequence[str], place: int) -> int | None:
+    """Return the place of the nanoseconds that go with a column of whole seconds: `header.stamp.sec`, `..nanosec`."""
+    found = _WHOLE_SECONDS.fullmatch(names[place].lower())
+    folded = [name.lower() for name in names] if found else []
+    wanted = [f"{found[1]}{part}" for part in ("nanosec", "nanosecs", "nsec", "nsecs", "nanoseconds")] if found else []
+    return next((folded.index(name) for name in wanted if name in folded), None)
 
 
 def _is_known(name: str) -> bool:

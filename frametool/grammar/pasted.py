@@ -332,11 +332,9 @@ def _meant(rows: Rows, given: Notation | None) -> list[Any]:
     elif (found := _spelled_rows(rows, form)) is not None:
         return found
     if given is not None:
-        size = len(form.columns)
         counts = " and ".join(map(str, dict.fromkeys(map(len, rows))))
-        expected = f"{size} numbers ({' '.join(form.columns)}), or {size + 3} with x y z before them"
         several = f"{len(rows)} rows of " * (len(rows) > 1)
-        raise ValueInvalid(f"{form.spec} has {expected}; found {several}{counts}")
+        raise ValueInvalid(f"{form.counted}; found {several}{counts}")
     return [rows[0] if len(rows) == 1 else rows]
 
 

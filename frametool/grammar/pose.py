@@ -37,12 +37,13 @@ POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "in
 
 
 class Pose(NamedTuple):
-    """One record: the pose of `name` in `parent`; position or rotation is None where it was not given."""
+    """One record: the pose of `name` in `parent`, and its time; what was not given is None."""
 
     position: Vector | None = None
     rotation: Quaternion | None = None
     name: str | None = None
     parent: str | None = None
+    stamp_ns: int | None = None
 
     @classmethod
     def of(cls, components: Sequence[float], name: str | None = None, parent: str | None = None) -> Pose:

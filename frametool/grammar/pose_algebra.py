@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from math import isfinite
 
-from frametool.errors import LookupFailed, ValueInvalid, shown
+from frametool.errors import LookupFailed, ValueInvalid, shown, warn
+from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -18,7 +19,8 @@ from frametool.grammar.result import Result
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from typing import Any
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
@@ -45,6 +47,14 @@ def composed_names(left: Pose, right: Pose) -> tuple[str | None, str | None]:
     return left.parent, right.name
 
 
+def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:
+    """Return the one time that some poses have, for their result; of several times it has none, which is told."""
+    stamps = sorted({pose.stamp_ns for pose in poses if pose.stamp_ns is not None})
+    if len(stamps) > 1:
+        warn(f"the result has no stamp: {' and '.join(map(format_stamp, stamps[:2]))} are the times of two poses")
+    return {"stamp_ns": stamps[0]} if len(stamps) == 1 else {}
+
+
 def inverse(pose: Pose) -> Pose:
     """Return b_from_a of a_from_b; what the pose does not say stays unsaid."""
     components = rigid.inverse(*pose.components)
@@ -53,6 +63,7 @@ def inverse(pose: Pose) -> Pose:
         None if pose.rotation is None else components[3:],
         pose.parent,
         pose.name,
+        pose.stamp_ns,
     )
 
 
@@ -65,7 +76,7 @@ def relative(a: Pose, b: Pose) -> Result:
     distance, angle = rigid.extent(*components, floats)
     extras = dict(zip(RELATIVE_EXTRAS, (distance, angle, math.degrees(angle)), strict=True))
     parent, name = relative_names(a, b)
-    return Result(Pose.of(components, name, parent), extras)
+    return Result(Pose.of(components, name, parent), extras | shared_stamp((a, b)))
 
 
 def relative_names(a: Pose, b: Pose) -> tuple[str | None, str | None]:
@@ -86,13 +97,16 @@ def turn_between(start: Vector, end: Vector) -> Result:
 
 
 def interpolated(a: Pose, b: Pose, fraction: float) -> Pose:
-    """Return the pose at a fraction of the way from a (0) to b (1): straight line and slerp, as tf2 does.
+    """Return the pose at a fraction of the way, and of the time, from a (0) to b (1): straight line and slerp, as tf2.
 
     Raises ValueInvalid where the two are given in different frames.
     """
     _refuse_two_parents(a, b)
     components = rigid.interpolate(*a.components, *b.components, fraction, floats)
-    return Pose.of(components, a.name if a.name == b.name else None, a.parent or b.parent)
+    start, end = a.stamp_ns, b.stamp_ns
+    between = end if start is None or end is None else start + round(fraction * (end - start))
+    pose = Pose.of(components, a.name if a.name == b.name else None, a.parent or b.parent)
+    return pose._replace(stamp_ns=start if between is None else between)
 
 
 def _refuse_two_parents(a: Pose, b: Pose) -> None:

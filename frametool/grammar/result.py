@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import ValueInvalid
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.representations import notation
-from frametool.grammar.pose import Pose
+from frametool.grammar.pose import NAMES, Pose
 from frametool.grammar.rotation_spelling import spelled
 
 if TYPE_CHECKING:
@@ -105,6 +105,19 @@ class Result:
         if any(is_locked(pose, each) for each in style.notations):
             entry["gimbal_lock"] = True
         return entry | self.extras
+
+
+class NoResult(Result):
+    """What stands for a bad row that is kept: its frames and what else it says, with null in the place of its pose."""
+
+    __slots__ = ()
+
+    def mapping(self, style: Style) -> dict[str, Any]:
+        """Return the keys that a result would have."""
+        if self.pose == Pose():
+            return dict(self.extras)
+        entry = Result(self.pose).mapping(style)
+        return {key: value if key in NAMES else None for key, value in entry.items()} | self.extras
 
 
 def _add(entry: dict[str, Any], key: str, value: Any) -> None:

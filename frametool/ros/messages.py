@@ -266,9 +266,9 @@ def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Mis
 
 def _whole(stamp: dict[str, Any], key: str) -> int:
     text = stamp[key]
-    if type(text) is str and len(text) <= MOST_DIGITS and text.isascii() and text.isdigit():
+    if isinstance(text, str) and len(text) <= MOST_DIGITS and text.isascii() and text.isdigit():
         return int(text)
-    if type(text) is not str or not re.fullmatch(_INTEGER, text):
+    if not isinstance(text, str) or not re.fullmatch(_INTEGER, text):
         raise Misfit(f"{key} must be a whole number, found {kind(text)}", (key,))
     return int(text)
 

@@ -19,9 +19,8 @@ from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn,
 from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
 from frametool.stream.header import XYZ
-from frametool.stream.record import PARTS
-from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH
-from frametool.stream.row_poses import objects, plain_cells, text_of
+from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
+from frametool.stream.row_poses import NO_STAMP, objects, plain_cells, text_of
 from frametool.stream.writers import target_in
 from frametool.text.parse import parse_floats
 from frametool.text.spans import Spans
@@ -238,7 +237,7 @@ class ArrayWriter(ColumnsWriter):
     def _names(self) -> list[str]:
         """Name the numbers of a result."""
         if self.kind in SIX:
-            return [f"{part}_{axis}" for part in PARTS[self.kind] for axis in XYZ] + list(self.extras)
+            return [*six_names(self.kind), *self.extras]
         position = list(XYZ) if self.target.unit is not None else []
         return [*position, *self.target.names, *self.extras]
 
@@ -252,7 +251,8 @@ class ArrayWriter(ColumnsWriter):
         for name, column in zip(self._names(), self._numbers(block), strict=True):
             made[name] = Made(column, not_finite(column))
         if block.stamps_ns is not None:
-            made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS))
+            none = block.stamps_ns == NO_STAMP
+            made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS), none if none.any() else None)
         for name, cells in block.extras.items():
             made.setdefault(name, Made(cells))
         return made

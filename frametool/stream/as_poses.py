@@ -24,13 +24,13 @@ from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
 from frametool.stream.header import listed
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, Target
-from frametool.stream.row_poses import RowPoses, TablePoses, chosen_poses, kept, spans_of
+from frametool.stream.row_layout import POINT, POSE, Shape, Target
+from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
-from frametool.stream.writers import TextWriter
+from frametool.stream.writers import LEARNED, TextWriter
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
@@ -58,8 +58,8 @@ class FormatConverter:
 
     def __init__(self, form: str, request: Request, style: Style, source: str, answers: Answers) -> None:
         """Take what is asked for; raises Misused for what only a table can hold."""
-        if request.keep or (request.prefix and request.operation.formula is None) or request.on_error == NULL:
-            raise Misused("--keep, --prefix and --on-error null are for tables that stay in their form")
+        if request.keep or (request.prefix and request.operation.formula is None):
+            raise Misused("--keep and --prefix are for tables that stay in their form")
         self.form = form
         self.source = source
         self.answers = answers
@@ -70,6 +70,8 @@ class FormatConverter:
         self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
         self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.form].writes)), "points" in writes
+        if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.form in LEARNED)):
+            raise Misused(f"--on-error null: {style.form} of {form} has no place for a row without a result; give skip")
         self.without = 0  # rows of an array that stand for no point or pose, and have no place in a text
 
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
@@ -104,8 +106,7 @@ class FormatConverter:
         operation = self.request.operation
         kind = operation.result_kind(self.shape.kind)
         extras = [self.request.prefix + name for name in operation.extras(self.shape.kind)]
-        kinds = (POSE, POINT, VECTOR, *(SIX if self.to_arrays else ()))
-        if operation.only_adds or kind not in kinds or (extras and kind != POSE):
+        if operation.only_adds or not kind or (extras and kind != POSE):
             raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
         writer = ArrayWriter if self.to_arrays else TextWriter
         return writer(self.style, kind, extras, placed=self.placed)
@@ -177,10 +178,10 @@ class FormatConverter:
         yield Step(rows.poses(opened.nothing()), Outcome(b""))
         for batch in opened.batches():
             poses = rows.poses(batch)
-            if not self.to_arrays:
+            if not self.to_arrays and self.request.on_error != NULL:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 self.without += len(poses.numbers) - len(there)
-                poses = chosen_poses(poses, there)
+                poses = kept(poses, there)
             yield Step(
                 poses, Outcome(b"", rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read)
             )
@@ -194,7 +195,9 @@ class FormatConverter:
         """Yield the poses of a form whose lines are no table."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
         faults: list[Fault] = []
-        report = stop if self.request.on_error == STOP else lambda error: faults.append(_fault(error))
+        report = stop
+        if self.request.on_error != STOP:
+            report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
         options = Options(self.tally, Topics(), report, normalize=self.request.normalize, answers=self.answers)
         has_kinds = hasattr(self.module, "form_of")
         form: Poses = self.module.form_of(file, options) if has_kinds else FORMATS[self.form].poses
@@ -222,11 +225,6 @@ class FormatConverter:
             found = sorted(faults + run.faults())
             yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
             faults.clear()
-
-
-def _fault(error: FormatError) -> Fault:
-    """Make the fault of a pose that was refused; lines from 0."""
-    return Fault(max(error.line, 1) - 1, "", error.message)
 
 
 def _none() -> RowPoses:

@@ -261,6 +261,9 @@ class ColumnRows:
             return None, {}
         name = self.table.name(self.layout.time)
         times, reasons = batch.stamps(self.layout.time, in_ns=in_nanoseconds(name))
+        if self.layout.below is not None:
+            below, more = batch.stamps(self.layout.below, in_ns=True)
+            times, reasons = times + below, {**more, **reasons}
         return times, {row: (name, reason) for row, reason in reasons.items()}
 
     @property

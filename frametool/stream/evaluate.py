@@ -18,8 +18,7 @@ from frametool.stream.stamp_columns import (
     NOWHERE,
     by_frame,
     by_time,
-    parse_header_stamps,
-    parse_stamps,
+    read_stamps,
     seconds_before,
     stamps_of,
     weights_of,
@@ -212,7 +211,7 @@ class Run:
             return self.block.times
         stamps, column = self.block.stamps[at], self.plan.timed.column if self.plan.timed else ""
         in_ns = self.plan.timed is not None and self.plan.timed.in_ns
-        times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=in_ns)
+        times, reasons = read_stamps(stamps, in_ns=in_ns)
         for row, reason in reasons.items():
             self._blame(row, column, reason)
         return times

@@ -11,11 +11,11 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, shown
-from frametool.geometry.representations import NAMED, REPRESENTATIONS
+from frametool.geometry.representations import NAMED, REPRESENTATIONS, UPPER_ROWS
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.names import on_earth
 from frametool.stream.faults import Misused
-from frametool.stream.row_layout import POINT, POSE, Shape
+from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, six_names
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 XYZ = ("x", "y", "z")
 POSITIONS = (XYZ, ("tx", "ty", "tz"), ("px", "py", "pz"))
 TELLING = ("position", "translation", "point", "vector")
+LETTERS = {TWIST: ("vx vy vz wx wy wz",), WRENCH: ("fx fy fz tx ty tz", "fx fy fz mx my mz")}
 NO_UNIT = ("", "-", "1")
 MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
 LONGEST_RANGE = 40  # characters: more digits name no column
@@ -47,6 +48,7 @@ class Columns(NamedTuple):
     notation: that of a rotation; degrees: what the name of each of its numbers says (True, False, None: nothing)
     whole: the numbers of a whole pose
     absent: which numbers of a position or a rotation have no column
+    kind: twist or wrench, of six columns
     wrong: what is wrong with the names, an error where the columns are used
     """
 
@@ -59,6 +61,7 @@ class Columns(NamedTuple):
     degrees: tuple[bool | None, ...] = ()
     whole: bool = False
     absent: tuple[int, ...] = ()
+    kind: str = ""
     wrong: str = ""
 
     @property
@@ -438,12 +441,34 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
     return position.suffix == rotation.suffix, same
 
 
+def find_six(names: Sequence[str], kind: str) -> Columns | None:
+    """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where told so."""
+    folded = [re.sub(r"[./]", "_", BRACKETS.sub("", name).strip().lower()) for name in names]
+    for each in SIX if kind == "" else (kind,):
+        for base in [six_names(each), *(base.split() for base in LETTERS[each] * bool(kind))]:
+            for prefix in [name.removesuffix(base[0]) for name in folded if re.fullmatch(f"(.*_)?{base[0]}", name)]:
+                wanted = [prefix + word for word in base]
+                if set(wanted) <= set(folded):
+                    return _six([folded.index(name) for name in wanted], names, each)
+    return None
+
+
+def _six(places: Sequence[int], names: Sequence[str], kind: str) -> Columns:
+    if len(places) != 6:
+        raise Misused(f"--columns: a {kind} has six ({' '.join(six_names(kind))}); found {len(places)}")
+    return Columns(tuple(places), tuple(names[place] for place in places), kind=kind)
+
+
 def row_shape(pose: PoseColumns, request: Request) -> Shape:
     """Say what the numbers of a pose's columns mean."""
     position, rotation = pose
+    if position and position.kind:
+        if not request.operation.moves:
+            raise Misused(f"a {position.kind} cannot be taken for a pose; apply moves it")
+        return Shape(position.kind, None)
     unit = position.unit if position else None
     if rotation is None or rotation.notation is None:
-        moved = request.operation.moves and request.kind != POSE
+        moved = request.operation.takes_points and request.kind != POSE
         return Shape((request.kind or POINT) if moved else POSE, unit)
     if request.kind not in ("", POSE) and request.operation.moves:
         raise Misused(
@@ -462,8 +487,12 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
     return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent)
 
 
-def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notation | None) -> PoseColumns:
+def named_pose(
+    spec: str, names: Sequence[str] | None, width: int, given: Notation | None, kind: str = ""
+) -> PoseColumns:
     """Take columns by name or by position from 1 (`2-8`): x y z, a rotation's, or first the one and then the other.
+
+    kind: what --as says; a twist or a wrench has six.
 
     Raises Misused for names that are not there, or a count that says nothing.
     """
@@ -474,6 +503,8 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notati
     header = Header(names or [f"column {place + 1}" for place in range(width)])
     if twice := sorted(header.names[place] for place, count in Counter(places).items() if count > 1):
         raise Misused(f"--columns: {', '.join(twice)} stands twice")
+    if kind in SIX:
+        return PoseColumns(_six(places, header.names, kind), None)
     count, rotation = _chosen_rotation(header, places, given)
     if count == len(places):
         return PoseColumns(None, rotation)
@@ -483,6 +514,13 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notati
     if len(match.spots) == len(XYZ):
         return PoseColumns(_position(header, match), rotation)
     return PoseColumns(_position(header, match._replace(spots=(*match.spots, None)))._replace(absent=(2,)), rotation)
+
+
+def wholes_of(given: Notation | None) -> list[Notation]:
+    """Return the notations whose numbers may be those of a whole pose: without names twelve need a word for it."""
+    if given is not None:
+        return [given, *([UPPER_ROWS] if given.representation.whole else [])]
+    return [parse_notation(row.name) for row in REPRESENTATIONS.values() if row.whole]
 
 
 def _chosen(header: Header, places: Sequence[int]) -> Match:
@@ -505,16 +543,15 @@ def _chosen_rotation(header: Header, places: Sequence[int], given: Notation | No
             return count, found
     if given is None and len(places) == len(XYZ):
         return 0, None
-    for row in REPRESENTATIONS.values() if given is None else (given.representation,):
-        if row.whole and len(places) == len(row.whole.columns):
-            return len(places), _rotation(header, _chosen(header, places), row, given)._replace(whole=True, unit=1.0)
+    for form in wholes_of(given):
+        if form.representation.whole and len(places) == len(form.representation.whole.columns):
+            found = _rotation(header, _chosen(header, places), form.representation, given)
+            return len(places), found._replace(whole=True, unit=1.0, notation=form)
     if given is None:
         raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
+    if len(places) not in given.counts:
+        raise Misused(f"--columns: {given.counted}; found {len(places)}")
     size = len(given.representation.columns)
-    if len(places) not in (size, size + 3):
-        raise Misused(
-            f"--columns: {given.spec} takes {size} columns, or {size + 3} with x y z before them; found {len(places)}"
-        )
     return size, _rotation(header, _chosen(header, places[-size:]), given.representation, given)
 
 

@@ -45,7 +45,8 @@ Column: TypeAlias = Kept | New | Named
 class Layout(NamedTuple):
     """The columns of the output, and from where in a row its pieces come.
 
-    places: the columns our numbers are read from; time: that of the stamps
+    places: the columns our numbers are read from; time: that of the stamps; below: that of the
+        nanoseconds of stamps whose seconds are whole
     frames: those that name the frame a row is given in, for look-ups the two frames
     name: the one that says what a row is the pose of
     stretches: (first, last column, where it begins, where it ends) of the text that passes
@@ -59,6 +60,7 @@ class Layout(NamedTuple):
     delimiter: bytes
     null: bytes
     time: int | None = None
+    below: int | None = None
     name: int | None = None
 
     def header(self, raw: Sequence[bytes]) -> list[bytes]:

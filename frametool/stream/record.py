@@ -28,13 +28,12 @@ from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_co
 from frametool.stream.row_layout import (
     ACCEL,
     ATTITUDE,
+    PARTS,
     POINT,
     POSE,
     SIX,
     TURN,
-    TWIST,
     VECTOR,
-    WRENCH,
     Shape,
     checked_rotation,
     doubt,
@@ -54,7 +53,6 @@ if TYPE_CHECKING:
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message")
 LISTS = ("markers", "polygon", "points")  # of messages that hold nothing else
-PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
 COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
@@ -302,7 +300,8 @@ def _is_holder(value: dict[str, Any]) -> bool:
 
 def _parts_of(value: dict[str, Any]) -> str | None:
     """Name the kind whose two vectors a mapping has, as a Twist or a Wrench has."""
-    return next((name for name, parts in PARTS.items() if all(type(value.get(part)) is dict for part in parts)), None)
+    held = {key for key, each in value.items() if type(each) in (dict, list)}
+    return next((name for name, parts in PARTS.items() if held.issuperset(parts)), None)
 
 
 def _refuse_several(value: dict[str, Any], found: list[str], path: Path) -> None:
@@ -481,7 +480,11 @@ def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request)
     if request.kind not in ("", name) or not request.operation.moves:
         raise Misfit(f"a {name} cannot be taken for a {request.kind or POSE}")
     numbers = [number for part in PARTS[name] for number in within((part,), read_numbers, value[part], XYZ)]
-    paths = tuple((*path, part, axis) for part in PARTS[name] for axis in XYZ)
+    paths = tuple(
+        (*path, part, *(step if type(value[part]) is list else (axis,)))
+        for part in PARTS[name]
+        for step, axis in zip(INDICES[:3], XYZ, strict=True)
+    )
     return Record(path, Shape(name, None), paths, tuple(numbers))
 
 
@@ -608,7 +611,7 @@ def _kind(key: str, rotations: object, request: Request) -> str:
     """Decide what a mapping is: with a rotation a pose, else a point or a vector, or what --as says."""
     if request.kind in PARTS:
         raise Misfit(f"a {request.kind} has {' and '.join(PARTS[request.kind])}, two vectors {{x:, y:, z:}}")
-    if rotations or request.kind == POSE or not request.operation.moves:
+    if rotations or request.kind == POSE or not request.operation.takes_points:
         if rotations and request.kind not in ("", POSE):
             raise Misfit(f"a record has a rotation and cannot be taken for a {request.kind}")
         return POSE

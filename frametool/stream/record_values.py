@@ -16,14 +16,16 @@ from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import holds_arrays
+from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, tell
-from frametool.grammar.result import Result
+from frametool.grammar.result import NoResult, Result
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
-from frametool.stream.record import PARTS, STALE, placed, value_at
+from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.request import Memory, Request
-from frametool.stream.row_layout import POSE, ROTATION, checked_rotation
+from frametool.stream.row_layout import PARTS, POSE, ROTATION, checked_rotation
 from frametool.stream.splice import target_of
+from frametool.stream.stamp_source import read_stamp
 from frametool.stream.template import cut, edits_of, filled
 
 if TYPE_CHECKING:
@@ -62,7 +64,7 @@ def read_given(source: Source, *, degrees: bool = False, normalize: bool = False
     nodes: list[Node] = []
     for document, records in documents(source, request):
         for record in records:
-            poses.append(pose_of(record, request))
+            poses.append(pose_of(record, request)._replace(stamp_ns=_stamp_of(document, record, source)))
             unit = _unit(record, document.value)
             if not _says_no_more(record, document, unit):
                 nodes = nodes or parse_nodes(source.text)
@@ -70,6 +72,16 @@ def read_given(source: Source, *, degrees: bool = False, normalize: bool = False
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
     return poses, beside
+
+
+def _stamp_of(document: Document, record: Record, source: Source) -> int | None:
+    """Return the stamp of a record, of its header or its own; raises FormatError with its place."""
+    own = value_at(document.value, record.path[1:])
+    key = _stamp_key(own) if record.stamp_ns is None and type(own) is dict else ""
+    try:
+        return _read_stamp(key, own[key]) if key else record.stamp_ns
+    except ValueInvalid as error:
+        raise placed(Misfit(str(error), (*record.path, key)), source) from None
 
 
 def pose_of(record: Record, request: Request) -> Pose:
@@ -241,10 +253,17 @@ def _values(
             yield _formula_result(node, unit, each, request)
         elif kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
-        elif style.form == "csv" or holds_arrays(style.form) or is_list or (style.form == "text" and kind not in PARTS):
-            yield _flat(node, unit, each)
+        elif is_list or not _stays(node, kind, style):
+            yield _flat(node, unit, each, style.form)
         else:
             yield spliced.at(unit)
+
+
+def _stays(node: Node, kind: str, style: Style) -> bool:
+    """Tell whether what is no pose is written as the mapping it is: in no table, and as a message only if it is one."""
+    if style.form == "csv" or holds_arrays(style.form) or kind in PARTS:
+        return kind in PARTS and style.form != "csv" and not holds_arrays(style.form)
+    return style.form != "text" and (style.form not in ("ros1", "ros2") or "header" in (node.value or ()))
 
 
 def _formula_result(node: Node, unit: Path, made: Answer, request: Request) -> Value:
@@ -279,20 +298,35 @@ def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: 
     pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
     extras: dict[str, Any] = dict(zip(request.operation.extras(POSE), made.parts[7:], strict=False))
     extras |= _covariances(made) | _rest(node, unit, record)
-    return Result(pose, _header_stamp(record) | _with_stamp_ns(extras, keeps=style.form in SPELLED))
+    return Result(pose, _header_stamp(record) | _with_stamp_ns(extras, style.form))
 
 
-def _with_stamp_ns(extras: dict[str, Any], *, keeps: bool) -> dict[str, Any]:
-    """Read the stamp that a record says under `stamp_ns`, or `stamp`, unless its form keeps that as it is written.
+def _with_stamp_ns(extras: dict[str, Any], form: str) -> dict[str, Any]:
+    """Read the stamp that a record says, in whole seconds and nanoseconds too, unless its form keeps it as it is.
 
     Raises ValueInvalid for what is no time.
     """
-    if "stamp_ns" not in extras and (keeps or extras.get("stamp") is None):
+    key = _stamp_key(extras)
+    is_spelled = form in SPELLED and (form != "csv" or type(extras[key]) is not dict) if key else False
+    if not key or (key != "stamp_ns" and is_spelled):
         return extras
-    from frametool.frames.stamps import parse_stamp
+    return extras | {"stamp_ns": _read_stamp(key, extras.pop(key))}
 
-    text = f"{extras['stamp_ns']}ns" if "stamp_ns" in extras else str(extras.pop("stamp"))
-    return extras | {"stamp_ns": parse_stamp(text)}
+
+def _stamp_key(members: dict[str, Any]) -> str:
+    """Return the key of a mapping's own stamp, "" where there is none."""
+    keys = [key for key, value in members.items() if value is not None and type(value) is not list]
+    at = None if "stamp_ns" in keys else stamp_column(keys)
+    return "stamp_ns" if "stamp_ns" in keys else "" if at is None else keys[at]
+
+
+def _read_stamp(key: str, value: Any) -> int:
+    """Read a stamp as its key says, or as whole seconds and nanoseconds; raises ValueInvalid."""
+    if type(value) is dict:
+        from frametool.ros import messages
+
+        return messages.read_stamp(value)
+    return read_stamp(str(value), in_ns=in_nanoseconds(key))
 
 
 def _used_keys(record: Record) -> set[str]:
@@ -327,7 +361,7 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     return rest
 
 
-def _flat(node: Node, unit: Path, made: Answer) -> dict[str, Any]:
+def _flat(node: Node, unit: Path, made: Answer, form: str) -> dict[str, Any]:
     """Return a point, vector, twist or wrench as a mapping without levels, with what else its record says."""
     entry = made.entry
     kind = entry.record.shape.kind
@@ -337,7 +371,8 @@ def _flat(node: Node, unit: Path, made: Answer) -> dict[str, Any]:
         named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
     else:
         named[kind] = numbers
-    return named | _header_stamp(entry.record) | _covariances(made) | _rest(node, unit, entry.record)
+    rest = _with_stamp_ns(_rest(node, unit, entry.record), form)
+    return named | _header_stamp(entry.record) | _covariances(made) | rest
 
 
 def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _Spliced) -> dict[str, Any]:
@@ -382,11 +417,30 @@ def _at(nodes: list[Node], path: Path) -> Node:
     return nodes[int(path[0])].at(path[1:])
 
 
+def _no_result(record: bytes, form: str, style: Style) -> NoResult:
+    """Return what a bad record says beside its numbers; in a table those are empty cells under names of their own."""
+    from frametool.stream.template import nulled
+
+    try:
+        text = record.decode()
+        said = plain(parse_nodes(nulled(text, json=form == "json") or text)[0])
+    except (FormatError, UnicodeDecodeError, IndexError):
+        said = None
+    kept = said if type(said) is dict else {}
+    return NoResult(Pose(), {key: value for key, value in kept.items() if style.form != "csv" or _says(value)})
+
+
+def _says(value: Any) -> bool:
+    """Tell whether there is more than null in a value."""
+    inner = value.values() if type(value) is dict else value if type(value) is list else None
+    return value is not None if inner is None else any(map(_says, inner))
+
+
 def stream_results(
     stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows
 ) -> Iterator[Value]:
     """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
-    from frametool.stream.faults import Fault
+    from frametool.stream.faults import NULL, Fault
     from frametool.stream.record_text import column_in, without_noise
     from frametool.stream.run import tell_of_rounding
     from frametool.stream.splitter import Splitter
@@ -399,20 +453,23 @@ def stream_results(
         for part in splitter.parts(block).parts:
             rows += 1
             at = line + block.count(b"\n", 0, part.start)
+            before = bad.count
             if part.problem:
                 bad.take([Fault(at, "", part.problem)])
-                continue
             source = Source(bad.source, "", at)
             try:
-                text = decode(block[part.start : part.end], bad.source)
-                plain_text = without_noise(text) if form == "yaml" else text
-                source = Source(bad.source, plain_text, at, column_in(block, part.start))
-                yield from results(source, request, style, memory, teller)
+                if not part.problem:
+                    text = decode(block[part.start : part.end], bad.source)
+                    plain_text = without_noise(text) if form == "yaml" else text
+                    source = Source(bad.source, plain_text, at, column_in(block, part.start))
+                    yield from results(source, request, style, memory, teller)
             except FormatError as error:
                 below, column = source.place(max(error.line, 1), error.column)
                 bad.take([Fault(below, str(column) if error.column else "", error.message)])
             except FrametoolError as error:
                 bad.take([Fault.of(at, "", error)])
+            if bad.count > before and bad.on_error == NULL and not part.outside:
+                yield _no_result(block[part.start : part.end], form, style)
         line += block.count(b"\n")
     tell_of_rounding(bad.source, teller.counts["rounded"], rows)
     bad.finish(rows)

@@ -122,6 +122,11 @@ class Operation(NamedTuple):
         return self.of in (START, PREVIOUS)
 
     @property
+    def takes_points(self) -> bool:
+        """Tell whether points and vectors have a result: where they are moved, and where they get other axes."""
+        return self.moves or self.turns
+
+    @property
     def changes_nothing(self) -> bool:
         """Tell whether rows only change their notation."""
         changed = self.left or self.right or self.of or self.moves or self.mirrors
@@ -140,6 +145,8 @@ class Operation(NamedTuple):
     def move(self, shape: Shape, own: Components, beside: Components, edge: Rigid | None) -> Components:
         """Move what is no pose, with its covariances, by `edge`, else by `left`."""
         mover = edge or self.left
+        if self.mirrors:
+            own = (own[0], -own[1], *own[2:])
         moved = own if mover is None else MOVERS[shape.kind](*mover, *own)
         return (*moved, *self.covariance(shape, beside, mover))
 

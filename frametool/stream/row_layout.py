@@ -21,6 +21,7 @@ POINT, VECTOR, POSE, TWIST, WRENCH, ACCEL = "point", "vector", "pose", "twist", 
 ROTATION = "rotation"  # without a position, which no move gives it
 ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a world that stands
 TURNED = (POSE, ROTATION, ATTITUDE)
+PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
 SIX = (TWIST, WRENCH, ACCEL)  # two vectors, linear part first
 MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbers come first
     "": lambda *_: (),
@@ -38,6 +39,11 @@ TO_DEGREES = 180.0 / 3.141592653589793
 FLAT = 1e-9  # radians, metres: what a number without a column may be
 LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
 Unit: TypeAlias = float | tuple[float, float, float]  # how many make a metre, where they differ of x, y, z each
+
+
+def six_names(kind: str) -> list[str]:
+    """Name the numbers of a twist or wrench as columns."""
+    return [f"{part}_{axis}" for part in PARTS[kind] for axis in "xyz"]
 
 
 class Shape(NamedTuple):

@@ -6,6 +6,7 @@ Also turns single results into such blocks and back, and columns of texts into s
 from __future__ import annotations
 
 import re
+from math import isnan
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -13,19 +14,18 @@ import numpy as np
 from frametool.documents.json import JSON_NUMBER, dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
-from frametool.grammar.names import in_nanoseconds, stamp_column
+from frametool.grammar.names import in_nanoseconds, stamp_places
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result
+from frametool.grammar.result import NoResult, Result
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import Fault
+from frametool.stream.faults import NULL, Fault
 from frametool.stream.header import listed
-from frametool.stream.layout import NAMED
-from frametool.stream.record import PARTS
-from frametool.stream.row_layout import POSE, Shape
+from frametool.stream.layout import NAMED, Kept
+from frametool.stream.row_layout import PARTS, POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
-from frametool.stream.stamp_columns import parse_stamps
-from frametool.stream.table import UNCLOSED, Naming, coded, rename_of, table_block
+from frametool.stream.stamp_columns import NOWHERE, read_stamps
+from frametool.stream.table import UNCLOSED, Naming, cells_of, coded, rename_of, table_block
 from frametool.stream.table_plan import plan_table
 from frametool.text.cells import torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -39,15 +39,19 @@ if TYPE_CHECKING:
     from frametool.stream.faults import RowNote
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
+    from frametool.stream.rows import Block
     from frametool.stream.table_stream import Begun
     from frametool.text.spans import Floats, Ints
     Cells: TypeAlias = Spans | NDArray[Any]
 
+NO_STAMP = np.iinfo(np.int64).min  # of a bad row that is kept
+
+
 class RowPoses(NamedTuple):
     """What became of the rows of a block: the good ones, in their order.
 
-    numbers: (n, k) the results, position first
-    stamps_ns: (n,) or None where rows have none
+    numbers: (n, k) the results, position first; nan in a row without one that is kept
+    stamps_ns: (n,) or None where rows have none; NO_STAMP in a row whose own is none
     lines: (n,) from 0
     parents, names: one a row, one for all, or none
     extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
@@ -84,10 +88,13 @@ class TablePoses:
         rename = rename_of(named)
         self.unnamed = (None, None) if rename is None else rename(None, None)
         self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
+        if layout.time is None:
+            time, below = stamp_places(self.table.names)
+            if not self.table.names and not request.columns and min(layout.places, default=0) == 1:
+                time = 0  # what stands before the numbers that --from speaks of
+            layout = layout._replace(time=None if time in layout.frames else time, below=below)
         self.stamp_at = layout.time
-        if layout.time is None and (found := stamp_column(self.table.names)) not in layout.frames:
-            self.stamp_at = found
-        used = {self.stamp_at, *layout.places, *self.naming.places}
+        used = {layout.time, layout.below, *layout.places, *self.naming.places}
         self.kept = [place for place in range(self.table.width) if place not in used]
         self.layout = self._with_stretches(layout)
         self.state = State()
@@ -99,7 +106,8 @@ class TablePoses:
         """Ask for the stamps, the columns that are not ours, one by one, and the names of the results."""
         stretches = [(place, place, "cell", "cell") for place in self.kept]
         stretches += [(role, role, NAMED, NAMED) for role in self.roles]
-        return layout._replace(stretches=tuple(stretches), time=self.stamp_at, pieces=())
+        columns = tuple(map(Kept, self.kept))  # of a row that has too few cells
+        return layout._replace(stretches=tuple(stretches), pieces=(), columns=columns)
 
     @property
     def columns(self) -> str:
@@ -110,7 +118,8 @@ class TablePoses:
         """Return the poses of a block, and leave what is wrong with other rows in `faults`."""
         torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
         body = text if torn is None else text[:torn]
-        block = table_block(self.table, self.layout, body, self.naming, nulls=False)
+        nulls = self.plan.on_error == NULL
+        block = table_block(self.table, self.layout, body, self.naming, nulls=nulls)
         stamps, late = self._stamps(block.stamps)
         run = Run(self.plan, block._replace(bad={**late, **block.bad}), self.state)
         self.faults = run.faults()
@@ -119,26 +128,49 @@ class TablePoses:
         self.mended += len(run.mended)
         self.off = max(self.off, run.off)
         self.notes = notes_of(run, block)
-        parts = block.parts if len(run.rows) == run.count else [chosen(part, run.rows) for part in block.parts]
+        self.rows += len(block.places) + len(block.broken)
+        rows, results, lines = run.rows, run.results, block.places
+        if nulls and self.faults:
+            block, rows, results, stamps = self._with_nulls(block, run, stamps)
+            lines = block.places
+        same = rows is run.rows and len(rows) == run.count
+        parts = block.parts if same else [chosen(part, rows) for part in block.parts]
         texts = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
         names: list[Sequence[str | None]] = [[name] for name in self.unnamed]
         for role, part in zip(self.roles, parts[len(self.kept) :], strict=True):
             names[role] = _texts(part)
-        lines = block.places[run.rows]
-        if b'"' in body:
-            lines = np.array([block.line_of(row) for row in run.rows.tolist()], np.int64)
-        self.rows += len(block.places) + len(block.broken)
+        lines = lines[rows]
+        if b'"' in body and not nulls:
+            lines = np.array([block.line_of(row) for row in rows.tolist()], np.int64)
         return RowPoses(
-            run.results, None if stamps is None else stamps[run.rows], lines, names[0], names[1], texts,
-            block.frames,
+            results, None if stamps is None else stamps[rows], lines, names[0], names[1], texts, block.frames
         )
+
+    def _with_nulls(self, block: Block, run: Run, stamps: Ints | None) -> tuple[Block, Ints, Floats, Ints | None]:
+        """Return the rows with the bad ones among them, without results; what has too few cells comes at its place."""
+        more = len(block.broken)
+        results = np.full((run.count + more, run.results.shape[1]), np.nan)
+        results[run.rows] = run.results
+        places = np.concatenate([block.places, np.array([each.place for each in block.broken], np.int64)])
+        cells = [cells_of(each.null_row, self.table.delimiter) for each in block.broken]
+        parts = []
+        for at, part in enumerate(block.parts):
+            added = spans_of([row[at] if at < min(len(row), len(self.kept)) else b"" for row in cells])
+            starts, ends = (np.concatenate([part[side], added[side] + len(part.data)]) for side in (1, 2))
+            parts.append(Spans(np.concatenate([part.data, added.data]), starts, ends))
+        if stamps is not None:
+            stamps = np.concatenate([stamps, np.full(more, NO_STAMP)])
+        there = {*run.rows.tolist(), *run.reasons, *range(run.count, run.count + more)}  # not the first of velocities
+        rows = np.array(sorted(there, key=places.__getitem__), np.int64)
+        return block._replace(places=places, parts=parts), rows, results[rows], stamps
 
     def _stamps(self, cells: Sequence[tuple[Spans, ...]]) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
         """Read the stamps of a block; return them, and which rows have none that can be read."""
         if self.stamp_at is None or not cells:
             return None, {}
         name = self.table.name(self.stamp_at)
-        times, reasons = parse_stamps(*cells[0], in_ns=in_nanoseconds(name))
+        times, reasons = read_stamps(cells[0], in_ns=in_nanoseconds(name))
+        times[list(reasons)] = NO_STAMP
         return times, {row: (name, reason) for row, reason in reasons.items()}
 
 
@@ -155,29 +187,12 @@ def first_of(block: RowPoses) -> RowPoses:
     return kept(block, slice(0, 1))
 
 
-def kept(block: RowPoses, rows: slice) -> RowPoses:
-    """Return some poses of a block that follow one another."""
-    size = len(block.numbers)
-    return _with_cells(
-        block, rows, *(each[rows] if len(each) == size else each for each in (block.parents, block.names))
-    )
-
-
-def chosen_poses(block: RowPoses, rows: Ints) -> RowPoses:
+def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
     """Return some poses of a block."""
-    size = len(block.numbers)
-    if len(rows) == size:
-        return block
-    names = [
-        [each[row] for row in rows.tolist()] if len(each) == size else each for each in (block.parents, block.names)
-    ]
-    return _with_cells(block, rows, *names)
-
-
-def _with_cells(
-    block: RowPoses, rows: slice | Ints, parents: Sequence[str | None], names: Sequence[str | None]
-) -> RowPoses:
-    """Return some poses of a block with these names."""
+    at = np.arange(len(block.numbers))[rows].tolist()
+    parents, names = (
+        [each[row] for row in at] if len(each) == len(block.numbers) else each for each in (block.parents, block.names)
+    )
     return block._replace(
         numbers=block.numbers[rows],
         stamps_ns=None if block.stamps_ns is None else block.stamps_ns[rows],
@@ -200,6 +215,9 @@ def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
     """
     if any(result.pose.rotation is None for result in results):
         raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+    stamped = ["stamp_ns" in result.extras for result in results]
+    if any(stamped) and not all(stamped):
+        raise ValueInvalid("some poses have a stamp and some have none; add it, or leave it out of all")
     poses = [result.pose for result in results]
     numbers = np.array([pose.components[0 if placed else 3 :] for pose in poses])
     parents, names = [pose.parent for pose in poses], [pose.name for pose in poses]
@@ -272,14 +290,16 @@ def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
-    for at, numbers in enumerate(block.numbers.tolist()):
-        own = 7 if placed else 4
+    own = 7 if placed else 4
+    null: list[Any] = [*NOWHERE[-own:], *[None] * len(extras)]
+    for at, found in enumerate(block.numbers.tolist()):
+        numbers = null if isnan(found[0]) else found
         pose = Pose.of(tuple(numbers[:7]) if placed else (0.0, 0.0, 0.0, *numbers[:4]), names[at], parents[at])
         said: dict[str, Any] = dict(zip(extras, numbers[own:], strict=True))
         if stamps is not None:
-            said["stamp_ns"] = stamps[at]
+            said["stamp_ns"] = None if stamps[at] == NO_STAMP else stamps[at]
         said |= {name: texts[at] for name, texts in others.items()}
-        made.append(Result(pose if placed else pose._replace(position=None), said))
+        made.append((NoResult if numbers is null else Result)(pose if placed else pose._replace(position=None), said))
     return made
 
 
@@ -292,9 +312,18 @@ def points_of(block: RowPoses, kind: str) -> list[dict[str, Any]]:
     made = []
     for at, numbers in enumerate(block.numbers.tolist()):
         named: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
-        stamp = {} if stamps is None else {"stamp_ns": stamps[at]}
-        made.append(named | {kind: numbers} | stamp | {name: texts[at] for name, texts in others.items()})
+        stamp = {} if stamps is None else {"stamp_ns": None if stamps[at] == NO_STAMP else stamps[at]}
+        own = spelled(kind, None if isnan(numbers[0]) else numbers)
+        made.append(named | own | stamp | {name: texts[at] for name, texts in others.items()})
     return made
+
+
+def spelled(kind: str, numbers: Sequence[float] | None) -> dict[str, Any]:
+    """Return the numbers of a point, vector, twist or wrench under its keys; None in their place if there are none."""
+    if kind not in PARTS:
+        return {kind: numbers if numbers is None else list(numbers)}
+    halves = (None, None) if numbers is None else (list(numbers[:3]), list(numbers[3:]))
+    return {kind: dict(zip(PARTS[kind], halves, strict=True))}
 
 
 def spans_of(texts: list[bytes]) -> Spans:

@@ -67,6 +67,11 @@ def parse_header_stamps(seconds: Spans, nanoseconds: Spans) -> tuple[Ints, dict[
     return stamps, reasons
 
 
+def read_stamps(cells: tuple[Spans, ...], *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
+    """Read stamps of one column, or of whole seconds and nanoseconds."""
+    return parse_header_stamps(*cells) if len(cells) == 2 else parse_stamps(*cells, in_ns=in_ns)
+
+
 def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: bool) -> tuple[Ints, Flags]:
     """Read digits with at most a point among them; give the nanoseconds and which of them are sure."""
     suffixed = (data.take(ends - 1) == ord("s")) & (data.take(ends - 2) == ord("n")) & (ends - starts > 2)
@@ -124,11 +129,7 @@ def stamps_of(block: Block, name: str, blame: Blame) -> Ints:
         return block.times
     if not block.stamps or not block.stamps[0]:
         raise ValueInvalid("rows have no stamps; there is no velocity")
-    spans = block.stamps[0]
-    if len(spans) == 2:
-        stamps, reasons = parse_header_stamps(*spans)
-    else:
-        stamps, reasons = parse_stamps(*spans, in_ns=in_nanoseconds(name))
+    stamps, reasons = read_stamps(block.stamps[0], in_ns=in_nanoseconds(name))
     for row, reason in reasons.items():
         blame(row, name, reason)
     return stamps
@@ -210,7 +211,7 @@ def by_time(
     if isinstance(stamps, np.ndarray):
         times, reasons = stamps, dict[int, str]()
     else:
-        times, reasons = parse_header_stamps(*stamps) if len(stamps) == 2 else parse_stamps(*stamps, in_ns=timed.in_ns)
+        times, reasons = read_stamps(stamps, in_ns=timed.in_ns)
     for row, reason in reasons.items():
         blame(row, timed.column, reason)
     poses = np.full((7, len(times)), np.nan)

@@ -85,7 +85,7 @@ class Naming:
         bad: dict[int, tuple[str, str | FrametoolError]] = {}
         for row in np.flatnonzero(np.array([isinstance(each, FrametoolError) for each in results])[of_row]).tolist():
             bad[row] = self.column, results[of_row[row]]
-        emptied = np.array([self._loses(*each) for each in zip(pairs, results, strict=True)])[of_row]
+        emptied = np.array([bool(self._lost(*each)) for each in zip(pairs, results, strict=True)])[of_row]
         lost = [
             (row, self._lost(pairs[of_row[row]], results[of_row[row]])) for row in np.flatnonzero(emptied)[:1].tolist()
         ]
@@ -118,10 +118,6 @@ class Naming:
         except FrametoolError as error:
             return error
         return parent if counter else new[0] or "", new[1] or ""
-
-    def _loses(self, pair: Texts, result: Texts | FrametoolError) -> bool:
-        """Tell whether a cell that named a frame is empty in the result."""
-        return bool(self._lost(pair, result))
 
     def _lost(self, pair: Texts, result: Texts | FrametoolError) -> str:
         """Return the frame that a cell named and the result does not; "" if there is none."""
@@ -297,7 +293,7 @@ def open_table(block: bytes, form: str, *, header: bool, source: str) -> tuple[T
     line = _first_record(rest, delimiter)
     if delimiter and torn_record(line, delimiter) is not None:
         raise FormatError(UNCLOSED, source=source, line=1)
-    cells = _cells(line, delimiter)
+    cells = cells_of(line, delimiter)
     named = _named_comment(comments, delimiter, len(cells)) if header else None
     if not cells and not (delimiter and comments):
         raise FormatError("no rows in it", source=source)
@@ -339,7 +335,7 @@ def _named_comment(
     start = comments.rindex(lines[-1])
     text = lines[-1].rstrip(b"\r\n")
     words = text.lstrip(b"# \t")
-    cells = _cells(words, delimiter)
+    cells = cells_of(words, delimiter)
     if not cells or (width and len(cells) != width) or not has_pose_column(map(_unquoted, cells)):
         return None
     before = comments[: start + len(text) - len(words)]
@@ -363,7 +359,7 @@ def _first_record(text: bytes, delimiter: bytes) -> bytes:
     return text[: int(ends[0]) - MARGIN] if len(ends) else text
 
 
-def _cells(line: bytes, delimiter: bytes) -> list[bytes]:
+def cells_of(line: bytes, delimiter: bytes) -> list[bytes]:
     """Return the raw cells of one line."""
     if not delimiter:
         return line.split()
@@ -402,7 +398,8 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming, *, nu
         names.spans[begin] if kind == NAMED else _stretch(cells, begin, end, kind, until)
         for begin, end, kind, until in layout.stretches
     ]
-    stamps = [] if layout.time is None else [(without_quotes(cells.column(layout.time)),)]
+    times = [place for place in (layout.time, layout.below) if place is not None]
+    stamps = [tuple(without_quotes(cells.column(place)) for place in times)] if times else []
     odd, broken = [], []
     lines_before = _line_counter(cells)
     if len(cells.rows) < len(cells.counts):
@@ -460,5 +457,5 @@ def _ragged(table: Table, count: int) -> str:
 
 def _null_row(table: Table, layout: Layout, raw: bytes) -> bytes:
     body = raw.rstrip(b"\r\n")
-    cells = _cells(raw, table.delimiter) if b'"' in raw or not table.delimiter else body.split(table.delimiter)
+    cells = cells_of(raw, table.delimiter) if b'"' in raw or not table.delimiter else body.split(table.delimiter)
     return layout.null_row(cells) + raw[len(body) :]

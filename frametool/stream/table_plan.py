@@ -5,13 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
-from frametool.geometry.representations import REPRESENTATIONS
-from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, without_mark
+from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, nanoseconds_beside, without_mark
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
-from frametool.stream.header import XYZ, PoseColumns, find_poses, listed, named_pose, row_shape
+from frametool.stream.header import (
+    XYZ,
+    PoseColumns,
+    find_poses,
+    find_six,
+    has_pose_column,
+    listed,
+    named_pose,
+    row_shape,
+    wholes_of,
+)
 from frametool.stream.layout import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
-from frametool.stream.row_layout import POSE, Shape
+from frametool.stream.row_layout import POSE, SIX, Shape, six_names
 from frametool.stream.table import rename_of
 
 if TYPE_CHECKING:
@@ -29,6 +38,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find_if_read(table, request, source)
     only_turned = not request.operation.moves and request.operation.keeps_position and request.gathered is None
+    only_turned = only_turned and not (request.operation.turns and poses and poses[0].rotation is None)  # a point
     if request.poses == 1 and only_turned and not request.all_numbers:
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
@@ -51,7 +61,9 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     if table.header:
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
-    layout = layout._replace(time=_time_column(table, request, source), name=name)
+    time = _time_column(table, request, source)
+    below = None if time is None or not table.names else nanoseconds_beside(table.names, time)
+    layout = layout._replace(time=time, below=below, name=name)
     return Plan(
         shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
@@ -67,19 +79,43 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if request.columns:
         if len(request.columns) != request.poses:
             raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
-        return [named_pose(spec, table.names, table.width, request.given) for spec in request.columns]
+        kinds = request.kinds or (request.kind,) * request.poses
+        return [
+            named_pose(spec, table.names, table.width, request.given, kind)
+            for spec, kind in zip(request.columns, kinds, strict=True)
+        ]
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
         names = ["" if name == request.extra_column else name for name in table.names]  # what it is for is known
-        return find_poses(names, request.given, request.poses, source)
+        return _find_named(names, request, source)
+    if request.kind in SIX and table.width == len(six_names(request.kind)):
+        return [named_pose(f"1-{table.width}", None, table.width, None, request.kind)]
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
-        return [named_pose(spec, None, table.width, request.given)]
-    raise FormatError(
-        f"{table.width} columns without names do not say what they are; give --from REP, or --columns",
-        source=source,
-        line=1,
-    )
+        return [named_pose(spec, None, table.width, request.given, request.kind)]
+    reason = f"{table.width} columns without names do not say what they are; give --from REP, or --columns"
+    if request.poses == 1 and request.given:
+        reason = f"{request.given.counted}; found {table.width} columns without names; or give --columns"
+    raise FormatError(reason, source=source, line=1)
+
+
+def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
+    """Find points, poses, a twist or a wrench by their names; beside a pose a twist is another column."""
+    six = find_six(names, request.kind if request.kind in SIX else "")
+    if request.kind in SIX and six is None:
+        wanted = " ".join(six_names(request.kind))
+        raise FormatError(
+            f"no columns of a {request.kind} ({wanted}) among: {listed(names)}; name them with --columns",
+            source=source,
+            line=1,
+        )
+    taken = () if six is None else six.places
+    others = ["" if place in taken else name for place, name in enumerate(names)]
+    if six is not None and (request.kind in SIX or not has_pose_column(others)):
+        return [PoseColumns(six, None)]
+    if not (request.operation.moves or request.operation.changes_nothing):
+        others = list(names)  # what a pose has beside it would no longer be true
+    return find_poses(others, request.given, request.poses, source)
 
 
 def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:
@@ -104,14 +140,12 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
 
 def _by_width(width: int, given: Notation | None) -> str:
     """Take all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not."""
-    rows = REPRESENTATIONS.values() if given is None else [given.representation]
-    wholes = [len(row.whole.columns) for row in rows if row.whole]
     if given is None:
-        return f"1-{width}" if width in (len(XYZ), *wholes) else ""
-    size = len(given.representation.columns)
-    if width in (size, size + 3, *wholes):
+        wholes = [form.representation.whole for form in wholes_of(None)]
+        return f"1-{width}" if width in (len(XYZ), *(len(whole.columns) for whole in wholes if whole)) else ""
+    if width in given.counts:
         return f"1-{width}"
-    return f"2-{width}" if width - 1 in (size + 3, *wholes) else ""
+    return f"2-{width}" if width - 1 in given.counts[1:] else ""
 
 
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
@@ -282,6 +316,8 @@ def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request,
     else:
         turned = _affixed(target.names, rotation, request, len(poses))
     moved = [] if target.unit is None else [request.prefix + name for name in XYZ]
+    if target.plain and pose.position:
+        moved = [request.prefix + name for name in pose.position.names]
     if moved and pose.position and alone:
         moved = list(pose.position.names)
         moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, FrametoolError, listing
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import stamp_column
+from frametool.grammar.names import stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault, Misused, RowNote
 from frametool.stream.rows import written
@@ -80,7 +80,8 @@ def begin_table(
     stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True, size: int = 0
 ) -> Begun:
     """Read the head of a table in a form; raises FormatError."""
-    blocks = _blocks(stream, (FORMATS[form].delimiter or "").encode(), size)
+    ends = _record_ends((FORMATS[form].delimiter or "").encode())
+    blocks = read_blocks(stream, size=size or BLOCK_BYTES, whole=ends())
     first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
@@ -88,11 +89,6 @@ def begin_table(
     table = as_trajectory(table, form, request, source)
     taken = len(first) - len(rest)
     return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))
-
-
-def _blocks(stream: ByteStream, delimiter: bytes, size: int) -> Iterator[bytes]:
-    """Return blocks of whole rows."""
-    return read_blocks(stream, size=size or BLOCK_BYTES, whole=_record_ends(delimiter)())
 
 
 def _record_ends(delimiter: bytes) -> Callable[[], Callable[[bytes], int]]:
@@ -123,13 +119,13 @@ def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request,
         return request._replace(timed=timed._replace(name=name)), None
     if timed.name:
         return request, None
-    found = stamp_column(table.names)  # rows have no header
+    found, _ = stamp_places(table.names)
     return request._replace(timed=None), None if found is None else timed._replace(name=table.name(found))
 
 
 def _stamp_column(table: Table, source: str, who: str) -> str:
     """Name the column of stamps that somebody asks for; raises Misused where none looks so."""
-    found = stamp_column(table.names)
+    found, _ = stamp_places(table.names)
     if found is None:
         known = f"; columns: {listing(table.names)}" if table.names else ""
         raise Misused(f"{who}: no column looks like stamps; name it with --time-column{known}", source=source, line=1)

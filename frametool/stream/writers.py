@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
-from itertools import chain
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
-from frametool.errors import ValueInvalid, warn
+from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows.pose_rows import (
     IMAGE,
+    MOST_NAMED,
     NUMBER,
     DroppedFields,
     Numbers,
@@ -29,7 +30,7 @@ from frametool.formats.rows.pose_rows import (
 )
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
-from frametool.geometry import arrays, floats, quaternion
+from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -38,11 +39,13 @@ from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import (
     block_of,
     first_of,
+    kept,
     plain_cell,
     plain_cells,
     points_of,
     results_of,
     spans_of,
+    spelled,
     texts_of,
 )
 from frametool.stream.rows import number_spans
@@ -82,6 +85,8 @@ class TextWriter:
         kind: pose, point or vector; extras: the numbers beside each; placed: whether poses have a position
         Raises ValueInvalid for what the form does not hold, and for notations that it does not have.
         """
+        if kind in SIX and style.form not in LEARNED:
+            raise ValueInvalid(f"{style.form} is not written of rows of a {kind}; write csv, json or yaml")
         if kind != POSE and "points" not in FORMATS[style.form].writes:
             raise ValueInvalid(f"{style.form} holds poses; a {kind} has no rotation")
         self.style = style
@@ -95,8 +100,9 @@ class TextWriter:
         self.placed = placed
         self.target = target_in(style, kind, placed=placed)
         self.count = 0
-        self.dropped = False
+        self.dropped: dict[str, None] = {}
         self.rows: RowForm | None = None
+        self.looked = False  # whether the form was seen to write a row
         self.order: list[int] = []
         self.first: Any = None
         self.empty: RowPoses | None = None  # a block without rows says what columns there are
@@ -106,16 +112,22 @@ class TextWriter:
         if not len(block.numbers):
             self.empty = block
             return b""
-        text = self._fixed(self.fixed, block) if self.fixed else self._free(block)
-        self.dropped |= self.style.form not in LEARNED and bool(self.extras or block.extras)
-        self.count += len(block.numbers)
+        if self.style.form not in LEARNED:
+            self.dropped |= dict.fromkeys((*self.extras, *block.extras))
+        absent = np.isnan(block.numbers[:, 0])
+        cuts = [0, *(np.flatnonzero(np.diff(absent)) + 1).tolist(), len(absent)]
+        text = b""
+        for start, end in pairwise(cuts):
+            run = block if len(cuts) == 2 else kept(block, slice(start, end))
+            text += self._fixed(self.fixed, run) if self.fixed else self._free(run, is_null=bool(absent[start]))
+            self.count += end - start
         return text
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last pose, and tell what was left out."""
         if self.fixed is None or self.dropped_fields is None:
             if self.dropped:
-                warn(f"{self.style.form}: other columns left out")
+                warn(f"{self.style.form}: {listing(self.dropped, MOST_NAMED)} left out")
             if self.style.form == "csv" and not self.count and self.empty is not None:
                 self._learn(self.empty)
                 yield self.rows.head if self.rows is not None else b""
@@ -133,19 +145,19 @@ class TextWriter:
             dropped.record(
                 frames=bool(there),
                 stamps=block.stamps_ns is not None and NUMBER not in block.extras,
-                extras=bool(self.extras or block.extras.keys() - {IMAGE, NUMBER}),
+                extras=[*self.extras, *(name for name in block.extras if name not in (IMAGE, NUMBER))],
             )
             dropped.counted |= "stamps" in form.holds and block.stamps_ns is None
             dropped.by_stamp |= IMAGE in form.row and images is None
             dropped.turned = is_turned(self.style)
-        values = np.array(form.numbers(*self._canonical(block))).T + 0.0  # none is -0.0
-        return self._joined(form, values, block)
+        return self._joined(form, np.array(form.numbers(*self._canonical(block))).T + 0.0, block)  # none is -0.0
 
     def _canonical(self, block: RowPoses) -> Components:
-        """Return position and quaternion of a block as the form has a camera's axes, with the sign that is written."""
-        tx, ty, tz, x, y, z, w = turned(self.style, self._own(tuple(block.numbers.T))[:7])
-        unit = quaternion.unit(x, y, z, w, arrays)
-        return (tx, ty, tz, *(unit if self.style.keep_sign else quaternion.from_quaternion(*unit, arrays)))
+        """Return position and quaternion of a block as the form has them: axes, direction, the sign that is written."""
+        tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
+        pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
+        tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.form].poses.inverse else pose
+        return (tx, ty, tz, *((x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)))
 
     def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
         """Put the rows of a block together."""
@@ -203,15 +215,18 @@ class TextWriter:
             return spans_of([dump(value).encode() for value in plain_cells(cells)])
         else:
             texts = texts_of(list(block.extras.values())[int(what)])
-        write: Callable[[str | None], bytes] = _csv_cell if self.style.form == "csv" else _json_cell
-        known = {text: write(text) for text in dict.fromkeys(texts)}
+        in_csv = self.style.form == "csv"
+        known = {text: (quoted(text or "") if in_csv else dump(plain_cell(text or ""))).encode() for text in {*texts}}
         return spans_of([known[text] for text in texts])
 
     # --- forms whose rows depend on what is written ---
 
-    def _free(self, block: RowPoses) -> bytes:
+    def _free(self, block: RowPoses, *, is_null: bool) -> bytes:
         """Write a block as the form was seen to write poses; one by one where it was not, or angles are not unique."""
-        if self.rows is None and self.count == 0:
+        if is_null:
+            return self._one_by_one(block)
+        if not self.looked:
+            self.looked = True
             self._learn(block)
             if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
                 self.rows = None
@@ -239,7 +254,8 @@ class TextWriter:
         """See how the form writes a pose whose numbers are all different, and take them for places to fill in."""
         style = self.style.in_form(self.style.form)
         style.precision = None
-        if style.form not in LEARNED or (style.form == "yaml" and (block.extras or _vary(block))):
+        varies = block.extras or {len(block.names), len(block.parents)} != {1}
+        if style.form not in LEARNED or (style.form == "yaml" and varies):
             return
         probe = self._probe(block)
         alone, twice = (self.write([probe] * count, style) for count in (1, 2))
@@ -264,7 +280,7 @@ class TextWriter:
 
     @property
     def _size(self) -> int:
-        return len(PROBE) if self.kind == POSE else len(XYZ)
+        return len(PROBE) if self.kind == POSE else 6 if self.kind in SIX else len(XYZ)
 
     def _probe(self, block: RowPoses) -> Any:
         """Make a result with what this block's have; what differs from row to row is marked."""
@@ -274,7 +290,7 @@ class TextWriter:
         )
         if self.kind != POSE:
             named = {} if parent is None else {"frame": parent}
-            return named | {self.kind: list(PROBE[: len(XYZ)])} | self._probe_extras(block)
+            return named | spelled(self.kind, PROBE[: self._size]) | self._probe_extras(block)
         pose = Pose.of(PROBE, name, parent)
         return Result(pose if self.placed else pose._replace(position=None), self._probe_extras(block))
 
@@ -308,10 +324,6 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
     return b"".join((writer.of_block(block_of(list(results))), *writer.end())).decode()
 
 
-def _vary(block: RowPoses) -> bool:
-    return len(block.names) != 1 or len(block.parents) != 1
-
-
 def _constant(text: bytes, size: int) -> Spans:
     starts = np.full(size, MARGIN, np.int64)
     return Spans(framed(text), starts, starts + len(text))
@@ -330,9 +342,3 @@ def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
     return list(chain(*([part, between] for part in each)))[:-1]
 
 
-def _csv_cell(text: str | None) -> bytes:
-    return quoted(text or "").encode()
-
-
-def _json_cell(text: str | None) -> bytes:
-    return dump(plain_cell(text or "")).encode()

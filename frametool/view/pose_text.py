@@ -7,10 +7,12 @@ from itertools import zip_longest
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool.documents.json import dump
 from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import REPRESENTATIONS, ROWS, notation
+from frametool.grammar.pose import TIMES
 from frametool.grammar.result import is_locked, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
@@ -45,8 +47,11 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     """Return one line a point, aligned, with its frame."""
     frames, rows = [], []
     for record in records:
-        frames.append(f"m in {record['frame']}" if record.get("frame") else "m")
-        numbers = next(value for value in record.values() if isinstance(value, list))
+        frame = f"m in {record['frame']}" if record.get("frame") else "m"
+        at = "" if record.get("stamp_ns") is None else f" at {format_stamp(record['stamp_ns'])}"
+        kind, numbers = next(each for each in record.items() if isinstance(each[1], list))
+        others = [f"  {key} {_said(value)}" for key, value in record.items() if key not in (kind, "frame", "stamp_ns")]
+        frames.append("".join([frame, at, *others]))
         rows.append([style.number(value + 0.0) for value in numbers])
     return "".join(f"{'  '.join(cells)}  {frame}\n" for cells, frame in zip(_aligned(rows), frames, strict=True))
 
@@ -67,12 +72,11 @@ def _describe(result: Result, style: Style) -> str:
 def _heading(result: Result) -> str:
     """Say in words which frame is seen from which, and when."""
     pose = result.pose
-    if pose.name is None and pose.parent is None:
-        return ""
+    at, source_at, fixed = (result.extras.get(key) for key in TIMES)
     if pose.name is None or pose.parent is None:
-        said = f"a pose seen from {pose.parent}" if pose.name is None else f"the pose of {pose.name}"
-        return f"{printable(said)}\n"
-    at, source_at, fixed = (result.extras.get(key) for key in ("stamp_ns", "source_stamp_ns", "fixed"))
+        seen = f"a pose seen from {pose.parent}" if pose.parent else f"the pose of {pose.name}" if pose.name else ""
+        said = " ".join([seen or "a pose", f"at {format_stamp(at)}"] if at is not None else [seen])
+        return f"{printable(said)}\n" if said else ""
     name, parent = printable(pose.name), printable(pose.parent)
     source = name if source_at is None else f"{name} at {format_stamp(source_at)}"
     target = parent if at is None else f"{parent} at {format_stamp(at)}"
@@ -106,6 +110,13 @@ def _extra_lines(result: Result) -> Iterator[NumberLine]:
         if isinstance(value, float):
             unit = "deg" if key.endswith("_deg") else units.get(key.partition("_")[0], "")
             yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)
+        elif key not in TIMES and value is not None:
+            yield NumberLine(key, [], _said(value))
+
+
+def _said(value: Any) -> str:
+    """Write what stands beside numbers."""
+    return printable(dump(value) if isinstance(value, (dict, list)) else "" if value is None else str(value))
 
 
 def _layout(lines: Sequence[NumberLine], style: Style) -> str:

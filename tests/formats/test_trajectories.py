@@ -385,7 +385,7 @@ def test_what_a_form_cannot_hold_is_told_once(run: Run) -> None:
     text = "stamp,parent,name,x,y,z,qx,qy,qz,qw,tag\n" + "".join(f"{at},map,base,1,2,3,0,0,0,1,x\n" for at in range(9))
     told = run("convert", "-f", "kitti", "--in", "csv", stdin=text).err
     assert told.count("warning") == 1
-    assert "kitti: names of frames, stamps, other columns left out" in told
+    assert "kitti: names of frames, stamps, tag left out" in told
     assert "axes of the poses are taken for optical" in told
 
 

@@ -18,13 +18,11 @@ from frametool.errors import FormatError, shown
 from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import FORMATS
-from frametool.geometry import rigid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import N
     from frametool.grammar.edges import Options, Samples
 
 IMAGE_LINE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
@@ -34,14 +32,9 @@ FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .."
 POSES = FORMATS["colmap"].poses
 
 
-def _world_in_camera(*pose: N) -> tuple[N, ...]:
-    tx, ty, tz, x, y, z, w = rigid.inverse(*pose)
-    return w, x, y, z, tx, ty, tz
-
-
 ROWS = RowForm(
     ("number", b" ", Numbers(7), b" 1 ", IMAGE, b"\n\n"),
-    _world_in_camera,
+    lambda tx, ty, tz, x, y, z, w: (w, x, y, z, tx, ty, tz),
     head=b"# Image list with two lines of data per image:\n"
     b"#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n",
     first=1,

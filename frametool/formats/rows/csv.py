@@ -11,7 +11,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
-from frametool.grammar.result import carries_position, pose_numbers
+from frametool.grammar.pose import NAMES
+from frametool.grammar.result import NoResult, carries_position, pose_numbers
 from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 
 PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
+SIX = ("twist", "wrench")
 HALVES = ("linear", "angular", "force", "torque")
 
 
@@ -52,15 +54,25 @@ def _pose_row(result: Result, style: Style) -> dict[str, Any]:
         if twice := [name for name in rotation if cells.get(name, rotation[name]) != rotation[name]]:
             raise ValueInvalid(f"columns {', '.join(twice)} would stand twice; write json or yaml, or one --to at once")
         cells |= rotation
-    return cells | {key: value for key, value in result.extras.items() if key not in cells}
+    if isinstance(result, NoResult):
+        cells |= dict.fromkeys(cells.keys() - NAMES)
+    extras = {
+        name: cell
+        for key, value in result.extras.items()
+        for name, cell in (_record_cells({key: value}) if key in SIX else ((key, value),))
+    }
+    return cells | {key: value for key, value in extras.items() if key not in cells}
 
 
 def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the cells of a record: three of each vector; what else is no scalar is one cell of JSON."""
     for key, value in record.items():
-        if key in (*PLAIN, *HALVES) and isinstance(value, (dict, list)):
-            numbers = value.values() if isinstance(value, dict) else value
+        if key in (*PLAIN, *HALVES) and (value is None or isinstance(value, (dict, list))):
+            numbers = value.values() if isinstance(value, dict) else value or [None] * 3
             yield from zip("xyz" if key in PLAIN else [f"{key}_{axis}" for axis in "xyz"], numbers, strict=False)
+        elif key in SIX and isinstance(value, dict):
+            for name, cell in _record_cells(value):
+                yield name if name.startswith(HALVES) else f"{key}_{name}", cell
         else:
             yield key, value
 

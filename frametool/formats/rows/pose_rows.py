@@ -11,19 +11,20 @@ from __future__ import annotations
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid, warn
+from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
 
 HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: between optical axes and those of OpenGL
-LOSABLE = {"frames": "names of frames", "stamps": "stamps", "extras": "other columns"}
+LOSABLE = {"frames": "names of frames", "stamps": "stamps"}
+MOST_NAMED = 8
 IMAGE = "image"  # the extra that names a picture
 NUMBER = "number"  # the extra that says what a pose was counted as in the same form
 
@@ -42,7 +43,7 @@ class RowForm(NamedTuple):
         `first`), `next` (one more), `image` (the name of its picture, else its seconds)
     numbers: from tx, ty, tz, x, y, z, w to the numbers in the order they are written
     head, between, tail: text before the first pose, between two, and behind the last
-    holds: which of `frames`, `stamps`, `extras` are written
+    holds: which of `frames`, `stamps` are written; other columns are not
     beside: what else a reader of the form finds in it, told whenever it is written
     """
 
@@ -63,21 +64,24 @@ class DroppedFields:
         """Collect nothing yet; raises ValueInvalid for notations that the form does not have."""
         self.form = form
         self.style = style
-        self.found: set[str] = set()
+        self.found: dict[str, None] = {}
         self.counted = False
         self.by_stamp = False
         self.turned = False
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.form} writes rotations in its own way; leave --to out")
 
-    def record(self, *, frames: bool, stamps: bool, extras: bool) -> None:
+    def record(self, *, frames: bool, stamps: bool, extras: Iterable[str]) -> None:
         """Note fields of poses that the format cannot store."""
-        said = {"frames": frames, "stamps": stamps, "extras": extras}
-        self.found |= {what for what, there in said.items() if there and what not in self.form.holds}
+        said = {"frames": frames, "stamps": stamps}
+        self.found |= {LOSABLE[what]: None for what, there in said.items() if there and what not in self.form.holds}
+        self.found |= dict.fromkeys(extras)  # by name
 
     def tell(self) -> None:
         """Warn of all that was left out or made up, in one line."""
-        left = [words for what, words in LOSABLE.items() if what in self.found]
+        left = [words for words in LOSABLE.values() if words in self.found]
+        if others := self.found.keys() - {*LOSABLE.values()}:
+            left.append(listing(others, MOST_NAMED))
         said = [f"{', '.join(left)} left out"] if left else []
         said += [self.form.beside] * bool(self.form.beside)
         said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
