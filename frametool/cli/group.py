@@ -15,7 +15,7 @@ from click.core import iter_params_for_processing
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
 from frametool.cli.sink import writing
-from frametool.errors import SHOWN, alternatives, shown
+from frametool.errors import SHOWN, alternatives, did_you_mean, shown
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
@@ -284,6 +284,9 @@ def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
+    if isinstance(error, click.NoSuchOption):  # each version of click has its own words
+        name, near = error.option_name, error.possibilities or ()
+        message = f"no such option {shown(name)}{did_you_mean(name, near)}"
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
         message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():
