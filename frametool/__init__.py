@@ -14,8 +14,6 @@ Arguments are always in the order (target, source). Metres, radians, quaternions
 nanoseconds. Names are loaded when first used: `import frametool` alone loads neither numpy nor yaml.
 """
 
-from __future__ import annotations
-
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.calc.api import calc as calc

@@ -114,6 +114,32 @@ def drain(terminal: int) -> None:
         pass
 
 
+# the first signal comes when a module is looked for: click, whose import takes longest, or one that a command needs
+HURRIED = """
+import os, signal, sys
+from frametool.cli import main
+class Looked:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1]:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Looked())
+main(["lookup", "robot.yaml", "map", "tool"])
+"""
+
+
+@pytest.mark.parametrize("module", ["contextlib", "frametool.cli.signals", "click", "frametool.cli.group", "frametool.formats.load", "yaml"])
+def test_ctrl_c_during_the_start_prints_nothing(module: str) -> None:
+    call = [sys.executable, "-I", "-S", "-c", f"import sys; sys.path[:0] = {sys.path!r}\n{HURRIED}", module]
+    done = subprocess.run(call, cwd=ROOT / "examples", capture_output=True, check=False, preexec_fn=by_default)
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"")
+
+
+def test_a_start_that_can_open_no_file_is_one_line() -> None:
+    code = "import resource; from frametool.cli import main; resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3)); main()"
+    done = subprocess.run([sys.executable, "-c", code, "--version"], env=ENVIRONMENT, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (5, b"frametool: too many open files\n")
+
+
 # what Windows lacks; libraries that know which system they run on are imported before it is taken away
 LACKING = """
 import multiprocessing.connection, os, select, signal, subprocess, sys, tempfile
