@@ -6,8 +6,6 @@ import os
 import signal
 from contextlib import contextmanager
 
-from frametool.cli import INTERRUPTED
-
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -33,7 +31,7 @@ class _Signals:
         name = signal.Signals(number).name
         if not self.begun and not self.writing:
             # what is raised in the middle of an import may be printed there, and lost
-            os._exit(INTERRUPTED if number == signal.SIGINT else die_of(name))
+            os._exit(130 if number == signal.SIGINT else die_of(name))
         if number != signal.SIGINT:
             for each in ENDING:
                 signal.signal(each, signal.SIG_IGN)  # `timeout` sends it twice: nothing cuts the cleaning short
