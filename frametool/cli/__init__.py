@@ -26,6 +26,7 @@ def main(arguments: list[str] | None = None) -> None:
     except (ImportError, OSError) as error:  # no module can be opened any more, nor those with better words
         sys.stderr.write(f"frametool: {(getattr(error, 'strerror', None) or str(error)).lower()}\n")
         status = IN_OUT
+    gc.freeze()  # on the way out nothing is looked through for garbage
     sys.exit(status)
 
 

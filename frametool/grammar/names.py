@@ -19,8 +19,9 @@ PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # what a message's header says is
 NAME_KEYS = ("child_frame_id", "name")  # what a pose is the pose of
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
-_STAMP = re.compile(r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
-_UNIT = re.compile(r"_([nmuµ]?s)$|[\[(]\s*([^\])]*?)\s*[\])]$")
+# compiled when first needed, not at start-up
+_STAMP = r"(?i)[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?"
+_UNIT = r"_([nmuµ]?s)$|[\[(]\s*([^\])]*?)\s*[\])]$"
 _SECONDS = ("s", "sec", "seconds", "")
 
 
@@ -31,7 +32,7 @@ def in_nanoseconds(name: str) -> bool:
     """
     if name in NANOSECONDS:
         return True
-    found = _UNIT.search(name.lower())
+    found = re.search(_UNIT, name.lower())
     unit = (found[1] or found[2] or "") if found else ""
     if unit in ("ns", *_SECONDS):
         return unit == "ns"
@@ -40,7 +41,7 @@ def in_nanoseconds(name: str) -> bool:
 
 def stamp_column(names: Iterable[str] | None) -> int | None:
     """Return the place of the first column that is called as stamps are, in a unit that is known."""
-    return next((at for at, name in enumerate(names or ()) if _STAMP.fullmatch(name) and _is_known(name)), None)
+    return next((at for at, name in enumerate(names or ()) if re.fullmatch(_STAMP, name) and _is_known(name)), None)
 
 
 def _is_known(name: str) -> bool:

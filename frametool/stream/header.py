@@ -109,7 +109,7 @@ class Header:
             self._take_apart(place, name.lstrip("# ") if place == 0 else name)
 
     def _take_apart(self, place: int, name: str) -> None:
-        bracket = BRACKETS.search(name)
+        bracket = re.search(BRACKETS, name)
         bare = name[: bracket.start()] if bracket else name
         folded = bare.lower() if bare.isascii() else bare
         for token in TOKEN.finditer(folded):
@@ -483,7 +483,7 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, given: Notati
 def _chosen(header: Header, places: Sequence[int]) -> Match:
     """Take columns as they were chosen, with the units that their names say."""
     bare = [header.names[place] for place in places]
-    units = [bracket[1] if (bracket := BRACKETS.search(name)) else _unit_at_end(name) for name in bare]
+    units = [bracket[1] if (bracket := re.search(BRACKETS, name)) else _unit_at_end(name) for name in bare]
     return Match(tuple(zip(places, units, strict=True)), "", "")
 
 
