@@ -63,30 +63,7 @@ _HOMES = {
     "sql": "frametool.stream.engines",
     "tutorial": "frametool.sim.scene",
 }
-__all__ = [
-    "FORMATS",
-    "FollowController",
-    "FrameTree",
-    "FrametoolError",
-    "Rotation",
-    "Transform",
-    "TransformBuffer",
-    "Turtle",
-    "Twist",
-    "__version__",
-    "apply_arrow",
-    "calc",
-    "diff",
-    "explain",
-    "follow_steps",
-    "load",
-    "load_robot",
-    "polars_exprs",
-    "simulate",
-    "simulate_many",
-    "sql",
-    "tutorial",
-]
+__all__ = ["__version__", *_HOMES]  # noqa: PLE0604 - its keys are strings
 
 
 def __getattr__(name: str) -> object:
