@@ -14,8 +14,6 @@ Arguments are always in the order (target, source). Metres, radians, quaternions
 nanoseconds. Names are loaded when first used: `import frametool` alone loads neither numpy nor yaml.
 """
 
-from __future__ import annotations
-
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.calc.api import calc as calc
@@ -75,35 +73,7 @@ _HOMES = {
     "sql": "frametool.stream.engines",
     "tutorial": "frametool.sim.scene",
 }
-__all__ = [
-    "FORMATS",
-    "FollowController",
-    "FrameTree",
-    "FrametoolError",
-    "Rotation",
-    "Trajectory",
-    "Transform",
-    "TransformBuffer",
-    "Turtle",
-    "Twist",
-    "__version__",
-    "align",
-    "apply_arrow",
-    "calc",
-    "compare",
-    "diff",
-    "explain",
-    "follow_steps",
-    "load",
-    "load_robot",
-    "load_trajectory",
-    "polars_exprs",
-    "resample",
-    "simulate",
-    "simulate_many",
-    "sql",
-    "tutorial",
-]
+__all__ = ["__version__", *_HOMES]  # noqa: PLE0604 - its keys are strings
 
 
 def __getattr__(name: str) -> object:

@@ -286,7 +286,7 @@ WRONG = {
     ("lookup arm.yaml base", 2):
         "lookup: missing argument 'SOURCE'; usage: frametool lookup [OPTIONS] TREE TARGET SOURCE",
     ("lookup arm.yaml base tip --presicion 3", 2):
-        "lookup: no such option '--presicion'. (Did you mean one of: '--direction', '--precision', '--prefix'?); "
+        "lookup: no such option '--presicion'; did you mean '--precision'?; "
         "usage: frametool lookup [OPTIONS] TREE TARGET SOURCE",
     ("convert --from ryp 0 0 0", 2): "convert: invalid value for '--from': unknown representation 'ryp'; "
         "did you mean 'rpy'? representations: ",

@@ -1,33 +1,32 @@
 """The command line: the edge where whatever goes wrong becomes a line on stderr and an exit code.
 
-Nothing is imported here that takes time: from the first moment on Ctrl-C ends the process without a traceback.
+Nothing is read from a file to import this: from the first moment on Ctrl-C ends the process without a traceback, and
+that no module can be opened is one line.
 """
-
-from __future__ import annotations
 
 import gc
 import os
 import sys
 from io import TextIOWrapper
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 IN_OUT, INTERRUPTED = 5, 130  # exit codes
 COLLECTED_EVERY = (50_000, 20, 100)  # objects, and rounds of them: a tree is no garbage, and walking it takes longest
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(arguments: list[str] | None = None) -> None:
     """Run the command line as a program of its own and exit with its status."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads that nothing here uses cost memory
     gc.set_threshold(*COLLECTED_EVERY)
     try:
         from frametool.cli.signals import with_signals
 
-        status = with_signals(run, sys.argv[1:] if arguments is None else list(arguments))
+        status = with_signals(run, sys.argv[1:] if arguments is None else arguments)
     except KeyboardInterrupt:
         status = INTERRUPTED
+    except (ImportError, OSError) as error:  # no module can be opened any more, nor those with better words
+        sys.stderr.write(f"frametool: {(getattr(error, 'strerror', None) or str(error)).lower()}\n")
+        status = IN_OUT
+    gc.freeze()  # on the way out nothing is looked through for garbage
     sys.exit(status)
 
 

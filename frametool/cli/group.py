@@ -14,8 +14,9 @@ from click.core import iter_params_for_processing
 
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
+from frametool.cli.signals import begin
 from frametool.cli.sink import writing
-from frametool.errors import SHOWN, alternatives, shown
+from frametool.errors import SHOWN, alternatives, did_you_mean, shown
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
@@ -205,6 +206,7 @@ class Group(WithHelp, click.Group):
         if cmd_name not in self.table:
             raise click.UsageError(f"no command {shown(cmd_name)}{alternatives(cmd_name, self.table, 'commands')}", ctx)
         found: click.Command = import_module(self.table[cmd_name][0]).command
+        begin()
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -298,6 +300,9 @@ def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
+    if isinstance(error, click.NoSuchOption):  # each version of click has its own words
+        name, near = error.option_name, error.possibilities or ()
+        message = f"no such option {shown(name)}{did_you_mean(name, near)}"
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
         message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():

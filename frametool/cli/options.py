@@ -28,9 +28,7 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 # an argument that begins like this is a number, whatever short options there are
-NEGATIVE = re.compile(
-    r"-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)", re.IGNORECASE
-)
+NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
 STREAMED = ("records", "rows", "arrays")
 READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
@@ -48,9 +46,9 @@ class Command(WithHelp, Reused):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers (-j is an option where joints are), give bare options their values, then parse."""
-        if any(map(NEGATIVE.match, args)):
+        if any(map(_is_negative, args)):
             options = {name for each in self.get_params(ctx) for name in each.opts}
-            args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
+            args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
         for option in {*OPTIONAL}.intersection(args):
             args = _with_value(args, option, *OPTIONAL[option])
         rest = super().parse_args(ctx, args)
@@ -75,6 +73,12 @@ class Command(WithHelp, Reused):
 OPTIONAL = {"--explain": ("text", "markdown", "latex"), "--rows": ("ate", "rpe", "kitti")}
 
 
+def _is_negative(argument: str) -> bool:
+    """Tell whether an argument begins as a number; most need no pattern for that, whose compiling takes longest."""
+    is_long = argument[:2] == "--" and argument[2:3].isalpha()
+    return argument[:1] == "-" and not is_long and re.match(NEGATIVE, argument) is not None
+
+
 def _with_value(args: list[str], option: str, *values: str) -> list[str]:
     """Join an option with the value behind it, or its usual one: click would take any argument there for its value."""
     joined = []
@@ -93,7 +97,7 @@ class Text(click.types.StringParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
         """Remove the blank."""
-        return value[1:] if value[:1] == " " and NEGATIVE.match(value[1:]) else value
+        return value[1:] if value[:1] == " " and _is_negative(value[1:]) else value
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
         """Return what the shell may complete, and what it means; None for names of files, which the shell knows."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import signal
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
@@ -20,17 +20,22 @@ class Terminated(BaseException):
 
 
 class _Signals:
-    """What the handler knows: whether a line is being written, and whether Ctrl-C came meanwhile."""
+    """What the handler knows: whether a command has begun, a line is being written, and Ctrl-C came meanwhile."""
 
+    begun = False
     writing = False
     interrupted = False
 
     def end(self, number: int, _frame: FrameType | None) -> None:
         """Raise what ends the run; the first Ctrl-C waits until the line that is being written is out."""
+        name = signal.Signals(number).name
+        if not self.begun and not self.writing:
+            # what is raised in the middle of an import may be printed there, and lost
+            os._exit(130 if number == signal.SIGINT else die_of(name))
         if number != signal.SIGINT:
             for each in ENDING:
                 signal.signal(each, signal.SIG_IGN)  # `timeout` sends it twice: nothing cuts the cleaning short
-            raise Terminated(signal.Signals(number).name)
+            raise Terminated(name)
         if self.interrupted or not self.writing:
             raise KeyboardInterrupt
         self.interrupted = True
@@ -51,6 +56,11 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
     finally:
         for number in caught:
             signal.signal(number, signal.SIG_DFL)
+
+
+def begin() -> None:
+    """Let Ctrl-C be raised from here on: a command may have something to clean up."""
+    _signals.begun = True
 
 
 @contextmanager

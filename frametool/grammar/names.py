@@ -19,13 +19,12 @@ PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # what a message's header says is
 NAME_KEYS = ("child_frame_id", "name")  # what a pose is the pose of
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
-_STAMP = re.compile(r"[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
-_UNIT = re.compile(r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$")
-_WHOLE_SECONDS = re.compile(r"(|.*[._])(?:secs?|seconds)")
+# compiled when first needed, not at start-up
+_STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?"
+_UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
+_WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
 _SECONDS = ("s", "sec", "seconds", "")
-_EARTH = re.compile(
-    r"[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|(?:lon(?:gitude)?|lng))(?:[_ ]?(?:deg|rad|e7))?\s*(?:[\[(].*)?", re.IGNORECASE
-)
+_EARTH = r"(?i)[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|(?:lon(?:gitude)?|lng))(?:[_ ]?(?:deg|rad|e7))?\s*(?:[\[(].*)?"
 
 
 def in_nanoseconds(name: str) -> bool:
@@ -35,7 +34,7 @@ def in_nanoseconds(name: str) -> bool:
     """
     if name in NANOSECONDS:
         return True
-    found = _UNIT.search(name.lower())
+    found = re.search(_UNIT, name.lower())
     unit = (found[1] or found[2] or "") if found else ""
     if unit in ("ns", *_SECONDS):
         return unit == "ns"
@@ -44,7 +43,7 @@ def in_nanoseconds(name: str) -> bool:
 
 def stamp_column(names: Iterable[str] | None) -> int | None:
     """Return the place of the first column that is called as stamps are, in a unit that is known."""
-    return next((at for at, name in enumerate(names or ()) if _STAMP.fullmatch(name) and _is_known(name)), None)
+    return next((at for at, name in enumerate(names or ()) if re.fullmatch(_STAMP, name) and _is_known(name)), None)
 
 
 def stamp_places(names: Iterable[str] | None) -> tuple[int | None, int | None]:
@@ -58,7 +57,7 @@ def stamp_places(names: Iterable[str] | None) -> tuple[int | None, int | None]:
 
 def nanoseconds_beside(names: Sequence[str], place: int) -> int | None:
     """Return the place of the nanoseconds that go with a column of whole seconds: `header.stamp.sec`, `..nanosec`."""
-    found = _WHOLE_SECONDS.fullmatch(names[place].lower())
+    found = re.fullmatch(_WHOLE_SECONDS, names[place].lower())
     folded = [name.lower() for name in names] if found else []
     wanted = [f"{found[1]}{part}" for part in ("nanosec", "nanosecs", "nsec", "nsecs", "nanoseconds")] if found else []
     return next((folded.index(name) for name in wanted if name in folded), None)
@@ -74,7 +73,7 @@ def _is_known(name: str) -> bool:
 
 def on_earth(names: Iterable[str]) -> str:
     """Return what to say of names that are a latitude and a longitude, which are no position here; "" without both."""
-    found = {match[1] is None: name for name in names if (match := _EARTH.fullmatch(name))}
+    found = {match[1] is None: name for name in names if (match := re.fullmatch(_EARTH, name))}
     if len(found) < 2:
         return ""
     named = f"{shown(found[False])} and {shown(found[True])}"

@@ -113,7 +113,7 @@ class Header:
             self._take_apart(place, name.lstrip("# ") if place == 0 else name)
 
     def _take_apart(self, place: int, name: str) -> None:
-        bracket = BRACKETS.search(name)
+        bracket = re.search(BRACKETS, name)
         bare = name[: bracket.start()] if bracket else name
         folded = bare.lower() if bare.isascii() else bare
         for token in TOKEN.finditer(folded):
@@ -443,7 +443,7 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
 
 def find_six(names: Sequence[str], kind: str) -> Columns | None:
     """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where told so."""
-    folded = [re.sub(r"[./]", "_", BRACKETS.sub("", name).strip().lower()) for name in names]
+    folded = [re.sub(r"[./]", "_", re.sub(BRACKETS, "", name).strip().lower()) for name in names]
     for each in SIX if kind == "" else (kind,):
         for base in [six_names(each), *(base.split() for base in LETTERS[each] * bool(kind))]:
             for prefix in [name.removesuffix(base[0]) for name in folded if re.fullmatch(f"(.*_)?{base[0]}", name)]:
@@ -526,7 +526,7 @@ def wholes_of(given: Notation | None) -> list[Notation]:
 def _chosen(header: Header, places: Sequence[int]) -> Match:
     """Take columns as they were chosen, with the units that their names say."""
     bare = [header.names[place] for place in places]
-    units = [bracket[1] if (bracket := BRACKETS.search(name)) else _unit_at_end(name) for name in bare]
+    units = [bracket[1] if (bracket := re.search(BRACKETS, name)) else _unit_at_end(name) for name in bare]
     return Match(tuple(zip(places, units, strict=True)), "", "")
 
 

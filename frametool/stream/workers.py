@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     Process = Callable[[bytes], Outcome]
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 MOST_WAITING = 2  # blocks a worker may have ahead, so that it never waits for its parent
 PLACES = 3  # for blocks, a worker: those ahead and one whose result waits for its turn; memory stays flat
 PLACE_BYTES = 4 * BLOCK_BYTES  # memory of which no more is used than is written; what is larger goes by the socket

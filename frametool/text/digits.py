@@ -98,10 +98,13 @@ def first_point(characters: Words) -> Ints:
     found = others - _ONES
     found &= ~others
     found &= _HIGH
-    # The bits below the lowest one set: eight for each byte before it, and seven; all 64 if none is set.
+    # The bits below the lowest one set: the highest of each byte before it; those of all eight if none is set.
     below = ~found & (found - np.uint64(1))
-    places: Ints = (np.bitwise_count(below) >> 3).astype(np.int64)
-    return places
+    below >>= np.uint64(7)
+    below &= _ONES
+    below *= _ONES  # the highest byte is their sum
+    below >>= np.uint64(56)
+    return below.view(np.int64)
 
 
 @cache

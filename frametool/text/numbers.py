@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0, "um": 1e6}  # how many make a metre
 ANGLES = {"deg": True, "degree": True, "degrees": True, "°": True, "rad": False, "radian": False, "radians": False}
-BRACKETS = re.compile(r"(?<!\s)\s*+[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$")
+BRACKETS = r"(?<!\s)\s*+[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 
 
 # float() reads more than a decimal number (blanks, underscores, nan, other scripts' digits), but nothing else of these

@@ -315,7 +315,7 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
     holder, dot, rest = name.partition(".")
     if dot and holder in _HOLDERS:
         return _with_unit(rest, joints)
-    match = BRACKETS.search(name) or _UNIT.search(name)
+    match = re.search(BRACKETS, name) or _UNIT.search(name)
     return (name[: match.start()], match[1]) if match else (name, "")
 
 
