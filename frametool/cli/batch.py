@@ -25,7 +25,8 @@ from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, alternatives
 from frametool.grammar.rotation_spelling import ROTATION_KEYS
 from frametool.stream.faults import ROWS_SKIPPED, Misused, RowsSkipped
-from frametool.stream.record import PARTS, POINT_KEYS
+from frametool.stream.record import POINT_KEYS
+from frametool.stream.row_layout import PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -203,7 +203,7 @@ def poses_from(argument: str | Source, request: Request) -> list[Pose]:
     """Read the poses of one argument: inline, `-` for standard input, or a file."""
     from frametool.stream.record_values import read_poses
 
-    return list(_read(argument, request, partial(read_poses, degrees=request.degrees, normalize=request.normalize)))
+    return list(_read(argument, request, partial(read_poses, asked=request)))
 
 
 def values_of(arguments: Sequence[str | Source], request: Request, output: Output) -> Iterator[Result | dict[str, Any]]:
@@ -280,6 +280,9 @@ def combinations(arguments: Sequence[str | Factor], request: Request) -> list[tu
     factors = [Factor(each) if isinstance(each, str) else each for each in arguments]
     if [each.argument for each in factors].count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
+    from frametool.stream.request import COMBINED
+
+    request = request._replace(operation=COMBINED)
     read = [list(map(each.of, poses_from(each.argument, request))) for each in factors]
     several = [f"{factor.argument} ({len(poses)})" for factor, poses in zip(factors, read, strict=True) if poses[1:]]
     if len(several) > 1:

@@ -25,10 +25,9 @@ from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import looked_up, looked_up_across
 from frametool.grammar.result import Result, Style, carries_position, pose_numbers
-from frametool.stream.record import PARTS
 from frametool.stream.record_values import documents
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_layout import POSE
+from frametool.stream.row_layout import PARTS, POSE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -42,6 +42,7 @@ class Pose(NamedTuple):
     rotation: Quaternion | None = None
     name: str | None = None
     parent: str | None = None
+    stamp_ns: int | None = None
 
     @classmethod
     def of(cls, components: Sequence[float], name: str | None = None, parent: str | None = None) -> Pose:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from math import isfinite
 
-from frametool.errors import LookupFailed, ValueInvalid, shown
+from frametool.errors import LookupFailed, ValueInvalid, shown, warn
 from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -53,6 +53,7 @@ def inverse(pose: Pose) -> Pose:
         None if pose.rotation is None else components[3:],
         pose.parent,
         pose.name,
+        pose.stamp_ns,
     )
 
 
@@ -63,9 +64,17 @@ def relative(a: Pose, b: Pose) -> Result:
     """
     components = rigid.relative(*a.components, *b.components)
     distance, angle = rigid.extent(*components, floats)
-    extras = dict(zip(RELATIVE_EXTRAS, (distance, angle, math.degrees(angle)), strict=True))
+    extras = dict(zip(RELATIVE_EXTRAS, (distance, angle, math.degrees(angle)), strict=True)) | common_stamp([a, b])
     parent, name = relative_names(a, b)
     return Result(Pose.of(components, name, parent), extras)
+
+
+def common_stamp(poses: Sequence[Pose]) -> dict[str, int]:
+    """Return the time that poses say; nothing where none does, and, which is told, where they differ."""
+    stamps = {pose.stamp_ns for pose in poses if pose.stamp_ns is not None}
+    if len(stamps) > 1:
+        warn("the stamps of the poses differ: the result has none")
+    return {"stamp_ns": stamps.pop()} if len(stamps) == 1 else {}
 
 
 def relative_names(a: Pose, b: Pose) -> tuple[str | None, str | None]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from contextlib import suppress
 from functools import cached_property, partial
 from itertools import count, islice
 from typing import TYPE_CHECKING, Any
@@ -20,9 +21,9 @@ from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.readers import Misfit, tell
 from frametool.grammar.result import Result
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
-from frametool.stream.record import PARTS, STALE, placed, value_at
+from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.request import Memory, Request
-from frametool.stream.row_layout import POSE, ROTATION, checked_rotation
+from frametool.stream.row_layout import PARTS, POSE, ROTATION, checked_rotation
 from frametool.stream.splice import target_of
 from frametool.stream.template import cut, edits_of, filled
 
@@ -45,14 +46,18 @@ MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
 
-def read_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
+def read_poses(source: Source, asked: Request) -> list[Pose]:
     """Return every pose of a text, in order; at least one.
 
-    degrees: the unit of bare angles.  normalize: accept any non-zero quaternion and any matrix near a rotation.
+    asked: the unit of bare angles, what counts as a rotation, the operation, which may not take all that records say
     Raises FormatError with the place.
     """
-    request = Request(kind=POSE, degrees=degrees, normalize=normalize)
-    poses = [pose_of(record, request) for _, records in documents(source, request) for record in records]
+    request = Request(asked.operation, kind=POSE, degrees=asked.degrees, normalize=asked.normalize)
+    poses = [
+        pose_of(record, request)._replace(stamp_ns=_stamp_of(record, document))
+        for document, records in documents(source, request)
+        for record in records
+    ]
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
     return poses
@@ -66,7 +71,7 @@ def pose_of(record: Record, request: Request) -> Pose:
         rotation, _ = checked_rotation(shape, record.values, normalize=request.normalize)
     placed_at = shape.whole or shape.unit is not None
     pose = Pose(shape.position(record.values) if placed_at else None, rotation, record.name.text, record.parent.text)
-    return inverted(pose) if record.inverse else pose
+    return inverted(pose) if shape.inverse else pose
 
 
 class Teller:
@@ -276,6 +281,15 @@ def _with_stamp_ns(extras: dict[str, Any], *, keeps: bool) -> dict[str, Any]:
 
     text = f"{extras['stamp_ns']}ns" if "stamp_ns" in extras else str(extras.pop("stamp"))
     return extras | {"stamp_ns": parse_stamp(text)}
+
+
+def _stamp_of(record: Record, document: Document) -> int | None:
+    """Return the time of a record: that of its header, or what stands beside it; None for what is no time."""
+    value = value_at(document.value, record.path[1:])
+    beside = {key: value[key] for key in ("stamp_ns", "stamp") if type(value) is dict and type(value.get(key)) is str}
+    with suppress(ValueInvalid):
+        return (_with_stamp_ns(beside, keeps=False) | _header_stamp(record)).get("stamp_ns")
+    return None
 
 
 def _used_keys(record: Record) -> set[str]:

@@ -84,14 +84,10 @@ def each_way(run: Run, operation: str, kind: str, forms: Iterable[str]) -> Itera
 
 
 SAME, NAMED, TIMED = range(3)
-EARLIER = "stamps: the stamp of a record among the arguments of compose and relative is dropped"
-STAMPED = ", ".join(name for name, kind in KINDS.items() if kind.stamp_ns is not None)
 INSIDE = "names: an inverse streamed as messages has its name inside the pose, where messages have none"
 SEAMS: list[tuple[str, int, str, str, str]] = [
     ("writing: a table of points is refused as JSON", SAME, "convert", "point, PointStamped, position, flat point", "table"),
-    ("evaluating: among arguments a covariance is dropped where a stream refuses it", SAME, "compose", ", ".join(WITH_COVARIANCE), "argument, file"),
     (INSIDE, NAMED, "invert", "PoseStamped, PoseArray, Path", "lines"),
-    (EARLIER, TIMED, "compose, relative", STAMPED, "argument, file"),
 ]
 
 

@@ -11,7 +11,7 @@ from frametool.cli.explaining import PoseTask, explain_options, pose_stream_opti
 from frametool.cli.options import TEXT, Command, pose_result_options
 from frametool.cli.poses import combinations, factors_of, one_pose
 from frametool.grammar.pose import Pose
-from frametool.grammar.pose_algebra import product
+from frametool.grammar.pose_algebra import common_stamp, product
 from frametool.grammar.result import Result
 
 
@@ -45,18 +45,19 @@ def command(poses: tuple[str, ...], **options: Any) -> int:
     if "-" not in given:
         if task.stream.path:
             raise click.UsageError("-i FILE is read where - stands among the poses")
-        task.output.poses([Result(reduce(product, each)) for each in combinations(factors, task.request())])
+        found = combinations(factors, task.request())
+        task.output.poses([Result(reduce(product, each), common_stamp(each)) for each in found])
         return 0
     if given.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
     at = given.index("-")
     rows = factors[at]
-    request = task.request()
+    from frametool.stream.request import COMBINED, Operation
+
+    request = task.request(operation=COMBINED)
     left, right = (
         [each.of(one_pose(each.argument, request)) for each in side] for side in (factors[:at], factors[at + 1 :])
     )
-    from frametool.stream.request import Operation
-
     before = reduce(product, left) if left else None
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:

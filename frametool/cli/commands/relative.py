@@ -94,7 +94,7 @@ def command(
 
 def _with_rows(a: str | None, b: str | None, plain: Request) -> Request:
     """Compare a stream's rows with a fixed A or B, or with the row's own second pose."""
-    from frametool.stream.request import Operation
+    from frametool.stream.request import COMBINED, Operation
 
     if b is None:
         if a not in (None, "-"):
@@ -103,7 +103,7 @@ def _with_rows(a: str | None, b: str | None, plain: Request) -> Request:
     if a == b == "-":
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     first = a != "-"
-    fixed = one_pose(str(a if first else b), plain)
+    fixed = one_pose(str(a if first else b), plain._replace(operation=COMBINED))
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         own = Pose(name=name, parent=parent)
