@@ -90,6 +90,7 @@ def _values(source: Source, scope: Scope) -> Term | None:
     """Read the poses or points of a document; None for a tree."""
     from frametool.documents.document import parse_documents
     from frametool.stream.record_values import read_poses
+    from frametool.stream.request import Request
 
     documents = [document.value for document in parse_documents(source.text, source.name)]
     if any(type(each) is dict and not OF_TREES.isdisjoint(each) for each in documents):
@@ -99,7 +100,7 @@ def _values(source: Source, scope: Scope) -> Term | None:
             return literal(documents[0], scope.reading(source))
         except Misfit as misfit:
             raise misfit.placed(source, 0) from None
-    poses = read_poses(source, degrees=scope.degrees, normalize=scope.normalize)
+    poses = read_poses(source, Request(degrees=scope.degrees, normalize=scope.normalize))
     if not poses:
         raise FormatError("nothing in it", source=source.name)
     items = tuple(map(term_of_pose, poses))

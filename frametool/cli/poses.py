@@ -203,7 +203,7 @@ def poses_from(argument: str | Source, request: Request) -> list[Pose]:
     """Read the poses of one argument: inline, `-` for standard input, or a file."""
     from frametool.stream.record_values import read_poses
 
-    return list(_read(argument, request, partial(read_poses, degrees=request.degrees, normalize=request.normalize)))
+    return list(_read(argument, request, partial(read_poses, asked=request)))
 
 
 def values_of(arguments: Sequence[str | Source], request: Request, output: Output) -> Iterator[Result | dict[str, Any]]:
@@ -293,13 +293,16 @@ class Given(NamedTuple):
 
 
 def _given(argument: str, request: Request) -> Given:
-    """Read all poses of one argument; warnings are kept, not told."""
+    """Read all poses of one of several arguments; warnings are kept, not told, a covariance is refused."""
     from frametool.stream.record_values import read_given
+    from frametool.stream.request import COMBINED
 
+    request = request._replace(operation=COMBINED)
     odd: list[tuple[Any, ...]] = []
     with heard_by(lambda *said: odd.append(said)):
-        read = partial(read_given, degrees=request.degrees, normalize=request.normalize)
-        found: list[Given] = [*_read(argument, request, lambda source: [Given(source, *read(source), odd)])]
+        found: list[Given] = [
+            *_read(argument, request, lambda source: [Given(source, *read_given(source, request), odd)])
+        ]
     return found[0]
 
 

@@ -284,7 +284,7 @@ class Stream:
         from frametool.stream.record_values import read_poses, results
 
         if request.gathered is not None:
-            request.gathered.add(read_poses(source, degrees=request.degrees, normalize=request.normalize))
+            request.gathered.add(read_poses(source, request))
             return 0
         request = request._replace(notations=request.notations or output.notations)
         output.values(results(source, request, output.style))

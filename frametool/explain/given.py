@@ -96,7 +96,7 @@ def given_poses(source: Source, *, degrees: bool = False, normalize: bool = Fals
 def given_of(record: Record, request: Request) -> Given:
     """Return a record as it is written."""
     shape, form = record.shape, record.shape.notation
-    given = Given(pose_of(record, request), form, position=shape.position(record.values), inverse=record.inverse)
+    given = Given(pose_of(record, request), form, position=shape.position(record.values), inverse=shape.inverse)
     if form is None:
         return given
     return given._replace(

@@ -90,8 +90,8 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     timed = request.timed
     if timed is not None and timed.name:
         stamp = (_beside(key_path, document, record, timed.name),)
-    elif timed is not None and record.stamp and timed.moves(record.parent.text):
-        stamp = record.stamp
+    elif timed is not None and record.stamps and timed.moves(record.parent.text):
+        stamp = record.stamps[:2]
     elif timed is not None and request.operation.formula is not None:
         stamp = (_beside(stamp_keys, document, record),)
     elif request.extra_column is not None:
@@ -110,7 +110,7 @@ def _path_beside(document: Document, record: Record, name: str) -> tuple[Path, .
     if name:
         return (_beside(key_path, document, record, name),)
     try:
-        return record.stamp or (_beside(stamp_keys, document, record),)
+        return record.stamps[:2] or (_beside(stamp_keys, document, record),)
     except Misfit:
         usual = ", ".join(STAMP_KEYS)
         raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path) from None

@@ -25,19 +25,7 @@ from frametool.grammar.pose import (
 )
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
-from frametool.stream.row_layout import (
-    ACCEL,
-    ATTITUDE,
-    PARTS,
-    POINT,
-    POSE,
-    SIX,
-    TURN,
-    VECTOR,
-    Shape,
-    checked_rotation,
-    doubt,
-)
+from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import NotFinite, parse_number, read_number_or_angle
 
@@ -60,7 +48,7 @@ XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
 UNKNOWN = -1.0  # as a covariance begins in ROS, where nothing is known of it, nor of what it would be of
 QUATERNION = (*XYZ, "w")
-USED = KNOWN.union(ROTATION_KEYS, (AXES_KEY,), COVARIANCES, *PARTS.values())
+USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY,), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
 KEYS_REMEDY = "name the keys _deg"
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
@@ -82,8 +70,9 @@ class Record(NamedTuple):
     key: the key of the position; "" where each of its numbers is a member of the record, whose keys are `members`
     rotation: the key of the rotation; others: further keys that say the same rotation
     flat: keys that hold one number of the rotation each; `rotation` is then the first of them
-    covariances: the keys of those whose numbers come last; unknown: where one begins with -1, which decides that
-    stamps: the paths of seconds and nanoseconds in its header, then of those around it; stamp_ns: the time of the first
+    covariances: the keys of those whose numbers come last; known: where each begins, which -1 would make one of those
+    unknown: where a covariance begins that is none, and decides that
+    stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the time of the first
     """
 
     path: Path
@@ -98,19 +87,10 @@ class Record(NamedTuple):
     name: Name = Name()
     parent: Name = Name()
     covariances: tuple[str, ...] = ()
+    known: tuple[Path, ...] = ()
     unknown: tuple[Path, ...] = ()
     stamps: tuple[Path, ...] = ()
     stamp_ns: int | None = None
-
-    @property
-    def stamp(self) -> tuple[Path, ...]:
-        """Return the paths of seconds and nanoseconds of its own time."""
-        return self.stamps[:2]
-
-    @property
-    def inverse(self) -> bool:
-        """Tell whether what is written is the inverse of the pose."""
-        return self.shape.inverse
 
 
 class Place(NamedTuple):
@@ -226,19 +206,14 @@ def _refuse_half(value: dict[str, Any], found: Sequence[Place], path: Path, stay
     """Stop where something beside what moves is given in the same frame, or may be, and would stay as it is."""
     header = value.get("header")
     is_message = type(header) is dict and "frame_id" in header
+    if is_message and not found:
+        what = "a position on the Earth" if "latitude" in value else "a message"
+        fields = _named_keys([key for key in value if key != "header"])
+        raise Misfit(f"{what} that cannot be moved whole: its fields are {fields}; see help records", path)
     used = {"header", *stays}.union(*((*each.path[len(path) :][:1], each.field, *each.covariances) for each in found))
     if any(each.path == path and not each.field for each in found):
         used |= USED
-    if is_message and not found:
-        what = "a position on the Earth" if "latitude" in value else "a message"
-        said = f"{what} that cannot be moved whole: its fields are {_named_keys([*value][1:])}"
-        raise Misfit(f"{said}; see help records", path)
-    rest = [
-        key
-        for key, each in value.items()
-        if (key not in used and _is_geometry(each, doubtful=is_message or key.endswith("covariance")))
-        or (key == "name" and is_message and type(each) is list)  # of joints, whose positions are no point
-    ]
+    rest = [key for key, each in value.items() if key not in used and _is_geometry(key, each, doubtful=is_message)]
     if found and rest:
         given = f"{_named_keys(rest, 2)} may be given in a frame that changes, and would stay"
         raise Misfit(f"{given}; leave out what does not move, see help records", (*path, rest[0]), key=True)
@@ -249,32 +224,34 @@ def _named_keys(keys: Sequence[str], most: int = MOST_KEYS) -> str:
     return ", ".join(map(shown, keys[:most])) + f" and {len(keys) - most} more" * (len(keys) > most)
 
 
-def _is_geometry(value: Any, *, doubtful: bool) -> bool:
-    """Tell whether a value may be given in a frame: it has x, y, z; if doubtful also x and y, or a list of numbers."""
+def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:
+    """Tell whether a value may be given in a frame: it has x, y, z; if doubtful also x and y, or a list of numbers.
+
+    The names in a list are those of joints, whose positions are no point.
+    """
     if type(value) is dict:
-        axes = XYZ[:2] if doubtful else XYZ
-        return value.keys() >= {*axes} or any(_is_geometry(each, doubtful=doubtful) for each in value.values())
+        axes = {*XYZ[: 3 - doubtful]}
+        return value.keys() >= axes or any(_is_geometry(at, each, doubtful=doubtful) for at, each in value.items())
     if type(value) is not list:
         return False
-    numbers = sum(type(each) is str and each[:1] in NUMBER_BEGINS for each in value[:MOST_KEYS])
-    return (doubtful and numbers > 1) or any(_is_geometry(each, doubtful=doubtful) for each in value[:MOST_KEYS])
+    some = value[:MOST_KEYS]
+    numbers = sum(type(each) is str and each[:1] in NUMBER_BEGINS for each in some)
+    is_it = (numbers > 1 and (doubtful or key.endswith("covariance"))) or (doubtful and key == "name")
+    return is_it or any(_is_geometry(key, each, doubtful=doubtful) for each in some)
 
 
 def _search_inside(
     value: dict[str, Any], path: Path, outer: tuple[Path, ...], request: Request, stays: Sequence[str]
 ) -> Iterator[Place]:
     """Yield what the known keys of a message hold."""
-    inner = [key for key in INNER if key not in stays and type(value.get(key)) in (dict, list)]
-    inner += [key for key in LISTS if key not in stays and _holds_mappings(value.get(key))]
-    held = {key: list(_search(value[key], (*path, key), (*outer, path), request)) for key in inner}
+    inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
+    if request.operation.moves:
+        inner += [key for key in LISTS if _is_geometry(key, value.get(key), doubtful=False)]
+    held = {key: list(_search(value[key], (*path, key), (*outer, path), request)) for key in inner if key not in stays}
     found = {key: each for key, each in held.items() if each}
     if found:
         _refuse_several(value, list(found), path)
     yield from chain.from_iterable(found.values())
-
-
-def _holds_mappings(value: Any) -> bool:
-    return type(value) is dict or (type(value) is list and any(type(each) is dict for each in value))
 
 
 def _holds_numbers(value: dict[str, Any]) -> bool:
@@ -287,11 +264,6 @@ def _holds_numbers(value: dict[str, Any]) -> bool:
         return _flat_pose(value, []) is not None
     except Misfit:
         return True  # half a rotation, or two: reading it says so
-
-
-def _scalars(value: dict[str, Any]) -> list[str]:
-    """Name the members that may be numbers of ours."""
-    return [key for key, each in value.items() if type(each) not in (dict, list) and key not in NOTHING_BUT]
 
 
 def _is_holder(value: dict[str, Any]) -> bool:
@@ -412,7 +384,7 @@ def _of_message(value: Any, place: Place, path: Path, reading: Reading, request:
     if kind == VECTOR:
         return _with_position(Record(path, Shape(kind), key=field), value[field], 1.0, partial=False)
     known = value.get(place.covariances[0])
-    if kind == ATTITUDE and known and within(place.covariances, _entries, known, (9,))[1][0] == UNKNOWN:
+    if known and within(place.covariances, _entries, known, (9,))[1][0] == UNKNOWN:
         return Record(path, Shape("", None), rotation=field)
     reading.degrees = request.degrees
     within((field,), read_rotation, field, value[field], reading)
@@ -439,9 +411,10 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     positions = [key for key in value if key in POINT_KEYS and _holds(key, value[key])]
     rotations = [key for key, each in value.items() if _is_rotation(key, each)]
     flat = _flat_pose(value, rotations)
-    if len(positions) > 1 and not _is_pose(positions, rotations or (flat and flat.rotation)):
-        raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
+    # the grammar of poses allows that several say the same thing twice
+    if len(positions) > 1 and not (turned and POSITION_KEYS.keys() >= {*positions}):
+        raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
     formula = request.operation.formula
     if not there and "header" not in value and (formula is None or formula.reads_row) and (problem := on_earth(value)):
         raise Misfit(problem)
@@ -463,11 +436,6 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     return record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
 
 
-def _is_pose(positions: Sequence[str], rotation: object) -> bool:
-    """Tell whether several positions may say the same thing twice, as the grammar of poses allows."""
-    return bool(rotation) and POSITION_KEYS.keys() >= set(positions)
-
-
 def _is_inverse(value: dict[str, Any]) -> bool:
     flag = value.get("inverse", "false")
     if flag not in ("true", "false"):
@@ -478,7 +446,7 @@ def _is_inverse(value: dict[str, Any]) -> bool:
 def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request) -> Record:
     """Read a twist or a wrench."""
     if request.kind not in ("", name) or not request.operation.moves:
-        raise Misfit(f"a {name} cannot be taken for a {request.kind or POSE}")
+        raise NotARotation(f"a {name} cannot be taken for a {request.kind or POSE}")
     numbers = [number for part in PARTS[name] for number in within((part,), read_numbers, value[part], XYZ)]
     paths = tuple(
         (*path, part, *(step if type(value[part]) is list else (axis,)))
@@ -527,7 +495,8 @@ def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | Non
 
     None where there is neither.  Raises Misfit for half a rotation, for two of them, and for a unit that is not known.
     """
-    names = _scalars(value)
+    # the members that may be numbers of ours
+    names = [key for key, each in value.items() if type(each) not in (dict, list) and key not in NOTHING_BUT]
     if not names:
         return None
     from frametool.stream.header import Columns, PoseColumns, plain_pose
@@ -668,7 +637,7 @@ def _with_covariances(record: Record, document: Any, place: Place, above: Path, 
     if there and (not operation.moves or operation.formula is not None or shape.inverse):
         what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
         raise Misfit(what, (*around, there[0]))
-    allowed = (36,) if shape.kind in SIX else (36, 9) if shape.kind == POSE else (9,)
+    allowed = (36,) if shape.kind in PARTS else (36, 9) if shape.kind == POSE else (9,)
     for key in there:
         below = (*around, key)
         places, numbers = within(below, _entries, holder[key], allowed)
@@ -679,6 +648,7 @@ def _with_covariances(record: Record, document: Any, place: Place, above: Path, 
         record = record._replace(
             shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
             numbers=record.numbers + paths, values=(*record.values, *numbers), covariances=(*record.covariances, key),
+            known=(*record.known, paths[0]),
         )  # fmt: skip
     return record
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import TypeAlias
 
-    from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part, Splitter
     from frametool.text.spans import Bytes, Ints
@@ -283,14 +282,11 @@ class RecordBlocks:
             timed=template.timed(request),
             beside=template.beside if request.extra_column is not None else "",
             gathered=request.gathered,
-            remedies=tuple(_remedy(entry.record) for entry in template.entries),
+            remedies=tuple(
+                KEYS_REMEDY if record.flat else f"write {record.rotation}_deg" for record, *_ in template.entries
+            ),
             sources=tuple(entry.record.parent.text for entry in template.entries),
         )
-
-
-def _remedy(record: Record) -> str:
-    """Say how a record names an angle in degrees."""
-    return KEYS_REMEDY if record.flat else f"write {record.rotation}_deg"
 
 
 def _is_text(block: bytes) -> bool:

@@ -47,18 +47,18 @@ MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
 
-def read_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Pose]:
+def read_poses(source: Source, asked: Request) -> list[Pose]:
     """Return every pose of a text, in order; at least one.
 
-    degrees: the unit of bare angles.  normalize: accept any non-zero quaternion and any matrix near a rotation.
+    asked: the unit of bare angles, what counts as a rotation, the operation, which may not take all that records say
     Raises FormatError with the place.
     """
-    return read_given(source, degrees=degrees, normalize=normalize)[0]
+    return read_given(source, asked)[0]
 
 
-def read_given(source: Source, *, degrees: bool = False, normalize: bool = False) -> tuple[list[Pose], set[str]]:
+def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     """Return every pose of a text as `read_poses` does, and the keys that stand beside any of them."""
-    request = Request(kind=POSE, degrees=degrees, normalize=normalize)
+    request = Request(asked.operation, kind=POSE, degrees=asked.degrees, normalize=asked.normalize)
     poses: list[Pose] = []
     beside: set[str] = set()
     nodes: list[Node] = []
@@ -92,7 +92,7 @@ def pose_of(record: Record, request: Request) -> Pose:
         rotation, _ = checked_rotation(shape, record.values, normalize=request.normalize)
     placed_at = shape.whole or shape.unit is not None
     pose = Pose(shape.position(record.values) if placed_at else None, rotation, record.name.text, record.parent.text)
-    return inverted(pose) if record.inverse else pose
+    return inverted(pose) if shape.inverse else pose
 
 
 class Teller:

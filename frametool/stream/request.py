@@ -230,6 +230,9 @@ class Operation(NamedTuple):
         return poses[0], poses[1]
 
 
+COMBINED = Operation(of="arguments")  # with each other, outside of here; they are only read
+
+
 def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
     """Return the pose that numbers say, which may be the inverse of what is written."""
     pose = pose_of(shape.position(own), rotation(own))

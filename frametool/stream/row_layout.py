@@ -22,7 +22,7 @@ ROTATION = "rotation"  # without a position, which no move gives it
 ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a world that stands
 TURNED = (POSE, ROTATION, ATTITUDE)
 PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
-SIX = (TWIST, WRENCH, ACCEL)  # two vectors, linear part first
+SIX = tuple(PARTS)  # two vectors, linear part first
 MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbers come first
     "": lambda *_: (),
     POINT: rigid.apply,

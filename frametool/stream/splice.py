@@ -122,7 +122,7 @@ class Splicer:
         shape, target = self.record.shape, self.target
         same = [(shape.notation, shape.degrees)] == list(target.notations) if shape.notation else not target.notations
         is_alone = self.record.flat == QUATERNION and target.unit is not None  # x y z w stand for nothing beside xyz
-        return same and shape.whole == target.whole and not (self.record.inverse or is_alone)
+        return same and shape.whole == target.whole and not (self.record.shape.inverse or is_alone)
 
     def _numbers(self, slots: Sequence[int], first: int) -> list[Edit]:
         """Put numbers of the result where the slots are."""
@@ -160,7 +160,7 @@ class Splicer:
     def _position_stays(self) -> bool:
         """Tell whether only the notation of the rotation changes: then the position keeps its text."""
         request = self.request
-        return request.operation.keeps_position and not self.record.inverse
+        return request.operation.keeps_position and not self.record.shape.inverse
 
     def _rotation(self) -> None:
         """Write the rotation where it stands, or its members anew."""

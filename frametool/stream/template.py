@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from frametool.grammar.readers import Note, Path
     from frametool.stream.answers import Answer, Entry
-    from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
     from frametool.stream.splice import Edit
@@ -91,8 +90,9 @@ class Template:
         self._root = root
         self._request = request
         slots = [_inside(root, path) for entry in entries for path in entry.record.numbers]
-        known = {_inside(root, path) for entry in entries for path in _first_entries(entry.record)}
-        stamps = [[_span(root, path) for path in entry.stamp] for entry in entries]
+        known = {_inside(root, path) for entry in entries for path in entry.record.known}
+        held = [[root.at(path) for path in entry.stamp] for entry in entries]
+        stamps = [[(node.start, node.end) for node in each] for each in held]
         number = re.compile(JSON_NUMBER if json else YAML_NUMBER)
         self.regular = all(slot is not None and number.fullmatch(text, *slot) for slot in slots)
         self.values = tuple(value for entry in entries for value in entry.record.values)
@@ -241,26 +241,12 @@ def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
         yield path, node
 
 
-def _first_entries(record: Record) -> Iterator[Path | None]:
-    """Yield the places of the first number of each covariance."""
-    at = record.shape.own_size
-    for size in record.shape.covariance:
-        yield record.numbers[at]
-        at += size
-
-
 def _inside(root: Node, path: Path | None) -> tuple[int, int] | None:
     """Return where a number stands, without its quotes; None for one that is not written."""
     if path is None:
         return None
     node = root.at(path)
     return node.start + bool(node.quote), node.end - bool(node.quote)
-
-
-def _span(root: Node, path: Path) -> tuple[int, int]:
-    """Return where a scalar stands, with its quotes."""
-    node = root.at(path)
-    return node.start, node.end
 
 
 def cut(

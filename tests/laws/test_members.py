@@ -84,7 +84,7 @@ def test_nothing_computed_is_a_negative_zero(run: Run, notation: str, rows: int,
 
 
 NO_POSE = {
-    "argument": "reading: an argument that parses and is no pose ends with 2",
+    "argument": "",
     "file": "reading: a record with a frame and a twist or wrench is taken for a calibration of Autoware",
     "line": "reading: a record with a frame and a twist or wrench is taken for a calibration of Autoware",
     "array": "",

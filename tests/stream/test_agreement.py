@@ -178,7 +178,7 @@ def test_an_argument_has_the_numbers_of_a_line(kind: str, wanted: str) -> None:
         return
     (mine,) = results(Source("argument", text), request, Style("json", request.notations))
     if isinstance(mine, Result):
-        (again,) = read_poses(Source("line", line.text.decode()))
+        (again,) = read_poses(Source("line", line.text.decode()), Request())
         x, y, z, *turned = mine.pose.components
         assert again.components in ((x, y, z, *turned), (x, y, z, *(0.0 - part for part in turned)))
     else:
