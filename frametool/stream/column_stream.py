@@ -100,7 +100,7 @@ class ColumnRows:
         self.faults: list[Fault] = []
         self.notes: list[RowNote] = []
         self.mended = 0
-        self.narrow = self._narrow()
+        self.narrow = {} if request.all_numbers else self._narrow()  # all of them are written as doubles
         self.numbers = sum(isinstance(column, New) for column in self.layout.columns)
 
     @property
@@ -126,12 +126,12 @@ class ColumnRows:
             return self.columns()
         targets = self.plan.targets
         names = [name for each in targets for name in (*XYZ[: 3 * (each.unit is not None)], *each.names)]
-        return [
-            column._replace(
-                name=names[given.number] if isinstance(given, New) and given.number < len(names) else f"column_{at}"
-            )
-            for at, (column, given) in enumerate(zip(self.columns(), self.layout.columns, strict=True), 1)
-        ]
+        kept = dict(zip(self.layout.places, names, strict=False))
+        found = []
+        for at, (column, given) in enumerate(zip(self.columns(), self.layout.columns, strict=True), 1):
+            ours = dict(enumerate(names)).get(given.number) if isinstance(given, New) else kept.get(given.place)
+            found.append(column._replace(name=ours or f"column_{at}"))
+        return found
 
     def _name(self, place: int) -> str:
         return self.table.names[place] if self.table.names else ""

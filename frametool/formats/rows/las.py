@@ -17,6 +17,7 @@ import numpy as np
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, warn
 from frametool.formats.rows.column_file import (
     MOST_ROWS,
+    WHOLE,
     XYZ,
     ColumnFile,
     StructuredBatch,
@@ -46,6 +47,8 @@ COLOURS = {"red", "green", "blue"}
 LAZ = "laz"
 EXTRA = {f"{letter}{size}" for letter in "iu" for size in (1, 2, 4, 8)} | {"f4", "f8"}  # types of other dimensions
 LONGEST_NAME = 32
+RECORDS = (("VLRs", 100, 54), ("EVLRs", 243, 60))  # where the header counts them, and the least bytes of each
+MINOR_AT, LEAST_HEAD = 25, 375  # of the version, 1.4 has EVLRs; bytes of its header
 PACKED_AT, PACKED = 104, b"\x80"  # the byte that says so, and from which value on
 
 
@@ -84,6 +87,24 @@ def _translated(name: str, what: str) -> Iterator[None]:
         raise FormatError(what.format(said), source=name) from None
 
 
+class _Clipped:
+    """A file of which nobody reads more than there is: memory is taken for what a header says, before it is read."""
+
+    def __init__(self, stream: Any, size: int) -> None:
+        """Take a stream that can be gone back in, and how many bytes it has."""
+        self._stream, self._size = stream, size
+
+    def __getattr__(self, name: str) -> Any:
+        """Do all else as the file does."""
+        return getattr(self._stream, name)
+
+    def read(self, size: int = -1) -> bytes:
+        """Read so many bytes, or all that are left."""
+        left = max(self._size - self._stream.tell(), 0)
+        data: bytes = self._stream.read(left if size < 0 else min(size, left))
+        return data
+
+
 class LasBatch(StructuredBatch):
     """Some points."""
 
@@ -110,8 +131,13 @@ class LasFile(ColumnFile):
         self.file = file
         file.stream = seekable(file, self)
         whole = bytes_left(file.stream) or 0
+        head = file.stream.read(LEAST_HEAD)
+        file.stream.seek(0)
+        for what, at, size in RECORDS[: 1 + (head[MINOR_AT : MINOR_AT + 1] >= b"\x04")]:
+            if (count := int.from_bytes(head[at : at + 4], "little")) * size > whole:
+                raise FormatError(f"the header says {count} {what}, in {whole} bytes", source=file.name)
         with _translated(file.name, BROKEN):
-            self.reader = laspy.open(file.stream, closefd=False)
+            self.reader = laspy.open(_Clipped(file.stream, whole), closefd=False)
             header = self.header = self.reader.header
             if not header.are_points_compressed:
                 file.stream.seek(header.offset_to_point_data)
@@ -209,8 +235,9 @@ class LasWriter:
                 points.array[name.upper()] = self._stored(values, XYZ.index(name))
             else:
                 points[name] = values
-                same = np.asarray(points[name]) == values
-                if not same.all():
+                stored = np.asarray(points[name])
+                same = stored == values
+                if stored.dtype.kind in WHOLE and not same.all():
                     value = values[int(np.argmin(same))]
                     raise FormatError(f"{name} {value:g}: las holds small whole numbers there", source=self.name)
         return points
@@ -254,7 +281,7 @@ def misfit(column: OutColumn) -> str:
     if column.name in STORED or len(column.name.encode()) > LONGEST_NAME:
         return f"its names have at most {LONGEST_NAME} bytes, and {', '.join(STORED)} have a meaning"
     kind = None if column.kind is None else column.kind.str[1:]
-    return "" if kind in EXTRA else f"it has no type for {column.kind}"
+    return "" if kind in EXTRA or column.name in XYZ else f"it has no type for {column.kind}"
 
 
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> LasWriter:
