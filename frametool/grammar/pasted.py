@@ -30,7 +30,7 @@ Rows: TypeAlias = "list[list[str]]"
 
 DECIMAL = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?"
 NUMBER = rf"[-+]?{DECIMAL}"
-LABEL = r"\s*+[A-Za-z_]\w*+\s*+=(?!=)\s*"  # MATLAB's and Python's `T =`
+LABEL = r"\s*+[A-Za-z_]\w*+\s*+=(?!=)\s*+"  # MATLAB's and Python's `T =`
 _NAMED = r"(?<![\w.)\]}])[A-Za-z_][\w.]*+\((?=\s*[-+.\d\[({A-Za-z])"  # array(, np.array(, tensor(
 _ARGUMENTS = r"(?:,\s*+[A-Za-z]\w*+\s*+=\s*+[\w.'\":<>]++){1,9}+\s*+(?=\))"  # dtype=float32
 _SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from time import process_time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -73,7 +74,7 @@ def test_a_form_with_mutated_lines_is_read_or_refused(tool: Tool) -> None:
             words[random.randrange(len(words))] = random.choice([random.choice(HOSTILE), "", "1", "nan", "1 2", "x"])
             lines[at] = random.choice([" ".join(words), lines[at][: random.randrange(len(lines[at]) + 1)], "", lines[at] * 2])
         Path("mutated").write_text("\n".join(lines), "utf-8", "surrogatepass")
-        command = random.choice([["convert", "--format=csv"], ["apply", "--transform", MOVED], ["invert", "-f", "json"]])
+        command = random.choice([["convert", "--format=csv"], ["apply", "--transform", MOVED], ["invert", "--format=json"]])
         axes = ROW_FORMS.get(form) or []
         tool(*command, "-i", "mutated", "--in", form, *axes, "--on-error", random.choice(["stop", "skip", "null"]))
         tool("check", "mutated", "--in", form, "--frames", "map,base")
@@ -141,3 +142,20 @@ def test_a_cloud_whose_header_lies_is_moved_or_refused(form: str, tool: Tool) ->
         into = random.choice([form, form, "csv"])
         done = tool("apply", "--transform", MOVED, "-i", f"in.{form}", *(["--format=csv"] if into == "csv" else ["-o", f"out.{form}", "--force"]))
         assert done.status or into == "csv" or Path(f"out.{form}").exists()
+
+
+UNITS = [" ", "\n", "\t", "\r\n", "[", "]", "{", "}", '"', "'", ", ", "- ", "-", "---\n", "# a\n", "\\", "\ufeff", "1", "1 ", "1\n", "e+", "[1,", '{"a":', "},{", "a: ", "a:\n", "&", "\\\\ ", "<", "At time 1\n", "[a] x\n"]
+BEFORE = ["", '{"x":1,"y":2,"z":3}', '[{"x":1,"y":2,"z":3}', "xyz: [1, 2, 3", "x,y,z\n1,2,3\n", "1 2 3", "T = ", "frames:\n  a: ", "- ", "t = 1, 2, 3"]
+TEXTS = [["convert"], ["apply", "--transform", MOVED], ["compose", "-", MOVED], ["mean"], ["check", "-"], ["tree", "-"], ["calc", "row"], ["echo", "-", "a", "b"]]
+
+
+def test_a_text_that_repeats_itself_takes_time_in_proportion(tool: Tool) -> None:
+    def took(count: int) -> float:
+        begin = process_time()
+        tool(*command, stdin=f"{before}{unit * (count // len(unit))}{behind}".encode())
+        return process_time() - begin
+
+    for random in cases(0.15):
+        command, before, unit, behind = random.choice(TEXTS), random.choice(BEFORE), random.choice(UNITS), random.choice(["", "x", "]\n", "1"])
+        if (long := took(60_000)) > 1.0:
+            assert long < 9 * took(15_000), (command, before, unit, behind)
