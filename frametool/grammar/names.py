@@ -22,9 +22,7 @@ NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names the
 _STAMP = re.compile(r"[#% ]*(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?", re.IGNORECASE)
 _UNIT = re.compile(r"_([nmuµ]?s)$|[\[(]\s*([^\])]*?)\s*[\])]$")
 _SECONDS = ("s", "sec", "seconds", "")
-_EARTH = re.compile(
-    r"[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|(?:lon(?:gitude)?|lng))(?:[_ ]?(?:deg|rad|e7))?\s*(?:[\[(].*)?", re.IGNORECASE
-)
+_EARTH = re.compile(r"(?i)[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|lon(?:gitude)?|lng)[_ ]?(?:deg|rad|e7)?\s*(?:[\[(].*)?")
 
 
 def in_nanoseconds(name: str) -> bool:
