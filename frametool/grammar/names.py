@@ -24,7 +24,7 @@ _STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(
 _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
 _SECONDS = ("s", "sec", "seconds", "")
-_EARTH = r"(?i)[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|(?:lon(?:gitude)?|lng))(?:[_ ]?(?:deg|rad|e7))?\s*(?:[\[(].*)?"
+_EARTH = r"(?i)[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|lon(?:gitude)?|lng)[_ ]?(?:deg|rad|e7)?\s*(?:[\[(].*)?"
 
 
 def in_nanoseconds(name: str) -> bool:

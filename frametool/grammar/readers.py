@@ -61,20 +61,17 @@ class Reading:
 
     __slots__ = ("bare_numbers", "degrees", "faults", "here", "normalize", "notes", "raw", "source")
 
-    def __init__(
-        self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False,
-        bare_numbers: bool = False,
-    ) -> None:  # fmt: skip
+    def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False) -> None:
         """Begin at the top of a document of `source`; `notes` collects what is odd.
 
-        raw: take messages as they are; whoever gets them judges.  bare_numbers: the text is in the form of another
-        tool, which reads neither `90deg` nor `pi/2`.
+        raw: take messages as they are; whoever gets them judges.  `bare_numbers` is set for the forms of other tools,
+        which read neither `90deg` nor `pi/2`.
         """
         self.source = source
         self.degrees = degrees
         self.normalize = normalize
         self.raw = raw
-        self.bare_numbers = bare_numbers
+        self.bare_numbers = False
         self.here: Path = ()
         self.notes: list[Note] = []
         self.faults: list[Misfit] | None = None

@@ -97,18 +97,25 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     for piece in lines(file.stream, file.name):
         for line in piece.text.removesuffix("\n").replace("\r", "\n").split("\n"):
             number += 1
-            if not line.strip() or line.lstrip().startswith("#"):
-                continue
-            reading = Reading(Source(file.name, line), normalize=options.normalize)
-            try:
-                pose = read_call(line, reading)
-            except ValueInvalid as error:
-                options.report(FormatError(str(error), source=file.name, line=number, rule=error.rule))
-                continue
-            parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
-            for note in reading.notes:
-                options.tally.note(note, number)
-            yield Edge(parent, child, pose.components, line=number)
+            is_call = line.strip() and not line.lstrip().startswith("#")
+            if is_call and (edge := read_edge(line, file, options, number)):
+                yield edge
+
+
+def read_edge(
+    arguments: str | Sequence[str], file: InputFile, options: Options, line: int, column: int = 0
+) -> Edge | None:
+    """Read the arguments of one call, a line or its words; None if they are wrong and reading goes on behind them."""
+    reading = Reading(Source(file.name, ""), normalize=options.normalize)
+    try:
+        pose = read_call(arguments, reading) if isinstance(arguments, str) else read_words(arguments, reading)
+    except ValueInvalid as error:
+        options.report(FormatError(str(error), source=file.name, line=line, column=column, rule=error.rule))
+        return None
+    parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
+    for note in reading.notes:
+        options.tally.note(note, line)
+    return Edge(parent, child, pose.components, line=line)
 
 
 def read_call(line: str, reading: Reading) -> Pose:

@@ -61,7 +61,7 @@ def test_a_state_is_taken_from_all_groups_that_have_it(run: Run) -> None:
         ("", 2, "r.srdf: say which state: --joints r.srdf:ready or --joints r.srdf:wide or"),
         (":raedy", 1, "r.srdf: no state 'raedy'; did you mean 'ready'? states: bad, bare, off, placed, ready, wide"),
         (":off", 1, r"r.srdf:8:\d+: no joint 'pann'; did you mean 'pan'"),
-        (":bad", 1, r"r.srdf:9:\d+: 'left' is not an? (angle|number)"),
+        (":bad", 1, r"r.srdf:9:\d+: value: 'left' is not an? (angle|number)"),
         (":bare", 1, "r.srdf: state 'bare' has no joints"),
         (":wide", 1, r"r.srdf:7:\d+: joint 'pan' has another value in line 6; say which: r.srdf:arm/wide or r.srdf:both/wide"),
     ],

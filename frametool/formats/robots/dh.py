@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
 
     Fail = Callable[[str], FormatError]
+    FoundRow = tuple[str, Path, dict[str, tuple[Any, Path]]]
 
 # what people call a column, without its unit and the number of the joint
 COLUMNS = {
@@ -47,13 +48,11 @@ COLUMNS = {
     "type": ("type", "joint_type", "kind", "sigma"),
     "name": ("name", "joint", "joint_name", "link", "i", "j", "id", "#", "no", "frame", "index"),
 }
-NAME = "name"
 # keys about something else, which are told and left out; any other key is an error, as it may be a misspelt one
-OTHERS = frozenset((
-    "min", "max", "qmin", "qmax", "q_min", "q_max", "lower", "upper", "limit", "limits", "qlim", "range", "home",
-    "axis", "mass", "m", "com", "inertia", "jm", "b", "tc", "g", "velocity", "effort", "parent", "child", "flip", "mdh",
-    "convention", "comment", "note", "description", "model", "robot", "color",
-))  # fmt: skip
+OTHERS = (
+    r"q?_?(?:min|max|lim)|lower|upper|limits?|range|home|axis|mass|m|com|inertia|jm|b|tc|g|velocity|effort|parent|child"
+    r"|flip|mdh|convention|comment|note|description|model|robot|color"
+)
 NEEDED = ("d", "a", "alpha")
 UNITS = {
     "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radians": "rad",
@@ -76,6 +75,9 @@ class Column(NamedTuple):
 
     name: str
     unit: str
+
+
+NAME = Column("name", "")
 
 
 class Cell(NamedTuple):
@@ -206,7 +208,7 @@ def _length(text: str, unit: str) -> Amount:
 
 def _tell_others(names: Iterable[str], line: int, tally: Tally) -> None:
     """Note the columns or keys that are about something else."""
-    if others := list(dict.fromkeys(names)):
+    if others := [name for name in dict.fromkeys(names) if column_of(name) is None]:
         tally.note_each(f"left out, about something else: {listing(others)}", line)
 
 
@@ -229,11 +231,10 @@ def _of_lines(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cell], 
     names = [column.name for column in columns.values()]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise line_error(file, number, 1, f"two columns for {twice}; keep one")
-    others = [word for at, word in enumerate(_split(header)) if at not in columns]
-    for word in others:
-        if near := _misspelt(word.text):
+    for at, word in enumerate(_split(header)):
+        if at not in columns and (near := _misspelt(word.text)):
             raise line_error(file, number, word.column, f"unknown column {shown(word.text)}{near}")
-    _tell_others((word.text for word in others), number, tally)
+    _tell_others((word.text for word in _split(header)), number, tally)
     for number, line in lines[begin + 1 :]:
         if line.lstrip().startswith("#"):
             continue
@@ -278,14 +279,13 @@ def _of_documents(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cel
             raise fail(f"{len(tables)} tables in it; keep one" if tables else f"no table in it: {expected}")
         (rows,) = tables
         lines = locate_many(source.text, [(document.index, *path) for _, path, _ in rows])
-        _tell_others((key for _, _, row in rows for key in row if key.lower() in OTHERS), lines[0][0], tally)
+        _tell_others((key for _, _, row in rows for key in row), lines[0][0], tally)
         for (name, path, row), (line, _) in zip(rows, lines, strict=True):
             cells: dict[str, Cell] = {}
             for key, (value, place) in row.items():
-                column = column_of(key)
-                if key.lower() in OTHERS:
+                if re.fullmatch(OTHERS, key.lower()):
                     continue
-                if column is None:
+                if (column := column_of(key)) is None:
                     message = f"unknown key {shown(key)}{_misspelt(key)}; a row has {', '.join(COLUMNS)}"
                     raise fail(message, *place, key=True)
                 if column.name in cells:
@@ -298,9 +298,7 @@ def _of_documents(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cel
             yield cells, partial(format_error, source, (document.index, *path)), line
 
 
-def _tables(
-    value: Any, path: Path, fail: Callable[..., FormatError]
-) -> Iterator[list[tuple[str, Path, dict[str, tuple[Any, Path]]]]]:
+def _tables(value: Any, path: Path, fail: Callable[..., FormatError]) -> Iterator[list[FoundRow]]:
     """Yield each table as its rows: name, place, and key -> value and its place; raises what `fail` makes."""
     if len(path) > 4 or type(value) not in (dict, list) or not value:
         return
@@ -315,18 +313,15 @@ def _tables(
                 raise fail(f"expected a row {{theta, d, a, alpha}}, found {kind(row)}", *path, name)
         yield rows
     elif _is_row(value):  # a map of columns, or of the numbers of one row
-        listed = [key for key, each in items if type(each) is list]
-        size = len(value[listed[0]]) if listed else 1
-        # one name beside columns is that of the robot
-        alone = {key for key, each in items if listed and type(each) is str and column_of(key) == (NAME, "")}
-        columns = {key: each for key, each in items if key not in alone}
+        columns = {key: each if type(each) is list else [each] for key, each in items}
+        size = max(map(len, columns.values()))
         for key, each in columns.items():
-            if listed and column_of(key) and (type(each) is not list or len(each) != size):
-                found = len(each) if type(each) is list else kind(each)
-                raise fail(f"{key}: expected {size} numbers as {listed[0]} has, found {found}", *path, key)
-        places = [(key, each, (*path, key)) for key, each in columns.items()]
+            if len(each) != size and column_of(key) not in (None, NAME):
+                raise fail(f"{key}: expected {size} numbers, as another has, found {len(each)}", *path, key)
+        # one name beside columns is that of the robot
+        kept = {key: each or [None] for key, each in columns.items() if len(each) == size or column_of(key) != NAME}
         yield [
-            ("", path, {key: (each[at], (*way, at)) if key in listed else (each, way) for key, each, way in places})
+            ("", path, {key: ((each[at:] or each)[0], (*path, key, at)) for key, each in kept.items()})
             for at in range(size)
         ]
     else:
@@ -359,16 +354,15 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 def _link(row: DhRow, parent: str, child: str, options: Options) -> Link:
     """Make a link of one row; its joint turns about z or shifts along it."""
-    line = row.line
     for name, amount in (("theta", row.theta), ("alpha", row.alpha)):
         if not amount.degrees and abs(amount.number) > TURN:
             message = f"{name} {amount.number:g} is more than a full turn in radians; degrees? write {name}_deg"
-            options.tally.note_each(message, line, "degrees")
+            options.tally.note_each(message, row.line, "degrees")
     theta = euler.to_quaternion(0.0, 0.0, row.theta.number, "sxyz", floats, degrees=row.theta.degrees)
     alpha = euler.to_quaternion(row.alpha.number, 0.0, 0.0, "sxyz", floats, degrees=row.alpha.degrees)
     along_z, along_x = (0.0, 0.0, row.d.number, *theta), (row.a, 0.0, 0.0, *alpha)
     modified = options.answers.dh == "modified"
     origin = rigid.compose(*along_x, *along_z) if modified else IDENTITY
     after = IDENTITY if modified else rigid.compose(*along_z, *along_x)
-    joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, AXIS, line=line),)
-    return Link(parent, child, origin, joints, line, after, fixed="" if joints else row.name)
+    joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, AXIS, line=row.line),)
+    return Link(parent, child, origin, joints, row.line, after, fixed="" if joints else row.name)

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 IMAGE_LINE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
 NUMBER_BEFORE = r"[-+.\d]+(?:[eE][-+]?\d+)?\s"
-POINTS = "X Y POINT3D_ID each"
 FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .."
 POSES = FORMATS["colmap"].poses
 
@@ -56,9 +55,8 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:  # noqa: ARG0
         comments = False
         pose = _pose(file, number, bare, of_frame=of_frames)
         begins = re.match(NUMBER_BEFORE, pose.image) is not None
-        if begins_so is None:
-            begins_so = begins
-        elif begins != begins_so:
+        begins_so = begins if begins_so is None else begins_so
+        if begins != begins_so:
             message = f"only some pictures are called as {shown(pose.image)}; a number too many or too few in the line?"
             raise FormatError(message, source=file.name, line=number)
         yield pose
@@ -66,7 +64,7 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:  # noqa: ARG0
             below, points = next(lines, (0, ""))
             words = points.split()
             if len(words) % 3 or not all(re.fullmatch("-1|[0-9]+", word) for word in words[2::3]):
-                message = f"expected points ({POINTS}) or an empty line below an image, found {len(words)} words"
+                message = f"expected points (X Y POINT3D_ID each) or an empty line, found {len(words)} words"
                 raise FormatError(message, source=file.name, line=below)
 
 

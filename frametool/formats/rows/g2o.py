@@ -30,10 +30,7 @@ POSES = FORMATS["g2o"].poses
 ROWS = RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=())
 EDGES = Poses("quaternion", counted="")
 # what else g2o writes: landmarks, parameters, measurements between others
-NO_POSE = re.compile(
-    r"FIX|PARAMS_\w+|ROBOTLASER\d|VERTEX_(?:XY|TRACKXYZ|POINTXYZ?|CAM|SWITCH\w*)"
-    r"|EDGE_(?:SE[23]_\w+|PRIOR_\w+|BEARING_\w+|PROJECT_\w+|POINTXYZ?|SWITCH\w*)"
-).fullmatch
+NO_POSE = r"FIX|PARAMS_\w+|ROBOTLASER\d|VERTEX_(?:XY|\w+XYZ?|CAM|SW\w*)|EDGE_(?:SE[23]|PRIOR|BEARING|PR|SW|PO)\w+"
 IN_SPACE, IN_PLANE = "x y z qx qy qz qw", "x y theta"
 VERTICES = {"VERTEX_SE3:QUAT": IN_SPACE, "VERTEX_SE2": IN_PLANE}
 MEASURED = {"EDGE_SE3:QUAT": IN_SPACE, "EDGE_SE2": IN_PLANE}
@@ -63,7 +60,7 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
         elif not words[0][0].isupper():
             message = f"expected a tag as {next(iter(kinds))}, found {shown(words[0])}"
             raise FormatError(message, source=file.name, line=number)
-        elif not NO_POSE(words[0]):
+        elif not re.fullmatch(NO_POSE, words[0]):
             unknown[words[0]] += 1
             first = first or number
     if unknown:

@@ -15,19 +15,19 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, locate_many, parse_documents
-from frametool.documents.source import InputFile, Source
 from frametool.documents.xml import XmlFile
-from frametool.errors import FormatError, ValueInvalid, shown
+from frametool.errors import ValueInvalid, shown
 from frametool.formats.detect import Beginning
 from frametool.formats.trees.launch_actions import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
-from frametool.grammar.edges import Edge, Options
-from frametool.grammar.readers import Misfit, Reading, kind
+from frametool.grammar.readers import Misfit, kind
 from frametool.ros import publisher
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from frametool.documents.source import InputFile, Source
     from frametool.frames.lookups import Frames
+    from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
@@ -60,32 +60,15 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         if action.unread:
             unread += action.unread.startswith(publisher.CALL)
             options.tally.note_each(action.unread, action.line)
-        elif edge := _edge(action, file, options):
+        elif edge := publisher.read_edge(action.arguments, file, options, action.line, action.column):
             count += 1
+            if action.conditions:
+                conditions = " and ".join(dict.fromkeys(action.conditions))
+                message = f"frame {shown(edge.child)} is published under a condition: {conditions}"
+                options.tally.note_each(message, action.line)
             yield edge
     calls = "1 static transform" if count == 1 else f"{count} static transforms"
     options.tally.about = calls + (f" ({unread} not read)" if unread else "")
-
-
-def _edge(action: Action, file: InputFile, options: Options) -> Edge | None:
-    """Read the arguments of one call; None if they are wrong and reading goes on behind the error."""
-    reading = Reading(Source(file.name, ""), normalize=options.normalize)
-    arguments, line = action.arguments, action.line
-    try:
-        if isinstance(arguments, str):
-            pose = publisher.read_call(arguments, reading)
-        else:
-            pose = publisher.read_words(arguments, reading)
-    except ValueInvalid as error:
-        options.report(FormatError(str(error), source=file.name, line=line, column=action.column, rule=error.rule))
-        return None
-    parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
-    for note in reading.notes:
-        options.tally.note(note, line)
-    if action.conditions:
-        conditions = " and ".join(dict.fromkeys(action.conditions))
-        options.tally.note_each(f"frame {shown(child)} is published under a condition: {conditions}", line)
-    return Edge(parent, child, pose.components, line=line)
 
 
 def _actions(file: InputFile) -> Iterator[Action]:

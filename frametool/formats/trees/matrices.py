@@ -61,16 +61,11 @@ PAIRS = (
     (r"R", "[Tt]", "", "", ""),
     (r"(?i:rotation(?:_?matrix)?)", "(?i:translation(?:_?vector)?)", "", "", ""),
 )
-# keys beside a matrix that name its frames, target first; where they do not say the direction, it is asked for
+# keys beside a matrix that name its frames, target first (OpenLORIS-Scene, tf); what is a source is asked for
 FRAME_KEYS = (
-    ("parent_frame", "child_frame", True),  # OpenLORIS-Scene: as tf has it
-    ("parent_frame_id", "child_frame_id", True),
-    ("frame_id", "child_frame_id", True),
-    ("parent", "child", True),
-    ("target_frame", "source_frame", False),
-    ("destination_frame", "source_frame", False),
-    ("to_frame", "from_frame", False),
-)
+    ("parent_frame", "child_frame"), ("parent_frame_id", "child_frame_id"), ("frame_id", "child_frame_id"),
+    ("parent", "child"), ("target_frame", "source_frame"), ("destination_frame", "source_frame"),
+)  # fmt: skip
 # what is no pose, though some of it has the size of one
 NO_POSE = (
     (r"P|P[0-9]|.*[Pp]rojection.*|P_rect.*", "projection"),
@@ -499,12 +494,13 @@ class Matrices:
 
         Raises Misfit where one of the two is missing, and Unclear where nothing says the direction.
         """
-        for target, source, said in FRAME_KEYS:
+        for target, source in FRAME_KEYS:
             if target in block.entries and source in block.entries:
                 parent, child = (within(block.path, named, block.entries, key) for key in (target, source))
                 what = f"{target} and {source} beside {path[-1]}"
-                return Meaning(parent, child, child) if said else self._told(what, path, parent, child)
-        ways = ((key, other) for one, two, _ in FRAME_KEYS for key, other in ((one, two), (two, one)))
+                is_said = source != "source_frame"
+                return Meaning(parent, child, child) if is_said else self._told(what, path, parent, child)
+        ways = ((key, other) for one, two in FRAME_KEYS for key, other in ((one, two), (two, one)))
         for key, other in ((key, other) for key, other in ways if key in block.entries):
             raise Misfit(f"{key} without {other}, so nothing says what the matrix is between", (*block.path, key))
         return None

@@ -62,7 +62,8 @@ def _read_xml(file: InputFile, options: Options, take: Any) -> Iterator[Edge]:
     xml = XmlFile(file)
     try:
         stored = StoredXml(xml)
-        reading = Reading(xml.source, normalize=options.normalize, bare_numbers=True)
+        reading = Reading(xml.source, normalize=options.normalize)
+        reading.bare_numbers = True
         for edge in take(stored.value, reading):
             yield edge._replace(path=(), line=stored.element(edge.path).line)
         remember(reading.notes, [stored.element(note.path).line for note in reading.notes], options.tally)

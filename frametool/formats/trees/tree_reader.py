@@ -321,8 +321,8 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
         options.report(error)
         return
     for document in documents:
-        reading = Reading(source, normalize=options.normalize, bare_numbers=True)
-        reading.faults = []
+        reading = Reading(source, normalize=options.normalize)
+        reading.faults, reading.bare_numbers = [], True
         try:
             for edge in take(document.value, reading):
                 yield without_slashes(edge, reading)._replace(path=(document.index, *edge.path))
