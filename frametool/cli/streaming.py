@@ -154,7 +154,7 @@ class Stream:
             try:
                 return self._run_opened(given, request, output, tables_only=tables_only)
             except FormatError as error:
-                raise with_hint(error, head, self.name) from None
+                raise with_hint(error, head, self.name, told=bool(self.told_form())) from None
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
         """Run the stream, of whatever form it is."""

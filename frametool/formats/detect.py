@@ -327,11 +327,11 @@ def refuse_robots(text: bytes, name: str) -> None:
         raise error
 
 
-def with_hint(error: FormatError, text: bytes, name: str) -> FormatError:
+def with_hint(error: FormatError, text: bytes, name: str, *, told: bool = False) -> FormatError:
     """Return the error for a text without a pose: of frames, one that points to `lookup`; no prose is quoted."""
     begin = Beginning(text[:HEAD])
     is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or _fitting(begin, _STRONG, (*FORMATS,))[0]
-    if begin.data_line and not (is_known or not_text(begin.head)):
+    if begin.data_line and not (told or is_known or not_text(begin.head)):
         error = _unknown(begin, "records", "rows", name=name)
     return _points_to_lookup(text, name) or error
 

@@ -150,9 +150,9 @@ class Recording(InputFile):
 
     def tell(self) -> None:
         """Warn of what was odd in the file, once it was read."""
-        found: dict[str, list[Remark]] = {}
+        found: dict[str | Remark, list[Remark]] = {}
         for told in self.tally.told():
-            found.setdefault(alike(told), []).append(told)
+            found.setdefault(told if told.rule == "odd" else alike(told), []).append(told)
         for first, *others in found.values():
             warn(f"{self.name}:{first.line}: {first.message}{more_like_it(1 + len(others))}", rule=first.rule)
 

@@ -93,3 +93,17 @@ def test_a_derivation_loads_no_numpy_and_without_one_its_modules_are_not_loaded(
         assert not {name for name in plain if name.startswith("frametool.explain")}
         assert "frametool.explain.sheet" in explained
         assert "numpy" not in explained
+
+
+ODD = "{xyz: [1.23456789012345, 2.3456789012, 3.1], rpy_deg: [10.1, 20.2, 30.3]}"
+OTHER = "{xyz: [11.23456789012345, 22.3456789012, 33.1], rpy_deg: [110.1, 20.2, 70.3]}"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("convert", ODD, "--to", notation) for notation in ("matrix", "rpy_deg", "six_d", "mrp", "axis_angle", "rotvec", "euler:rzxz")]
+    + [("compose", ODD, OTHER, "--to", "matrix"), ("relative", ODD, OTHER), ("invert", ODD), ("apply", "--transform", ODD, "1.1", "2.123456789", "3")],
+)  # fmt: skip
+def test_a_derivation_with_all_digits_fits_a_terminal(run: Callable[..., Outcome], arguments: tuple[str, ...]) -> None:
+    lines = run(*arguments, "--explain", "--precision", "full").out.splitlines()
+    assert max(map(len, lines)) <= 80

@@ -95,7 +95,7 @@ def test_the_transforms_of_a_lidar_odometry_turn_its_camera_axes_into_those_of_t
     assert tree.lookup("map", "camera_init").apply([0, 0, 1]) == pytest.approx([1, 0, 0], abs=2e-6)  # forward
     assert tree.lookup("map", "camera_init").apply([1, 0, 0]) == pytest.approx([0, 1, 0], abs=2e-6)  # left
     assert tree.lookup("camera", "base_link").apply([1, 0, 0]) == pytest.approx([0, 0, 1], abs=2e-6)
-    assert said[0] == "a.launch:2: frame '/map': the leading / is no part of a name and was left out"
+    assert said[0] == "a.launch:2: frame '/map': the leading / is no part of a name and was left out (3 more like it)"
 
 
 
