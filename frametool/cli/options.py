@@ -36,7 +36,7 @@ READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 
-NEEDS = {"force": "output", "tolerance": "find"}  # option -> that without which it would not be used
+NEEDS = {"force": ("output", "plot"), "tolerance": ("find",)}  # option -> those without which it would not be used
 
 
 class Command(WithHelp, Reused):
@@ -53,8 +53,8 @@ class Command(WithHelp, Reused):
             args = [f" {each}" if NEGATIVE.match(each) and each not in options else each for each in args]
         rest = super().parse_args(ctx, _with_form(args) if "--explain" in args else args)
         for name, needed in NEEDS.items():
-            if ctx.params.get(needed, "") is None:
-                refuse_unused(f"is not used without --{needed}", name, ctx=ctx)
+            if needed[0] in ctx.params and not any(map(ctx.params.get, needed)):
+                refuse_unused(f"is not used without --{needed[0]}", name, ctx=ctx)
         return rest
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
