@@ -34,7 +34,7 @@ READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 
-NEEDS = {"force": "output", "tolerance": "find"}  # option -> that without which it would not be used
+NEEDS = {"force": ("output", "plot"), "tolerance": ("find",)}  # option -> those without which it would not be used
 
 
 class Command(WithHelp, Reused):
@@ -53,8 +53,8 @@ class Command(WithHelp, Reused):
             args = _with_value(args, option, *OPTIONAL[option])
         rest = super().parse_args(ctx, args)
         for name, needed in NEEDS.items():
-            if ctx.params.get(needed, "") is None:
-                refuse_unused(f"is not used without --{needed}", name, ctx=ctx)
+            if needed[0] in ctx.params and not any(map(ctx.params.get, needed)):
+                refuse_unused(f"is not used without --{needed[0]}", name, ctx=ctx)
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -18,7 +18,7 @@ from frametool.cli.options import Text, input_forms, refuse_not_needed
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import noting_files, states_of
-from frametool.errors import FrametoolError, shown, warn
+from frametool.errors import FrametoolError, listing, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.grammar.edges import Answers
 
@@ -146,8 +146,7 @@ def refuse_idle(files: Sequence[Recording]) -> None:
     """Refuse options about files that were read which none of them leaves open."""
     refuse_not_needed([file.form for file in files], *OPEN_IN_TREES)
     if settings().topics and not any(file.topics.counts or file.topics.seen for file in files):
-        named = " and ".join(file.name for file in files)
-        raise click.UsageError(f"--topic is not used: no topic is named in {named}")
+        raise click.UsageError(f"--topic is not used: no topic is named in {listing(file.name for file in files)}")
 
 
 def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]) -> Value:

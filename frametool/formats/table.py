@@ -200,7 +200,7 @@ FORMATS = {
     ),
     "columns": Format(
         "columns between blanks, # comments",
-        reads=("rows",),
+        reads=("rows",), asks=("stamps",),
         signs=(("header", r"#|\s*\S+\s+\S"),),
         delimiter="",
     ),
@@ -219,17 +219,17 @@ FORMATS = {
     "echo": _read_tree(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
         _MESSAGES,
-        signs=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
+        asks=("frames",), signs=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
     ),
     "jsonl": _read_tree(
         "messages as JSON, one a line (rosbridge, Foxglove)",
         _MESSAGES,
-        signs=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
+        asks=("frames",), signs=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
     ),
-    "csv1": _read_tree("CSV of `rostopic echo -p`", _MESSAGES, signs=(("line", "%time,"),)),
+    "csv1": _read_tree("CSV of `rostopic echo -p`", _MESSAGES, asks=("frames",), signs=(("line", "%time,"),)),
     "csv2": _read_tree(
         "CSV of `ros2 topic echo --csv`",
-        _MESSAGES,
+        _MESSAGES, asks=("frames",),
         signs=(("line", rf"-?\d{{1,12}},\d{{1,10}},(?!{_NUMBER},)[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){{5}}$"),),
     ),
     "calls": _read_tree(
@@ -241,14 +241,15 @@ FORMATS = {
             ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
         ),
     ),
-    "bag1": Format("ROS 1 bag", (".bag",), ("tree",), BAG, signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),)),
+    "bag1": _read_tree("ROS 1 bag", BAG, suffixes=(".bag",), asks=("frames",),
+                       signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),)),
     "bag2": _read_tree(
         "ROS 2 bag: sqlite3, or a folder",
         BAG,
-        suffixes=(".db3",),
+        suffixes=(".db3",), asks=("frames",),
         signs=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
     ),
-    "mcap": _read_tree("MCAP file", BAG, suffixes=(".mcap",), signs=(("magic", rb"\x89MCAP0\r\n"),)),
+    "mcap": _read_tree("MCAP file", BAG, suffixes=(".mcap",), asks=("frames",), signs=(("magic", rb"\x89MCAP0\r\n"),)),
     "ros1": _ECHO._replace(summary="messages as `rostopic echo` prints them"),
     "ros2": _ECHO._replace(summary="messages as `ros2 topic echo` prints them"),
     "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
@@ -316,7 +317,7 @@ FORMATS = {
         signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
         states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
         poses=Poses("quaternion", counted="ids of vertices"),
-        asks=("frames", "stamps"),
+        asks=("frames", "stamps", "edges"),
     ),
     "open3d": _trajectory(
         "Open3D camera trajectory",

@@ -14,7 +14,9 @@ from clouds import cloud, pcd, ply
 from oracles_of_use import cases
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from random import Random
+    from typing import Any
 
     from oracles_of_use import Tool
 
@@ -24,7 +26,7 @@ LIES = [b"0", b"1", b"29", b"31", b"-1", b"4000000000", b"99999999999999999999",
 MOST = 30e6  # bytes: what the batches of a good file take, too
 
 
-def _npy(array: object) -> bytes:
+def _npy(array: Any) -> bytes:
     file = io.BytesIO()
     np.save(file, array)
     return file.getvalue()
@@ -57,7 +59,7 @@ def _arrow(form: str) -> bytes:
     return file.getvalue()
 
 
-GOOD = {
+GOOD: dict[str, Callable[[], bytes]] = {
     "pcd": lambda: pcd(CLOUD),
     "text.pcd": lambda: pcd(CLOUD, "ascii"),
     "ply": lambda: ply(CLOUD),

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 @click.argument("source", type=FRAME, required=False, metavar="SOURCE")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest]")
-@click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE; --at is that at TARGET")
+@click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE, with --fixed; --at: at TARGET")
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="what stands still between the two times: map")
 @times_option
 @rules_options
@@ -67,10 +67,8 @@ def command(
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
       frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp;
-    nothing is extrapolated. Trajectories (-f tum, kitti ..) hold all samples of the way without --times.
-    -i FILE and the options of rows need --target-column or --source-column; --source-at needs --fixed, --at is then
-    that of TARGET; --on-error is also for --times.
+    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp.
+    Trajectories (-f tum ..) hold all samples. Options of rows need --target-column or --source-column.
     """
     by_row, task = RowFrames(options), PoseTask(options)
     stream, output = task.stream, task.output

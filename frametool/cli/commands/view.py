@@ -102,8 +102,7 @@ def command(
     scene = FrameScene(frames, at_ns=stamp_ns, **options)
     gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
     if gone and chosen != "html":  # which goes to the nearest time
-        at = format_stamp(scene.at_ns or 0)
-        say(f"note: no data of {listing(gone)} at {at}: it and what hangs from it is not drawn")
+        say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
     before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed) if overlay else None
     on_terminal = chosen == "text" and output is None and sys.stdout.isatty()
     if live and (not on_terminal or scene.at_ns is None):
