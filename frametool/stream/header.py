@@ -444,8 +444,8 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
 def find_six(names: Sequence[str], kind: str) -> Columns | None:
     """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where told so."""
     folded = [re.sub(r"[./]", "_", re.sub(BRACKETS, "", name).strip().lower()) for name in names]
-    for each in SIX if kind == "" else (kind,):
-        for base in [six_names(each), *(base.split() for base in LETTERS[each] * bool(kind))]:
+    for each in LETTERS if kind == "" else (kind,):
+        for base in [six_names(each), *(base.split() for base in LETTERS.get(each, ()) * bool(kind))]:
             for prefix in [name.removesuffix(base[0]) for name in folded if re.fullmatch(f"(.*_)?{base[0]}", name)]:
                 wanted = [prefix + word for word in base]
                 if set(wanted) <= set(folded):
