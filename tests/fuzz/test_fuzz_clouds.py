@@ -6,7 +6,7 @@ import io
 import re
 import tracemalloc
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from clouds import cloud, pcd, ply
 from oracles_of_use import cases
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from random import Random
 
     from oracles_of_use import Tool
@@ -24,7 +25,7 @@ LIES = [b"0", b"1", b"29", b"31", b"-1", b"4000000000", b"99999999999999999999",
 MOST = 30e6  # bytes: what the batches of a good file take, too
 
 
-def _npy(array: object) -> bytes:
+def _npy(array: Any) -> bytes:
     file = io.BytesIO()
     np.save(file, array)
     return file.getvalue()
@@ -57,7 +58,7 @@ def _arrow(form: str) -> bytes:
     return file.getvalue()
 
 
-GOOD = {
+GOOD: dict[str, Callable[[], bytes]] = {
     "pcd": lambda: pcd(CLOUD),
     "text.pcd": lambda: pcd(CLOUD, "ascii"),
     "ply": lambda: ply(CLOUD),
