@@ -20,7 +20,7 @@ from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
 from frametool.stream.header import XYZ
 from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
-from frametool.stream.row_poses import NO_STAMP, objects, plain_cells, text_of
+from frametool.stream.row_poses import NO_STAMP, objects, plain_cells, text_of, texts_of
 from frametool.stream.writers import target_in
 from frametool.text.parse import parse_floats
 from frametool.text.spans import Spans
@@ -36,7 +36,7 @@ WAITING = 1 << 18  # rows whose cells say what the types of columns are
 SPARE = 64  # characters that a text may have where not all rows were seen
 DOUBLE, FLAG = np.dtype(np.float64), np.dtype(np.bool_)
 EXACT = 1 << 53  # whole numbers below are floats to the bit
-LIMITS = np.iinfo(np.int64)
+LIMITS, SAFE = np.iinfo(np.int64), 18  # digits that are surely within
 # of a type only if each is written as a number of it is: 007 and +5 stay text, and what would lose digits
 PATTERNS = {
     np.dtype(np.int64): r"-?(?:0|[1-9][0-9]{0,18})",
@@ -47,10 +47,11 @@ TYPE_NAMES = {None: "string", DOUBLE: "double"}
 READS: dict[Kind, Any] = {np.dtype(np.int64): int, DOUBLE: float, FLAG: "true".__eq__}
 
 
-def fits(text: str, kind: Kind) -> bool:
-    """Tell whether a cell is written as a number or truth value of a type is."""
-    is_whole = kind.kind in WHOLE
-    return re.fullmatch(PATTERNS[kind], text) is not None and (not is_whole or LIMITS.min <= int(text) <= LIMITS.max)
+def fit(texts: Sequence[str], kind: Kind) -> bool:
+    """Tell whether all cells are written as numbers or truth values of a type are."""
+    if not all(map(re.compile(PATTERNS[kind]).fullmatch, texts)):
+        return False
+    return kind.kind not in WHOLE or all(LIMITS.min <= int(text) <= LIMITS.max for text in texts if len(text) > SAFE)
 
 
 class ColumnsWriter:
@@ -141,11 +142,12 @@ class ColumnsWriter:
         if parts and all(map(_is_typed, parts)):
             own: Kind = parts[0].dtype.newbyteorder("=")  # type: ignore[union-attr]
             return OutColumn(name, DOUBLE if own.kind == "f" and own.itemsize > DOUBLE.itemsize else own)
-        values = [value for part in parts for value in plain_cells(part)]
-        there = [value for value in values if value is not None]
+        values = [value for part in parts for value in _values(part)]
+        there = [value for value in values if value is not None and value != ""]
         has_gaps = (has_gaps or len(there) < len(values)) and not self.has_nulls
-        if there and all(isinstance(value, Verbatim) for value in there):
-            kinds = [kind for kind in PATTERNS if all(fits(value, kind) for value in there)][:1]
+        is_open = all(isinstance(part, Spans) for part in parts) or all(isinstance(value, Verbatim) for value in there)
+        if there and is_open:
+            kinds = [kind for kind in PATTERNS if fit(there, kind)][:1]
             if has_gaps and kinds not in ([], [DOUBLE]):
                 kinds = [DOUBLE] if FLAG not in kinds and all(abs(int(value)) < EXACT for value in there) else []
             if kinds:
@@ -158,20 +160,22 @@ class ColumnsWriter:
         """Return a column of a block in its type; raises ValueInvalid for a cell that is of another one."""
         cells, kind = made.values, column.kind
         if kind is None:
-            values = plain_cells(cells)
+            values = _values(cells)
             return Made(["" if value is None else _text(value, is_json=column.is_json) for value in values])
         if _is_typed(cells):
             if kind == DOUBLE and not _is_exact(cells.dtype, [cells]) and cells.dtype.kind in WHOLE:
                 raise self._another(column, str(max(cells.tolist(), key=abs)))
             return Made(cells.astype(kind, copy=False), made.absent)
-        if kind == DOUBLE and isinstance(cells, Spans):
+        if kind != FLAG and isinstance(cells, Spans):
             numbers, bad = parse_floats(cells)
             empty = cells.starts == cells.ends
-            if empty[bad].all():
+            if kind == DOUBLE and empty[bad].all():
                 return Made(numbers, empty if empty.any() else None)
+            if not len(bad) and (np.rint(numbers) == numbers).all() and abs(numbers).max() < EXACT:
+                return Made(numbers.astype(kind))
         values = plain_cells(cells)
         absent = np.array([value is None for value in values], np.bool_)
-        wrong = [value for value in values if value is not None and not fits(text_of(value), kind)]
+        wrong = [value for value in values if value is not None and not fit([text_of(value)], kind)]
         if wrong or (absent.any() and not self.has_nulls and kind != DOUBLE):
             raise self._another(column, text_of(wrong[0]) if wrong else "")
         nothing = np.nan if kind == DOUBLE else 0
@@ -197,6 +201,11 @@ def _is_exact(kind: Kind | None, parts: Sequence[Any]) -> bool:
         for part in parts
         for number in ([part.min(), part.max()] if _is_typed(part) and part.size else map(int, _numbers(part)))
     )
+
+
+def _values(cells: Cells) -> list[Any]:
+    """Return cells of text as texts, all else as plain values."""
+    return texts_of(cells) if isinstance(cells, Spans) else plain_cells(cells)
 
 
 def _numbers(part: Cells) -> list[str]:

@@ -199,6 +199,7 @@ class LasWriter:
         """Take the points of a batch, those that have a place; nothing is written yet."""
         columns = [each for each in self.columns if each.passed is None]
         new = {column.name: np.asarray(each.values) for column, each in zip(columns, made, strict=True)}
+        new |= {name: new[name].astype(np.float64) for name in XYZ if name in new}
         there = np.all([np.isfinite(new[name]) for name in XYZ if name in new], axis=0)
         if not there.all():
             self.left_out += int(np.count_nonzero(~there))
