@@ -159,12 +159,15 @@ def _layout_of(text: bytes, *, final: bool) -> str:
     return VALUES if problem is None else LINES
 
 
+TOO_DEEP = "nested too deeply"
+
+
 def _value(text: str, at: int) -> tuple[int, str | None]:
     """Return the end of the JSON value at a place and ""; or where it goes wrong and why: None if it is cut off."""
     try:
         return _decoder()(text, at)[1], ""
     except RecursionError:
-        return at, "nested too deeply"
+        return at, TOO_DEEP
     except ValueError as error:
         place: int = getattr(error, "pos", at)
         message: str = getattr(error, "msg", str(error))
@@ -220,10 +223,13 @@ def _scanned(
             continue
         end = match(start) if match else None
         if end is None:
-            end, wrong = _value(text, start) if broken.closed.get(start) != 0 else (len(data), None)
+            end, wrong = broken.fails.get(start) or (
+                _value(text, start) if broken.closed.get(start) != 0 else (len(data), None)
+            )
             if wrong is None and not final:
                 return Parts(found)
             if wrong != "":
+                broken.note(start, end if wrong != TOO_DEEP else len(data), wrong)
                 own = _own_indent(data, at, start, array=array, first=first and not found)
                 end = broken.end(start, end if wrong else len(data), own)
                 if not end:
@@ -260,6 +266,19 @@ class _Broken:
         self.final = final
         self.closed: dict[int, int] = {}  # behind which place a bracket is closed: 0 for one of the other kind, or none
         self.single: set[bytes] = set()  # keys that do not come again
+        self.fails: dict[int, tuple[int, str | None]] = {}  # where a value behind some place goes wrong, and why
+
+    def note(self, start: int, wrong: int, why: str | None) -> None:
+        """Note the values inside one that went wrong which are open there: they go wrong at the same place."""
+        if start in self.fails:
+            return
+        opened: list[int] = []
+        for token in _TOKEN.finditer(self.data, start, wrong):
+            if token[0] in (b"{", b"["):
+                opened.append(token.start())
+            elif token[0] in (b"}", b"]") and opened:
+                opened.pop()
+        self.fails.update(dict.fromkeys(opened, (wrong, why)))
 
     def end(self, start: int, wrong: int, own: int) -> int:
         """Return where a value ends; 0 where what decides it may be behind the text.
