@@ -15,9 +15,9 @@ COLLECTED_EVERY = (50_000, 20, 100)  # objects, and rounds of them: a tree is no
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line as a program of its own and exit with its status."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads that nothing here uses cost memory
-    gc.set_threshold(*COLLECTED_EVERY)
     try:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads that nothing here uses cost memory
+        gc.set_threshold(*COLLECTED_EVERY)
         from frametool.cli.signals import with_signals
 
         status = with_signals(run, sys.argv[1:] if arguments is None else arguments)

@@ -14,7 +14,6 @@ from click.core import iter_params_for_processing
 
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
-from frametool.cli.signals import begin
 from frametool.cli.sink import writing
 from frametool.errors import SHOWN, alternatives, did_you_mean, shown
 from frametool.stream.faults import Misused
@@ -206,7 +205,6 @@ class Group(WithHelp, click.Group):
         if cmd_name not in self.table:
             raise click.UsageError(f"no command {shown(cmd_name)}{alternatives(cmd_name, self.table, 'commands')}", ctx)
         found: click.Command = import_module(self.table[cmd_name][0]).command
-        begin()
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002

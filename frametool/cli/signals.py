@@ -20,16 +20,18 @@ class Terminated(BaseException):
 
 
 class _Signals:
-    """What the handler knows: whether a command has begun, a line is being written, and Ctrl-C came meanwhile."""
+    """What the handler knows: whether there is what to clean up, a line is being written, and Ctrl-C came meanwhile."""
 
-    begun = False
+    cleans_up = False
     writing = False
     interrupted = False
 
-    def end(self, number: int, _frame: FrameType | None) -> None:
+    def end(self, number: int, frame: FrameType | None) -> None:
         """Raise what ends the run; the first Ctrl-C waits until the line that is being written is out."""
         name = signal.Signals(number).name
-        if not self.begun and not self.writing:
+        while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
+            frame = frame.f_back
+        if frame and not self.cleans_up and not self.writing:
             # what is raised in the middle of an import may be printed there, and lost
             os._exit(130 if number == signal.SIGINT else die_of(name))
         if number != signal.SIGINT:
@@ -58,9 +60,9 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
             signal.signal(number, signal.SIG_DFL)
 
 
-def begin() -> None:
-    """Let Ctrl-C be raised from here on: a command may have something to clean up."""
-    _signals.begun = True
+def clean_up() -> None:
+    """Let what ends the run be raised from here on, in the middle of an import too."""
+    _signals.cleans_up = True
 
 
 @contextmanager

@@ -17,6 +17,7 @@ import click
 
 from frametool.cli.options import FULL, TEXT, Digits, Number, Parsed, together
 from frametool.cli.output import PICTURES, drawn
+from frametool.cli.signals import clean_up
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.documents.source import Source, decode, read_text
@@ -197,6 +198,7 @@ class SimOutput(NamedTuple):
         if self.live:
             from frametool.view.terminal import Screen
 
+            clean_up()  # the terminal's cursor
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
         else:
             yield log_events()

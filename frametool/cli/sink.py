@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from itertools import count
 from typing import TYPE_CHECKING, BinaryIO
 
-from frametool.cli.signals import whole_lines
+from frametool.cli.signals import clean_up, whole_lines
 from frametool.errors import FileProblem, ValueInvalid, printable, shown
 
 if TYPE_CHECKING:
@@ -95,6 +95,7 @@ def _replacing(path: str, *, force: bool) -> Iterator[BinaryIO]:
     """Yield a stream into a part file that takes the place of `path` if all goes well."""
     place = os.path.realpath(path)
     refuse_existing(path, force=force)
+    clean_up()
     with _problems_of(path):
         stream = _part_beside(place, 0o600 if os.path.exists(place) else 0o666)
     try:

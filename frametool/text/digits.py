@@ -99,12 +99,9 @@ def first_point(characters: Words) -> Ints:
     found &= ~others
     found &= _HIGH
     # The bits below the lowest one set: the highest of each byte before it; those of all eight if none is set.
-    below = ~found & (found - np.uint64(1))
-    below >>= np.uint64(7)
-    below &= _ONES
+    below = (~found & (found - np.uint64(1))) >> np.uint64(7) & _ONES
     below *= _ONES  # the highest byte is their sum
-    below >>= np.uint64(56)
-    return below.view(np.int64)
+    return (below >> np.uint64(56)).view(np.int64)
 
 
 @cache

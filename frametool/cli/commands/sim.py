@@ -14,6 +14,7 @@ from frametool.cli.group import Group
 from frametool.cli.options import EXIT_CODES, TEXT, Command, Parsed
 from frametool.cli.output import drawn
 from frametool.cli.poses import source_of, usage_if_inline
+from frametool.cli.signals import clean_up
 from frametool.cli.sim_output import (
     DURATION,
     LEADER,
@@ -259,6 +260,7 @@ def keyboard(mailbox: Mailbox, *, headings: bool) -> Iterator[None]:
     import tty
     from threading import Thread
 
+    clean_up()
     before = termios.tcgetattr(sys.stdin)
     tty.setcbreak(sys.stdin)
     try:

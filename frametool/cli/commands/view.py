@@ -12,6 +12,7 @@ import click
 from frametool.cli.group import refuse_unused
 from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules_of
 from frametool.cli.output import drawn
+from frametool.cli.signals import clean_up
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened
@@ -110,6 +111,7 @@ def command(
     if on_terminal:
         from frametool.view.terminal import play, print_terminal
 
+        clean_up()  # the terminal's cursor
         (play if live else print_terminal)(scene, eye, color)
         return
     content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
