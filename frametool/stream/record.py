@@ -380,7 +380,7 @@ def _of_message(value: Any, place: Place, path: Path, reading: Reading, request:
     """
     field, kind = place.field, place.kind
     if request.kind not in ("", kind):
-        raise Misfit(f"a {kind} cannot be taken for a {request.kind}")
+        raise Misfit(f"{field} cannot be taken for a {request.kind}")
     if kind == VECTOR:
         return _with_position(Record(path, Shape(kind), key=field), value[field], 1.0, partial=False)
     known = value.get(place.covariances[0])
