@@ -41,7 +41,7 @@ def test_the_form_follows_the_equals_sign(form: str, begins: str, run: Callable[
     ([*CONVERT, "--explain", "--precision", "0"], "--precision counts significant digits with --explain; give 1 or more, or full"),
     (["convert", "--explain"], "standard input is a stream; --explain derives one record"),
     (["convert", "-", "--explain"], "standard input is a stream; --explain derives one record"),
-    (["convert", "-i", "rows.csv", "--explain"], "-i FILE is a stream; --explain derives one record"),
+    (["convert", "-i", "rows.csv", "--explain"], "--input is about a stream; --explain derives one record"),
     (["convert", POSE, POSE, "--explain"], "--explain derives one pose, found 2"),
     (["compose", "-", POSE, "--explain"], "standard input is a stream"),
     (["invert", "--explain"], "standard input is a stream"),
