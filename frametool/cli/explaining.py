@@ -81,12 +81,20 @@ class PoseTask:
                 names.add("input_forms")
         refuse_unused("is about rows; arguments are read here, and rows where - stands or nothing is", *names)
 
-    def answer(self, argument: str | Source, request: Request) -> int:
-        """Write the results of the records of one argument: inline, a file, or the stream of the command."""
+    def answer(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
+        """Write the results of the records of one argument: inline, a file, or the stream of the command.
+
+        timed: the stamp of a single result, {} for none, where it is not that of its record
+        """
         if isinstance(argument, str) and (self.stream.is_wanted(argument) or self.has_table(argument)):
             return self.stream.run(request, self.output)
         self.only_arguments([argument])
-        self.output.values(values_of([argument], request, self.output))
+        values = values_of([argument], request, self.output)
+        if timed is not None:
+            from frametool.stream.record_values import at_time
+
+            values = (at_time(each, timed) for each in values)
+        self.output.values(values)
         return 0
 
     def plan(self) -> DerivationStyle:

@@ -354,12 +354,13 @@ def say_if_verbose(text: str) -> None:
 
 
 def _say_not_needed() -> None:
-    """Say on stderr that --camera-axes changes nothing: no input leaves the axes open, no result has any."""
-    inputs, chosen = settings().inputs, settings().camera_axes
-    if chosen and not settings().quiet and not any("camera_axes" in asks for _, asks in inputs):
-        forms = " and ".join(dict.fromkeys(form for form, _ in inputs if form))
-        why = f": {forms} does not leave that open" if forms else " here"
-        say(f"note: --camera-axes changes nothing{why}")
+    """Say on stderr which options change nothing, where only what was read or is written shows whether they do."""
+    inputs = settings().inputs
+    forms = " and ".join(dict.fromkeys(form for form, _ in inputs if form))
+    for ask, chosen in (("frames", settings().named_frames), ("camera_axes", settings().camera_axes)):
+        if chosen and not settings().quiet and not any(ask in asks for _, asks in inputs):
+            why = f": {forms} does not leave that open" if forms else " here"
+            say(f"note: --{ask.replace('_', '-')} changes nothing{why}")
 
 
 def refuse_not_needed(forms: Collection[str], *asked: str) -> None:

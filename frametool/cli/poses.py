@@ -17,6 +17,7 @@ import click
 
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, ValueInvalid, heard_by, shown, warn
+from frametool.grammar.names import stamp_column
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
 from frametool.grammar.rotation_spelling import read_spelled, rotation_of, spelled
@@ -283,12 +284,13 @@ class Given(NamedTuple):
     beside: set[str]
     odd: list[tuple[Any, ...]]
 
-    def only_poses(self) -> list[Pose]:
-        """Return the poses alone; tell what was odd, and what else stood there."""
+    def only_poses(self, *, timed: bool) -> list[Pose]:
+        """Return the poses alone; tell what was odd, and what else stood there, but stamps that count as `timed`."""
         for message, rule, kind in self.odd:
             warn(message, rule=rule, kind=kind)
-        if self.beside:
-            warn(f"{self.source.name}: {', '.join(map(shown, sorted(self.beside)))} left out: only its pose is used")
+        left_out = [key for key in sorted(self.beside) if not (timed and stamp_column([key]) is not None)]
+        if left_out:
+            warn(f"{self.source.name}: {', '.join(map(shown, left_out))} left out: only its pose is used")
         return self.poses
 
 
@@ -316,12 +318,16 @@ def _several(given: Sequence[Given | None]) -> list[int]:
 
 
 class Rows(NamedTuple):
-    """Which argument holds the records that make the results, one each; and the one pose of each other argument."""
+    """Which argument holds the records that make the results, one each; and the one pose of each other argument.
+
+    timed: the time of single poses, {} where they have none or several; None where each result has its record's
+    """
 
     at: int
     argument: str | Source
     before: list[Pose]
     behind: list[Pose]
+    timed: dict[str, Any] | None
 
 
 def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[str], bool]) -> Rows:
@@ -332,18 +338,23 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
     given = [None if at == stream else _given(each, request) for at, each in enumerate(arguments)]
     says_more = [at for at, each in enumerate(given) if each and each.beside]
     at = [0, *says_more, *_several(given)][-1] if stream is None else stream
-    sides = [
-        [_only(each.only_poses(), each.source) for each in side if each] for side in (given[:at], given[at + 1 :])
-    ]
-    rows = given[at]
-    return Rows(at, rows.source if rows else "-", *sides)
+    rows, timed = given[at], None
+    if rows is not None and len(rows.poses) == 1:
+        from frametool.grammar.pose_algebra import shared_stamp
+
+        timed = shared_stamp(pose for each in given if each for pose in each.poses)
+    before, behind = (
+        [_only(each.only_poses(timed=timed is not None), each.source) for each in side if each]
+        for side in (given[:at], given[at + 1 :])
+    )
+    return Rows(at, rows.source if rows else "-", before, behind, timed)
 
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:
     """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
     given = [_given(each, request) for each in arguments]
     several = _several(given)
-    read = [each.only_poses() for each in given]
+    read = [each.only_poses(timed=True) for each in given]
     most = len(read[several[0]]) if several else 1
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 

@@ -189,7 +189,7 @@ def opened(
     behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
     of: so many files there are in all
     """
-    from frametool.formats.load import Recording, opened_together
+    from frametool.formats.load import Recording, close_all, opened_together
 
     refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
@@ -218,6 +218,7 @@ def opened(
     )
     lacking = [file for file in found if "frames" in file.asks]
     if len(named) not in (0, 1, len(lacking), files):
+        close_all(found)
         raise click.UsageError(f"--frames is given {len(named)} times, {len(lacking)} of the files need names")
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)

@@ -313,6 +313,16 @@ def _with_stamp_ns(extras: dict[str, Any], form: str) -> dict[str, Any]:
     return extras | {"stamp_ns": _read_stamp(key, extras.pop(key))}
 
 
+def at_time(value: Value, timed: dict[str, Any]) -> Value:
+    """Return a result with a stamp, or without any; its own stays as it is written if there is to be one."""
+    if not isinstance(value, Result):
+        return value
+    key = _stamp_key(value.extras)
+    if key and timed:
+        return value
+    return type(value)(value.pose, timed | {name: each for name, each in value.extras.items() if name != key})
+
+
 def _stamp_key(members: dict[str, Any]) -> str:
     """Return the key of a mapping's own stamp, "" where there is none."""
     keys = [key for key, value in members.items() if value is not None and type(value) is not list]

@@ -77,9 +77,11 @@ def test_a_stamp_goes_along_into_every_form(run: Run, command: str, given: str, 
 def test_the_one_stamp_of_arguments_is_that_of_their_result(run: Run, command: tuple[str, ...]) -> None:
     first, second = "{stamp: 1.5, xyz: [1, 2, 3], rpy: [0, 0, 1]}", "{stamp: 2.5, xyz: [0, 1, 0]}"
     done = run(*command, first, "{xyz: [0, 1, 0]}", "-f", "json")
-    assert json.loads(done.out)["stamp_ns"] == 1_500_000_000
+    assert json.loads(done.out)["stamp"] == 1.5
+    done = run(*command, first, "{xyz: [0, 1, 0], label: a}", "-f", "json")
+    assert (json.loads(done.out)["stamp_ns"], json.loads(done.out)["label"]) == (1_500_000_000, "a")
     done = run(*command, first, second, "-f", "json")
-    assert "stamp_ns" not in json.loads(done.out)
+    assert not {"stamp", "stamp_ns"} & json.loads(done.out).keys()
     assert "the result has no stamp: 1.500000000 and 2.500000000 are the times of two poses" in done.err
 
 

@@ -112,7 +112,7 @@ def test_what_is_no_scale_of_a_pose_passes(run: Run) -> None:
     table = "x,y,z,qx,qy,qz,qw,scale\n1,2,3,0,0,0,1,2.5\n"
     assert run("convert", "--to", "quaternion", stdin=table).out == table.replace("0,0,0,1,", "0.0,0.0,0.0,1.0,")
     marker = json.dumps({"pose": POSES["message"], "scale": {"x": 1, "y": 2, "z": 3}}) + "\n"
-    assert '"scale": {"x": 1, "y": 2, "z": 3}' in run("invert", stdin=marker).out
+    assert '"scale": {"x": 1, "y": 2, "z": 3}' in run("convert", stdin=marker).out
     points = "".join(json.dumps({"point": [1, 2, 3], "scale": size}) + "\n" for size in range(20))
     done = run("apply", "--transform", "{xyz: [1, 0, 0]}", stdin=points)
     assert [json.loads(line) for line in done.out.splitlines()] == [

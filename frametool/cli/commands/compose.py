@@ -58,4 +58,4 @@ def command(poses: tuple[str, ...], **options: Any) -> int:
 
     behind = tuple(each.components for each in right)
     operation = Operation(before and before.components, behind, inverse=row.is_inverse)
-    return task.answer(rows.argument, request._replace(operation=operation, rename=rename))
+    return task.answer(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)

@@ -103,4 +103,4 @@ def command(
         return relative_names(*((fixed, own) if rows.at else (own, fixed)))
 
     operation = Operation(of="first" if rows.at else "second", fixed=fixed.components)
-    return task.answer(rows.argument, request._replace(operation=operation, rename=rename))
+    return task.answer(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)
