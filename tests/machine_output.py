@@ -44,6 +44,10 @@ REPRESENTATIONS = (
 COMMANDS: tuple[tuple[str, str], ...] = (
     *((f"convert {A} --to {name} -f {form}", "") for name in REPRESENTATIONS for form in ("json", "yaml")),
     ("convert --from rpy_deg 0 0 90", ""),
+    ("compare examples/truth.tum examples/truth.tum --align none -f csv", ""),
+    ("align examples/truth.tum examples/mono.tum --align none -f json", ""),
+    ("resample examples/walk.tum --rate 4 -f csv", ""),
+    ("resample examples/gps.csv --every 40m -f json", ""),
     ("convert --from wxyz 1 0 0 0 --to matrix,rpy -f json", ""),
     ("convert --from rpy 0.1 -0.2 3 --keep-sign -f json --precision 4", ""),
     (f"convert {A} -f csv", ""),

@@ -104,7 +104,7 @@ def test_no_imports_inside_a_room_run_in_a_circle(room: str) -> None:
 def test_the_package_stays_as_small_as_it_can_be_read() -> None:
     """`python tests/count_code.py` says in which room the lines are."""
     files, lines = rooms()
-    assert lines.total() - lines["later"] <= 33_500
+    assert lines.total() - lines["later"] <= 34_500  # 33 367 before what is read and told was made whole
     assert files.total() - files["later"] <= 250
     assert lines["later"] <= 1_800
 
