@@ -47,7 +47,7 @@ COMMANDS: tuple[tuple[str, str], ...] = (
     ("compare examples/truth.tum examples/truth.tum --align none -f csv", ""),
     ("align examples/truth.tum examples/mono.tum --align none -f json", ""),
     ("resample examples/walk.tum --rate 4 -f csv", ""),
-    ("resample examples/gps.csv --every 40m -f json", ""),
+    ("resample examples/gps.csv --every 40m --precision 3 -f json", ""),
     ("convert --from wxyz 1 0 0 0 --to matrix,rpy -f json", ""),
     ("convert --from rpy 0.1 -0.2 3 --keep-sign -f json --precision 4", ""),
     (f"convert {A} -f csv", ""),

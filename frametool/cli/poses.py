@@ -17,7 +17,6 @@ import click
 
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, ValueInvalid, heard_by, shown, warn
-from frametool.grammar.names import stamp_column
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
 from frametool.grammar.rotation_spelling import read_spelled, rotation_of, spelled
@@ -286,6 +285,8 @@ class Given(NamedTuple):
 
     def only_poses(self, *, timed: bool) -> list[Pose]:
         """Return the poses alone; tell what was odd, and what else stood there, but stamps that count as `timed`."""
+        from frametool.grammar.names import stamp_column
+
         for message, rule, kind in self.odd:
             warn(message, rule=rule, kind=kind)
         left_out = [key for key in sorted(self.beside) if not (timed and stamp_column([key]) is not None)]
