@@ -9,8 +9,8 @@ import numpy as np
 
 from frametool.fit.metrics import statistics
 from frametool.view.comparison_text import write_comparison, write_table
-from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords, write_svg
-from frametool.view.run_plot import shade_of, ticks
+from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords, shade_of, write_svg
+from frametool.view.run_plot import ticks
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

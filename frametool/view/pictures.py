@@ -34,6 +34,20 @@ PALETTE = {
     "z": ("#1a5fd0", "#5c9dff"),
 }
 
+# viridis at five places, dark for little
+STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
+PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
+
+
+def shade_of(value: float, low: float, high: float) -> str:
+    """Return the colour of a value between its bounds; that of the paper for nan."""
+    if value != value:  # noqa: PLR0124 - nan
+        return "paper"
+    place = (value - low) / (high - low) * (len(STOPS) - 1) if high > low else 0.0
+    at = min(int(place), len(STOPS) - 2)
+    mixed = (round(a + (b - a) * (place - at)) for a, b in zip(STOPS[at], STOPS[at + 1], strict=True))
+    return f"#{''.join(f'{part:02x}' for part in mixed)}"
+
 
 class PictureLine(NamedTuple):
     """A line through points; dashes: pixels drawn and left out; title: what it says when pointed at."""
@@ -248,9 +262,7 @@ def still_picture(
         points = [flat.origins[name][:2] for name in link]
         shapes.append(PictureLine(points, "soft", alpha=0.7, dashes=(4.0, 3.0)))
     for frame, stretches in flat.trails:
-        for stretch in stretches:
-            points = [flat.at(point)[:2] for point in stretch]
-            shapes.append(PictureLine(points, "trail", 1.5, 0.5, title=frame))
+        shapes += _trail(frame, [[flat.at(point)[:2] for point in stretch] for stretch in stretches])
     for name, pose in other.poses().items() if other else ():
         if name in flat.poses:
             shapes += _other(flat, name, pose)
@@ -268,6 +280,17 @@ def _frame(flat: Projection, name: str) -> Iterator[Shape]:
     tips = flat.tips(name)
     yield from (PictureLine([(x, y), tips[axis][:2]], AXES[axis], 2.0, title=name) for axis in flat.axis_order(name))
     yield PictureDot(x, y, 2.2, "ink", name)
+
+
+def _trail(frame: str, stretches: Sequence[Sequence[tuple[float, float]]]) -> Iterator[Shape]:
+    """Draw where a frame went, coloured by time."""
+    steps = max(sum(len(stretch) - 1 for stretch in stretches), 1)
+    size, done = -(-steps // PIECES), 0
+    for stretch in stretches:
+        for begin in range(0, max(len(stretch) - 1, 1), size):
+            shade = shade_of(LAST_SHADE * (done + begin) / steps, 0.0, 1.0)
+            yield PictureLine(stretch[begin : begin + size + 1], shade, 1.5, 0.8, title=frame)
+        done += len(stretch) - 1
 
 
 def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:

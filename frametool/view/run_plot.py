@@ -13,7 +13,7 @@ from xml.sax.saxutils import escape
 from frametool.errors import printable
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE
-from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords
+from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords, shade_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -225,8 +225,6 @@ SIDE = 400.0  # pixels of a map
 MAP_MARGIN = 70.0
 BAR = 15.0
 SHADES = 50  # of the bar
-# viridis at five places, dark for little
-STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
 
 
 def sweep_picture(gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult) -> Picture:
@@ -269,13 +267,3 @@ def _bar(left: float, low: float, high: float) -> Iterator[Shape]:
         yield PictureBox(left, y, BAR, SIDE / SHADES + 0.5, shade_of(shade / (SHADES - 1), 0.0, 1.0))
     yield PictureWords(left, MAP_MARGIN - 8.0, f"{high:.3g}")
     yield PictureWords(left, MAP_MARGIN + SIDE + 14.0, f"{low:.3g}")
-
-
-def shade_of(value: float, low: float, high: float) -> str:
-    """Return the colour of a value between its bounds; that of the paper for nan."""
-    if value != value:  # noqa: PLR0124 - nan
-        return "paper"
-    place = (value - low) / (high - low) * (len(STOPS) - 1) if high > low else 0.0
-    at = min(int(place), len(STOPS) - 2)
-    mixed = (round(a + (b - a) * (place - at)) for a, b in zip(STOPS[at], STOPS[at + 1], strict=True))
-    return f"#{''.join(f'{part:02x}' for part in mixed)}"

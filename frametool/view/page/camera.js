@@ -64,7 +64,7 @@ function fit(most = false) {
   const box = canvas.getBoundingClientRect(), [right, up] = view_axes();
   const reach = (axis) => Math.max(1e-9, axis.reduce((sum, part, k) => sum + Math.abs(part) * (high[k] - low[k]) / 2, 0));
   const room = (pixels) => Math.max(pixels - 150, 60);
-  const usual = Math.min(box.width, box.height) * 0.4 / (0.55 * link_length);  // one frame alone is not blown up
+  const usual = Math.min(box.width, box.height) * 0.4 / (0.55 * link_length);
   cam.scale = Math.min(room(box.width) / reach(right) / 2, room(box.height) / reach(up) / 2, usual);
 }
 

@@ -41,7 +41,7 @@ function edge(frame, t) {
   return {parent, pose: along(here, next, Number(t - stamps[at]) / Number(stamps[at + 1] - stamps[at])), moves: true};
 }
 
-// List a frame and its ancestors with the edges between them; `gap` is the moving frame whose data end the line.
+// List a frame and its ancestors with the edges between; `gap` is the moving frame whose data end it.
 function to_root(frame, t) {
   const line = [frame], edges = [];
   for (let step = edge(frame, t); step && line.length <= COUNT; step = edge(step.parent, t)) {
@@ -52,7 +52,7 @@ function to_root(frame, t) {
   return {line, edges, gap: TRACKS.has(top) ? top : -1};
 }
 
-// Compose the edges of one branch, topmost first, as the command does: neighbours that stand still before the others.
+// Compose the edges of one branch, topmost first: neighbours that stand still before the others.
 function product(edges) {
   const folded = [];
   for (const {pose, moves} of edges) {
@@ -112,7 +112,7 @@ function stamps_of(tracks) {
   return all.filter((t, at) => !at || t !== all[at - 1]);
 }
 
-// Return every frame with parents before children at a time; only changing parents can upset the order of names.
+// Return every frame at a time, parents before children; only changing parents can upset their order.
 const ALL = Array.from({length: COUNT}, (_, frame) => frame);
 const REPARENTED = head.tracks.some((track) => Array.isArray(track.parents));
 function ordered(t) {

@@ -1,4 +1,4 @@
-// Names beside frames, none over another: the chosen first, then those that move, then the nearest.
+// Names beside frames, none over another: the chosen, then those that move, then the nearest.
 
 const MOST_NAMES = 160, MOST_FAILED = 60, MANY = 3000, CELL = 64, LINE = 16;
 const DISTANCES = [9, 20, 34, 52, 74];  // pixels from a frame to its name
@@ -132,7 +132,7 @@ function place_name(group, {words, away, left, middle, box}, taken) {
   labels.placed.push({box, group, words});
 }
 
-// Point at the edge of the picture to the few frames outside of it, with their distance from its middle.
+// Point at the edge of the picture to the few frames outside of it, with their distance.
 function draw_outside(frames) {
   labels.outside = [];
   const out = frames.filter((frame) => !Number.isNaN(x_of(frame)) && !is_inside(frame, 0));

@@ -101,17 +101,16 @@ function draw_links(frames) {
 function draw_trails() {
   for (const {frame, points} of trails) {
     if (state.hidden.has(frame)) continue;
-    pen.beginPath();
-    let on = false;
-    for (const point of points) {
-      if (point) {
-        const [x, y] = project(point);
-        if (on) pen.lineTo(x, y);
-        else pen.moveTo(x, y);
+    const count = points.length, size = Math.ceil(count / 24);
+    for (let at = 0; at < count; at += size) {
+      pen.beginPath();
+      let on = false;
+      for (const point of points.slice(at, at + size + 1)) {
+        if (point) pen[on ? "lineTo" : "moveTo"](...project(point));
+        on = Boolean(point);
       }
-      on = Boolean(point);
+      stroke(`hsl(${280 - 170 * at / count} 55% 48%)`, 1.5, 0.8);
     }
-    stroke(tint.sel, 1.5, 0.5);
   }
 }
 

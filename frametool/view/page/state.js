@@ -77,7 +77,7 @@ function on_axis(frame, axis, metres) {
   return [0, 1, 2].map((k) => WORLD[at + k] + metres * WORLD[along_axis + k]);
 }
 
-// ---- another tree laid over this one: poses of the frames of the same names, as they were in the first `fixed`
+// ---- another tree laid over this one: poses of the frames of the same names, in the first `fixed`
 const OTHER = new Map(Object.entries(head.overlay ? head.overlay.poses : {}).map(([key, pose]) => [Number(key), pose]));
 
 function other_pose(frame) {
@@ -85,7 +85,7 @@ function other_pose(frame) {
   return back && pose ? compose(inverse(back), pose) : null;
 }
 
-// Return in words how far a frame stands from itself in the other tree; "" where it is not in both.
+// Return in words how far a frame is from itself in the other tree; "" where it is not in both.
 function difference(frame) {
   const here = lookup(state.fixed, frame, state.t).pose, there = other_pose(frame);
   if (!here || !there) return "";
@@ -101,7 +101,7 @@ function shown() {
     && (!path || path.has(frame)) && (!state.only_found || !state.found || state.found.has(frame)));
 }
 
-// ---- trails: where moving frames, and the source, went in `fixed`; null where the line breaks
+// ---- trails: where frames that move went in `fixed`, violet to green; null where it breaks
 const MOST_TRAIL = 4000, PARTS = 8;
 let trails = [];
 
