@@ -1,4 +1,4 @@
-// Rigid-body arithmetic by the very steps and names of frametool.geometry, only + - * / and roots: page and command
+// Rigid-body arithmetic by the steps and names of frametool.geometry, only + - * / and roots: page and command
 // print the same digits.  A pose is [tx, ty, tz, x, y, z, w], parent_from_child.
 
 const EPS = 2 ** -52, UNIT = 4 * EPS, TINY = 1e-150, LOCK = EPS * EPS;
