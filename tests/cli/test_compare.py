@@ -245,3 +245,14 @@ def test_the_python_face_gives_what_the_command_prints(run: Run, tmp_path: Path)
         frametool.compare(ref, frametool.Trajectory(est.stamps_ns / 1e9, est.xyz))
     with pytest.raises(TypeError, match="aling"):
         frametool.compare(ref, est, aling="yaw")
+
+
+def test_view_draws_the_path_coloured_by_time_and_several_side_by_side(run: Run, tmp_path: Path) -> None:
+    files = {name: FILES[name] for name in DRONE}
+    done = run("view", "drone-ref.tum", "--with", "drone-est.tum", "--frames", "world,ref", "--frames", "world,est", "-o", "paths.svg", files=files)
+    assert done.status == 0
+    text = (tmp_path / "paths.svg").read_text()
+    for name in ("ref", "est"):
+        shades = re.findall(rf'<path stroke="(#\w{{6}})"[^>]*><title>{name}</title>', text)
+        assert len(shades) >= 20
+        assert len(set(shades)) == len(shades)
