@@ -256,3 +256,10 @@ def test_view_draws_the_path_coloured_by_time_and_several_side_by_side(run: Run,
         shades = re.findall(rf'<path stroke="(#\w{{6}})"[^>]*><title>{name}</title>', text)
         assert len(shades) >= 20
         assert len(set(shades)) == len(shades)
+
+
+def test_a_report_is_replaced_with_force_alone(run: Run) -> None:
+    arguments = ("compare", *DRONE, "--report", "error.svg")
+    assert run(*arguments, files=FILES).status == 0
+    assert run(*arguments, files=FILES).status == 5
+    assert run(*arguments, "--force", files=FILES).status == 0
