@@ -34,7 +34,8 @@ READ = readers("tree", "records", "rows", "arrays", "joints")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 
-NEEDS = {"force": ("output", "plot", "report", "view"), "tolerance": ("find",)}  # option -> those without which it would not be used
+# option -> those without which it would not be used
+NEEDS = {"force": ("output", "plot", "report", "view"), "tolerance": ("find",)}
 
 
 class Command(WithHelp, Reused):
