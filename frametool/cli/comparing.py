@@ -159,7 +159,7 @@ def trajectory(argument: str, on_error: str, form: str = "") -> tuple[Trajectory
     from os.path import basename
 
     from frametool.stream.faults import BadRows
-    from frametool.stream.trajectories import read_trajectory
+    from frametool.stream.trajectories import read_trajectory, split_name
 
     made: list[BadRows] = []
 
@@ -168,7 +168,9 @@ def trajectory(argument: str, on_error: str, form: str = "") -> tuple[Trajectory
         return made[-1]
 
     found = read_trajectory(argument, form=form, topics=settings().topics, answers=answers(), policy=policy)
-    return found, "stdin" if argument == "-" else basename(argument), any(bad.count for bad in made)
+    file, inside = split_name(argument)
+    name = ":".join(["stdin" if file == "-" else basename(file), *inside])
+    return found, name, any(bad.count for bad in made)
 
 
 def comparisons(ref: str, ests: Sequence[str], options: dict[str, Any]) -> tuple[list[Comparison], bool]:

@@ -19,9 +19,10 @@ from frametool.formats.table import FORMATS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.grammar.edges import Answers
 from frametool.grammar.pose_algebra import sample_stamps
-from frametool.grammar.result import Style
+from frametool.grammar.result import Result, Style
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
+from frametool.stream.record_values import stream_results
 from frametool.stream.request import Operation, Request
 from frametool.stream.run import Outcome, run
 
@@ -31,8 +32,10 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from frametool.frames.buffer import TransformBuffer
+    from frametool.text.lines import ByteStream
 
 POSITION = 3  # numbers
+TREE = rb"""(?m)^\s*(?:---\s*)?\{?\s*["']?(?:frames|transforms|angles)["']?\s*:"""  # keys of a tree, not of a record
 
 
 def load_trajectory(
@@ -78,10 +81,12 @@ def read_trajectory(
     file = InputFile(name)
     if not form:
         form = detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)[0]
-    if {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
+    is_record = "records" in FORMATS[form].reads and not re.search(TREE, file.head())
+    if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
         return _of_tree(name, form, topics, answers, inside, file)
     try:
-        return _of_rows(file, form, answers, policy(file.name))
+        bad = policy(file.name)
+        return _of_records(file, form, bad) if is_record else _of_rows(file, form, answers, bad)
     finally:
         file.close()
 
@@ -135,6 +140,28 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Traj
     times: Any = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
     turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
     return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body)
+
+
+def _of_records(file: InputFile, form: str, bad: BadRows) -> Trajectory:
+    """Gather records one by one: poses, or points, with their stamps."""
+    poses, stamps, named = [], [], set()
+    for each in stream_results(cast("ByteStream", file.stream), form, Request(), Style("tum"), bad):
+        if not isinstance(each, Result) or each.pose.position is None:
+            raise FormatError("a trajectory is made of poses, or of points with stamps", source=file.name)
+        poses.append(each.pose)
+        stamps.append(each.extras.get("stamp_ns"))
+        named.add((each.pose.parent, each.pose.name))
+    if not poses:
+        raise FormatError("no poses in it", source=file.name)
+    if stamps.count(None) not in (0, len(stamps)):
+        raise FormatError("some poses have a stamp and some have none", source=file.name)
+    has_turns = all(pose.rotation is not None for pose in poses)
+    columns = np.array([pose.components for pose in poses])
+    parent, name = named.pop() if len(named) == 1 else (None, None)
+    times: Any = None if stamps[0] is None else np.array(stamps, np.int64)
+    return Trajectory(
+        times, columns[:, :POSITION], columns[:, POSITION:] if has_turns else None, parent or WORLD, name or BODY
+    )
 
 
 def _all(names: Sequence[str | None], others: Sequence[str | None]) -> Sequence[str | None]:

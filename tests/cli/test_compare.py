@@ -263,3 +263,15 @@ def test_a_report_is_replaced_with_force_alone(run: Run) -> None:
     assert run(*arguments, files=FILES).status == 0
     assert run(*arguments, files=FILES).status == 5
     assert run(*arguments, "--force", files=FILES).status == 0
+
+
+def test_records_with_stamps_are_a_trajectory(run: Run) -> None:
+    wanted = found(run, *DRONE)["ate"]
+    lines = run("convert", "-i", "drone-est.tum", "-f", "json", files=FILES).out
+    files = FILES | {"est.jsonl": lines}
+    assert json.loads(run("compare", "drone-ref.tum", "est.jsonl", "-f", "json", files=files).out)["ate"] == wanted
+    points = "".join(json.dumps({"stamp_ns": each["stamp_ns"], "point": each["xyz"]}) + "\n" for each in map(json.loads, lines.splitlines()))
+    alone = json.loads(run("compare", "drone-ref.tum", "-", "-f", "json", stdin=points, files=FILES).out)["ate"]
+    assert (alone["m"], alone["deg"]) == (wanted["m"], None)
+    mixed = lines + '{"xyz": [1, 2, 3]}\n'
+    assert "some poses have a stamp and some have none" in run("compare", "drone-ref.tum", "-", stdin=mixed, files=FILES).err
