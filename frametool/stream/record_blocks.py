@@ -143,18 +143,21 @@ class RecordBlocks:
 
         clean = _is_text(chunk)
         parts, found.closed = self.splitter.parts(chunk, match)
-        at = 0
+        line = text.count(b"\n", 0, start)
+        at = counted = below = 0
         for part in parts:
             if part.begin > at:
                 found.odd.append((start + at, chunk[at : part.begin]))
             at = part.after
+            below, counted = below + chunk.count(b"\n", counted, part.start), part.start  # lines of the chunk
             hit = None if part.problem else matches.get(part.start) or self._match(chunk, part.start, part.end)
             if hit is None:
-                learned: Template | bytes | Fault | Rendered = self._learn(chunk, part)
-                line = text.count(b"\n", 0, start)
+                learned: Template | bytes | Fault | Rendered = (
+                    Fault(below, "", part.problem) if part.problem else self._learn(chunk, part)
+                )
                 if isinstance(learned, Template) and learned.is_long and not self.request.in_order:
                     learned = rendered(
-                        learned, self.request, chunk.count(b"\n", 0, part.start), column_in(chunk, part.start)
+                        learned, self.request, below, column_in(chunk, part.start)
                     )
                 if isinstance(learned, Rendered):
                     row = chunk[part.begin : part.start] + learned.text + chunk[part.end : part.after]
