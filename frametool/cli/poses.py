@@ -275,7 +275,7 @@ def _factor(text: str, *, is_inverse: bool) -> Factor:
     return Factor(bare if bare != text.strip() else text, is_inverse)
 
 
-class Given(NamedTuple):
+class ArgumentPoses(NamedTuple):
     """What an argument holds: its poses, the keys that stand beside any of them, and what was odd in it."""
 
     source: Source
@@ -295,7 +295,7 @@ class Given(NamedTuple):
         return self.poses
 
 
-def _given(argument: str, request: Request) -> Given:
+def _given(argument: str, request: Request) -> ArgumentPoses:
     """Read all poses of one of several arguments; warnings are kept, not told, a covariance is refused."""
     from frametool.stream.record_values import read_given
     from frametool.stream.request import COMBINED
@@ -303,13 +303,13 @@ def _given(argument: str, request: Request) -> Given:
     request = request._replace(operation=COMBINED)
     odd: list[tuple[Any, ...]] = []
     with heard_by(lambda *said: odd.append(said)):
-        found: list[Given] = [
-            *_read(argument, request, lambda source: [Given(source, *read_given(source, request), odd)])
+        found: list[ArgumentPoses] = [
+            *_read(argument, request, lambda source: [ArgumentPoses(source, *read_given(source, request), odd)])
         ]
     return found[0]
 
 
-def _several(given: Sequence[Given | None]) -> list[int]:
+def _several(given: Sequence[ArgumentPoses | None]) -> list[int]:
     """Return where the argument that holds several poses stands; raise ValueInvalid if another one does too."""
     found = [at for at, each in enumerate(given) if each and len(each.poses) > 1]
     if len(found) > 1:

@@ -38,19 +38,18 @@ def command(ref: str, est: str, names: str | None, deg: bool, **options: Any) ->
     into = Output("poses", **shaping, deg=deg) if shaping["output"] else None
     form = {"format_name": None if into else shaping["format_name"], "output": None, "force": False}
     entry = Output("poses", **(shaping | form), deg=deg)
+    chosen = _names(names)
     (found,), skipped = comparisons(ref, [est], options)
     from frametool.fit.numbers import whole_estimate, worlds
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result
 
-    named = _names(names) or worlds(found)
+    named = chosen or worlds(found)
     extras = {"scale": found.fit.scale} if found.settings.align == "sim3" else {}
     whole = whole_estimate(found)._replace(world=found.pairs.ref.world)
-    if into is not None:
-        write_trajectory(into, whole)
-    if into is None and entry.is_trajectory:
-        write_trajectory(entry, whole)
-    else:
+    if into is not None or entry.is_trajectory:
+        write_trajectory(into or entry, whole)
+    if not entry.is_trajectory:
         entry.poses([Result(Pose.of(found.fit.transform.components, named[1], named[0]), extras)])
     return ROWS_SKIPPED if skipped else 0
 

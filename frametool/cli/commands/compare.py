@@ -93,7 +93,8 @@ def command(
         from frametool.view.comparison_text import write_explanation
 
         every = [numbers(each) for each in found]
-        passed = [(each, limit) for each in every for limit in limits or () if limit.passed(each) is not None]
+        asked = [(each, limit) for each in every for limit in limits or ()]
+        passed = [(each, limit, now) for each, limit in asked if (now := limit.passed(each)) is not None]
         for name in filter(None, (report, instead)):
             _write_report(found, name, force=shaping["force"])
         if explain:
@@ -104,9 +105,9 @@ def command(
         if limits:
             error.exit_code = TROUBLE
         raise
-    for each, limit in passed:
-        say(f"limit passed: {each['est']}: {limit.name} is {limit.passed(each):.6g}, {limit.text}")
-    return PASSED if passed else ROWS_SKIPPED if skipped and not limits else TROUBLE if skipped else 0
+    for each, limit, now in passed:
+        say(f"limit passed: {each['est']}: {limit.name} is {now:.6g}, {limit.text}")
+    return PASSED if passed else (TROUBLE if limits else ROWS_SKIPPED) if skipped else 0
 
 
 def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> None:
