@@ -1,0 +1,107 @@
+"""Poses as arrays of matrices, what a fit needs of them: products, errors, small steps and how these act.
+
+turns: (n, 3, 3) rotations; places: (n, 3), metres.  An error or a step is (n, 6): metres and a rotation vector, both
+along the fixed axes of the frame a pose is given in, as the covariances of ROS: place + d[:3], Exp(d[3:]) turn.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.geometry import arrays, matrix, quaternion, vectors
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from frametool.geometry.types import Array, Quaternion
+
+NEAR = 1e-4  # radians: below, the series of J^-1 is exact to the last bits
+
+
+class Poses(NamedTuple):
+    """Many poses, or one without the first axis."""
+
+    turns: Any
+    places: Any
+
+    @classmethod
+    def of(cls, transform: Transform) -> Poses:
+        """Take transforms."""
+        whole = transform.as_matrix()
+        return cls(whole[..., :3, :3].copy(), whole[..., :3, 3].copy())
+
+    @property
+    def transform(self) -> Transform:
+        """The same as transforms."""
+        x, y, z = np.moveaxis(self.places, -1, 0)
+        return Transform.of(x, y, z, *as_quaternion(self.turns))
+
+    @property
+    def inverse(self) -> Poses:
+        """The poses the other way round."""
+        back = np.swapaxes(self.turns, -1, -2)
+        return Poses(back, -np.einsum("...ij,...j->...i", back, self.places))
+
+    def __matmul__(self, other: Poses) -> Poses:
+        """Compose: a_from_c = a_from_b @ b_from_c."""
+        return Poses(self.turns @ other.turns, self.apply(other.places))
+
+    def apply(self, points: Array) -> Array:
+        """Move points."""
+        moved: Array = np.einsum("...ij,...j->...i", self.turns, points) + self.places
+        return moved
+
+    def at(self, index: Any) -> Poses:
+        """Choose poses as numpy does."""
+        return Poses(self.turns[index], self.places[index])
+
+    def stepped(self, steps: Array) -> Poses:
+        """Add small steps: place + d[:3], Exp(d[3:]) turn."""
+        return Poses(exp(steps[..., 3:]) @ self.turns, self.places + steps[..., :3])
+
+    def errors(self, measured: Poses) -> Array:
+        """Return [place - measured place, Log(turn measured turn')]."""
+        turned = log(self.turns @ np.swapaxes(measured.turns, -1, -2))
+        return np.concatenate([self.places - measured.places, turned], -1)
+
+
+def as_quaternion(turns: Array) -> Quaternion:
+    """Return x, y, z, w >= 0 of rotation matrices."""
+    entries = matrix.nine(turns[..., i, j] for i in range(3) for j in range(3))
+    return quaternion.unit(*matrix.to_quaternion(*entries, arrays), arrays)
+
+
+def exp(rotvecs: Array) -> Array:
+    """Return the rotation matrices of rotation vectors (.., 3), radians."""
+    x, y, z = np.moveaxis(rotvecs, -1, 0)
+    nine = quaternion.to_matrix(*vectors.from_rotvec(x, y, z, arrays))
+    return np.stack(nine, -1).reshape(*rotvecs.shape, 3)
+
+
+def log(turns: Array) -> Array:
+    """Return the rotation vectors of rotation matrices (.., 3, 3)."""
+    x, y, z, w = as_quaternion(turns)
+    return np.stack(vectors.as_rotvec(x, y, z, w, arrays), -1)
+
+
+def skew(v: Array) -> Array:
+    """Return [v]x of vectors (.., 3): [v]x a = v x a."""
+    x, y, z = np.moveaxis(v, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape, 3)
+
+
+def inverse_left_jacobian(rotvecs: Array) -> Array:
+    """Return J^-1(w): Log(Exp(d) Exp(w)) = w + J^-1(w) d for small d.
+
+    Source: Barfoot 2017, eq. 7.77b; I - [w]x / 2 + (1 / a^2 - (1 + cos a) / (2 a sin a)) [w]x^2, a = |w|.
+    """
+    angle = np.linalg.norm(rotvecs, axis=-1)
+    far = angle > NEAR
+    a = np.where(far, angle, 1.0)
+    factor = np.where(far, 1.0 / a**2 - 1.0 / (2.0 * a * np.tan(a / 2.0)), 1.0 / 12.0)
+    crossed = skew(rotvecs)
+    return np.eye(3) - crossed / 2.0 + factor[..., None, None] * (crossed @ crossed)
