@@ -106,7 +106,7 @@ def test_the_package_stays_as_small_as_it_can_be_read() -> None:
     files, lines = rooms()
     assert lines.total() - lines["later"] <= 34_500  # 33 367 before what is read and told was made whole
     assert files.total() - files["later"] <= 250
-    assert lines["later"] <= 1_800
+    assert lines["later"] <= 4_000  # trajectories compared: 1 800; measurements solved, covariances, scale: 2 200
 
 
 def loaded_by(*arguments: str, stdin: str = "") -> set[str]:

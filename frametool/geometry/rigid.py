@@ -1,8 +1,8 @@
 """Kernels of rigid transforms: translation tx, ty, tz in metres, then the unit quaternion x, y, z, w.
 
 Products and inverses; the way between two poses, prepared once and walked at many fractions, its rotation that of
-`quaternion.slerp` to the bit; chains of joints, whose fixed pieces cost nothing where they are zero; and twists,
-wrenches and covariances seen from another frame (linear part first), by the adjoint.
+`quaternion.slerp` to the bit; chains of joints, whose fixed pieces cost nothing where they are zero; and twists and
+wrenches seen from another frame (linear part first), by the adjoint.
 Knows numbers only; components are floats or arrays of one shape, and both take the same steps.
 """
 
@@ -18,9 +18,6 @@ from frametool.geometry.quaternion import cross, either, length, settled
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from typing import TypeAlias
-
     from frametool.geometry.types import (
         Components,
         Eight,
@@ -36,7 +33,6 @@ if TYPE_CHECKING:
         Two,
         Vector,
     )
-    Rows: TypeAlias = Sequence[Sequence[float]]
 
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 SERIES_EXP = 1.5  # rad: above, a - sin(a) loses less than a digit; below, ten terms of its series are exact
@@ -310,45 +306,3 @@ def move_twist(
     bx, by, bz = quaternion.rotate(x, y, z, w, wx, wy, wz)
     cx, cy, cz = quaternion.cross(tx, ty, tz, bx, by, bz)
     return ax + cx, ay + cy, az + cz, bx, by, bz
-
-
-def rotate_covariance(x: float, y: float, z: float, w: float, covariance: Sequence[float]) -> list[float]:
-    """Turn a 3 x 3 or 6 x 6 covariance, row-major: each 3 x 3 block C becomes R C R^T.
-
-    Of six that is the covariance of a position and of small rotations about fixed axes, as ROS has it.
-    """
-    turn = quaternion.to_matrix(x, y, z, w)
-    rows = [turn[0:3], turn[3:6], turn[6:9]]
-    size = 3 if len(covariance) == 9 else 6
-    moved = [0.0] * len(covariance)
-    for top in range(0, size, 3):
-        for left in range(0, size, 3):
-            block = [[covariance[size * (top + i) + left + j] for j in range(3)] for i in range(3)]
-            for i, row in enumerate(_product(_product(rows, block), _transposed(rows))):
-                moved[size * (top + i) + left : size * (top + i) + left + 3] = row
-    return moved
-
-
-def move_covariance(move: Callable[..., Six[float]], pose: Rigid, covariance: Sequence[float]) -> list[float]:
-    """Move the 6 x 6 covariance of a twist or wrench: A C A^T, where A is what `move` does by a pose."""
-    columns = [move(*pose, *[float(i == j) for j in range(6)]) for i in range(6)]
-    adjoint = _transposed(columns)
-    rows = [covariance[6 * i : 6 * i + 6] for i in range(6)]
-    return [value for row in _product(_product(adjoint, rows), columns) for value in row]
-
-
-def _product(a: Rows, b: Rows) -> list[list[float]]:
-    columns = _transposed(b)
-    return [[_inner(row, column) for column in columns] for row in a]
-
-
-def _inner(row: Sequence[float], column: Sequence[float]) -> float:
-    """Return the sum of the products in their order: `sum` compensates its rounding from Python 3.12 on."""
-    total = 0.0
-    for x, y in zip(row, column, strict=True):
-        total += x * y
-    return total
-
-
-def _transposed(a: Rows) -> list[list[float]]:
-    return [list(column) for column in zip(*a, strict=True)]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from frametool.errors import FormatError
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Note, Path
 
     Report = Callable[[FormatError], None]
@@ -30,6 +30,7 @@ class Edge(NamedTuple):
     received_ns: when the recorder got it, if that is known
     path: in a document, the way to it from the top of the text
     topic: by which it came, if that is known
+    covariance: 36 entries as `geometry.uncertainty` has them, the same for all samples of a frame; None: exact
     """
 
     parent: str | None
@@ -40,6 +41,7 @@ class Edge(NamedTuple):
     received_ns: int | None = None
     path: Path = ()
     topic: str = ""
+    covariance: Components | None = None
 
 
 class Samples(NamedTuple):

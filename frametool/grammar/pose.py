@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, bare, did_you_mean, shown
-from frametool.geometry import rigid
+from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
 from frametool.grammar.rotation_spelling import AGREEMENT, AXES_KEY, ROTATION_KEYS, agreeing_rotation, read_rotation
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Quaternion, Vector
 
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001}
@@ -33,28 +32,44 @@ DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "a
 NAMES = frozenset(("name", "parent"))
 MOST_NAMED = 5  # unknown keys in one message, if they fit into
 MOST_CHARACTERS = 80
-POSE_KEYS = frozenset((*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, "inverse", "angles", "scale", AXES_KEY))
+SCALE = "scale"
+UNCERTAIN = frozenset(("sigma", "covariance"))
+SIMILARITY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
+POSE_KEYS = frozenset(
+    (*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *UNCERTAIN, "inverse", "angles", SCALE, AXES_KEY)
+)
 
 
 class Pose(NamedTuple):
-    """One record: the pose of `name` in `parent`, and its time; what was not given is None."""
+    """One record: the pose of `name` in `parent`, and its time; what was not given is None.
+
+    covariance: its 36 entries, None where it is exact; scale: of a similarity p' = scale R p + t
+    """
 
     position: Vector | None = None
     rotation: Quaternion | None = None
     name: str | None = None
     parent: str | None = None
     stamp_ns: int | None = None
+    covariance: Components | None = None
+    scale: float = 1.0
 
     @classmethod
     def of(cls, components: Sequence[float], name: str | None = None, parent: str | None = None) -> Pose:
-        """Make a pose of tx, ty, tz, x, y, z, w."""
-        tx, ty, tz, x, y, z, w = components
-        return cls((tx, ty, tz), (x, y, z, w), name, parent)
+        """Make a pose of tx, ty, tz, x, y, z, w, and of its covariance or scale as `placed` has them."""
+        tx, ty, tz, x, y, z, w, *beside = components
+        covariance = tuple(beside) if len(beside) > 1 else None
+        return cls((tx, ty, tz), (x, y, z, w), name, parent, None, covariance, beside[0] if len(beside) == 1 else 1.0)
 
     @property
     def components(self) -> Rigid:
         """Return tx, ty, tz, x, y, z, w; what is missing is 0 and the identity."""
         return (*(self.position or (0.0, 0.0, 0.0)), *(self.rotation or (0.0, 0.0, 0.0, 1.0)))
+
+    @property
+    def placed(self) -> Components:
+        """Return the components, with the covariance or the scale behind them: as `geometry.placed` has them."""
+        return (*self.components, *(self.covariance or ()), *([self.scale] * (self.scale != 1.0)))
 
     @property
     def transform(self) -> Transform:
@@ -74,12 +89,16 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     position: Vector | None = None
     rotation: Quaternion | None = None
     outer_degrees = reading.degrees
-    if "scale" in mapping:
-        refuse_scale(mapping["scale"])
+    if SCALE in mapping:
+        refuse_scale(mapping[SCALE])
     if "angles" in mapping:
         reading.degrees = read_angle_unit(mapping["angles"])
-    key = ""
+    key, uncertain = "", None
     try:
+        if not UNCERTAIN.isdisjoint(mapping):
+            from frametool.grammar.covariance import read_covariance
+
+            uncertain = read_covariance(mapping, reading)
         for key, value in mapping.items():
             if key in POSITION_KEYS:
                 position = _agreeing_position(position, read_position(value, POSITION_KEYS[key]))
@@ -89,7 +108,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
                 if moved is not None:
                     position = _only_position(position, moved)
     except Misfit as error:
-        raise error.below(key) from None
+        raise error.below(key) if key else error from None
     except ValueInvalid as error:
         raise Misfit(str(error), (key,), rule=error.rule) from None
     finally:
@@ -97,16 +116,20 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     name, parent = mapping.get("name", ""), mapping.get("parent", "")
     if not (name and parent and type(name) is type(parent) is str):
         name, parent = read_name(mapping, "name"), read_name(mapping, "parent")
-    pose = Pose(position, rotation, name, parent)
+    pose = Pose(position, rotation, name, parent, None, uncertain)
     return inverted(pose) if "inverse" in mapping and _read_flag(mapping["inverse"]) else pose
 
 
 def inverted(pose: Pose) -> Pose:
     """Return the inverse numbers under the same names: what `inverse: true` means."""
-    components = rigid.inverse(*pose.components)
+    from frametool.geometry import placed
+
+    back = Pose.of(placed.inverse(pose.placed))
     return pose._replace(
-        position=None if pose.position is None else components[:3],
-        rotation=None if pose.rotation is None else components[3:],
+        position=None if pose.position is None else back.position,
+        rotation=None if pose.rotation is None else back.rotation,
+        covariance=back.covariance,
+        scale=back.scale,
     )
 
 
@@ -136,6 +159,19 @@ def _read_flag(value: Any) -> bool:
     return bool(value == "true")
 
 
+def read_scale(value: Any) -> float:
+    """Read the scale of a similarity; raises Misfit, and NotARotation for one that is not positive."""
+    if type(value) is not str:
+        raise Misfit(f"scale must be one number, found {kind(value)}", (SCALE,))
+    try:
+        scale = parse_number(value)
+    except ValueInvalid as error:
+        raise Misfit(str(error), (SCALE,)) from None
+    if scale <= 0.0:
+        raise NotARotation(f"scale is {value}; it must be positive", (SCALE,))
+    return scale
+
+
 def refuse_scale(value: Any) -> None:
     """Stop at the scale of a pose unless it is 1, or three of them: what is scaled is no pose."""
     parts = value if type(value) is list else [*value.values()] if type(value) is dict else [value]
@@ -144,9 +180,7 @@ def refuse_scale(value: Any) -> None:
     except (ValueInvalid, TypeError):
         is_one = False
     if not is_one:
-        found = bare(" ".join(parts)) if all(type(part) is str for part in parts) else kind(value)
-        message = f"scaled by {found}: a similarity, not a pose; beside a pose scale can only be 1"
-        raise NotARotation(message, ("scale",))
+        raise NotARotation(SIMILARITY, (SCALE,))
 
 
 def read_position(value: Any, unit: float) -> Vector:

@@ -45,7 +45,7 @@ class Misfit(ValueInvalid):
 
 
 class NotARotation(Misfit):
-    """Numbers that were read well but make no rotation."""
+    """Numbers that were read well but make no rotation, no covariance, or no pose."""
 
 
 class Note(NamedTuple):

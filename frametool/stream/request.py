@@ -154,12 +154,16 @@ class Operation(NamedTuple):
         """Move the covariances of a thing by `edge`, else by `left`; what else comes beside it stays."""
         if (mover := edge or self.left) is None:
             return numbers
+        if not shape.covariance:
+            return numbers
+        from frametool.geometry import uncertainty
+
         moved: list[Number] = []
         for size in shape.covariance:
             if shape.kind in (TWIST, WRENCH):
-                moved += rigid.move_covariance(MOVERS[shape.kind], mover, numbers[:size])
+                moved += uncertainty.moved(MOVERS[shape.kind], mover, numbers[:size])
             else:
-                moved += rigid.rotate_covariance(*mover[3:], numbers[:size])
+                moved += uncertainty.turned(numbers[:size], *mover[3:])
             numbers = numbers[size:]
         return (*moved, *numbers)
 

@@ -1,0 +1,89 @@
+"""Poses with what counts beside them: seven components alone, eight with a scale, 43 with a covariance.
+
+The eighth is s of the similarity p' = s R p + t; the 36 are the entries that `uncertainty` describes.  What is alone is
+exact, and of scale 1.  No pose has both.  Components are floats or arrays of one shape.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from frametool.errors import ValueInvalid
+from frametool.geometry import rigid
+
+if TYPE_CHECKING:
+    from frametool.geometry.types import Components, Number, Rigid
+
+RIGID, SCALED, UNCERTAIN = 7, 8, 43  # components
+SIMILARITY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
+
+
+def compose(a: Components, b: Components) -> Components:
+    """Return a_from_c of a_from_b and b_from_c: s = s1 s2, R = R1 R2, t = t1 + s1 R1 t2."""
+    if len(a) == len(b) == RIGID:
+        return rigid.compose(*a, *b)
+    first, second = pose_of(a), pose_of(b)
+    if SCALED in (len(a), len(b)):
+        _refuse_both(a, b)
+        s1, s2 = scale_of(a), scale_of(b)
+        x, y, z = second[:3]
+        return (*rigid.compose(*first, s1 * x, s1 * y, s1 * z, *second[3:]), s1 * s2)
+    from frametool.geometry import uncertainty
+
+    beside = uncertainty.composed(first, covariance_of(a), second, covariance_of(b))
+    return (*rigid.compose(*first, *second), *(beside or ()))
+
+
+def inverse(a: Components) -> Components:
+    """Return b_from_a of a_from_b: 1/s, R', -R' t / s."""
+    pose = pose_of(a)
+    x, y, z, *rotation = rigid.inverse(*pose)
+    if len(a) == SCALED:
+        s = scale_of(a)
+        return (x / s, y / s, z / s, *rotation, 1.0 / s)
+    if len(a) == RIGID:
+        return (x, y, z, *rotation)
+    from frametool.geometry import uncertainty
+
+    return (x, y, z, *rotation, *uncertainty.inverted(pose, a[RIGID:]))
+
+
+def relative(a: Components, b: Components) -> Components:
+    """Return b seen from a: inverse(a) b."""
+    first, second = pose_of(a), pose_of(b)
+    pose = rigid.relative(*first, *second)
+    if len(a) == len(b) == RIGID:
+        return pose
+    _refuse_scales(a, b)
+    from frametool.geometry import uncertainty
+
+    of_a = covariance_of(a)
+    back = rigid.inverse(*first)
+    beside = uncertainty.composed(back, of_a and uncertainty.inverted(first, of_a), second, covariance_of(b))
+    return (*pose, *(beside or ()))
+
+
+def pose_of(a: Components) -> Rigid:
+    """Return the seven components of a pose."""
+    tx, ty, tz, x, y, z, w = a[:RIGID]
+    return tx, ty, tz, x, y, z, w
+
+
+def covariance_of(a: Components) -> Components | None:
+    """Return the covariance of a pose; None where it is exact."""
+    return a[RIGID:] if len(a) == UNCERTAIN else None
+
+
+def scale_of(a: Components) -> Number:
+    """Return the scale of a similarity; 1 of a pose."""
+    return a[RIGID] if len(a) == SCALED else 1.0
+
+
+def _refuse_both(a: Components, b: Components) -> None:
+    if UNCERTAIN in (len(a), len(b)):
+        raise ValueInvalid("the covariance cannot be carried through a scale; leave one of them out")
+
+
+def _refuse_scales(a: Components, b: Components) -> None:
+    if SCALED in (len(a), len(b)):
+        raise ValueInvalid(SIMILARITY)

@@ -1,0 +1,135 @@
+"""Covariances of poses, points, twists and wrenches, to first order: how they move, compose and invert.
+
+Of a pose: over (x, y, z, turns about X, Y, Z), metres and radians, along the fixed axes of its parent, as ROS has it:
+t + d[:3], Exp(d[3:]) R.  Entries are row-major, 36 of a pose and 9 of a point, floats or arrays; None is exact.
+Results are symmetric to the bit: what is below the diagonal is written from above it.
+Source: Barfoot 2017, section 7.3; in the parent's axes both Jacobians are a lever arm and a turn.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from frametool.geometry import quaternion
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.types import Components, Number, Rigid
+
+    Entries: TypeAlias = Sequence[Any]
+    Rows: TypeAlias = list[list[Any]]
+
+POSE, POINT = 36, 9  # entries
+
+
+def composed(a: Rigid, of_a: Entries | None, b: Rigid, of_b: Entries | None) -> Components | None:
+    """Return the covariance of a_from_c of those of a_from_b and b_from_c: [I, -[R t_b]x; 0, I] A [..]' + R B R'."""
+    arm = quaternion.rotate(*a[3:], *b[:3])
+    return added(of_a and levered(of_a, *arm), of_b and turned(of_b, *a[3:]))
+
+
+def inverted(pose: Rigid, entries: Entries) -> Components:
+    """Return the covariance of b_from_a of that of a_from_b: R' [I, [t]x; 0, I] A [..]' R."""
+    x, y, z, *rotation = pose
+    return turned(levered(entries, -x, -y, -z), *quaternion.conjugate(*rotation))
+
+
+def of_point(pose: Rigid, entries: Entries | None, point: Components, of_point: Entries | None) -> Components | None:
+    """Return the 3 x 3 covariance of a moved point: [I, -[R p]x] A [..]' + R C R'."""
+    arm = quaternion.rotate(*pose[3:], *point)
+    moved = entries and blocks(levered(entries, *arm))[0]
+    return added(moved and symmetric(moved), of_point and turned(of_point, *pose[3:]))
+
+
+def of_vector(pose: Rigid, entries: Entries | None, vector: Components, of_vector: Entries | None) -> Components | None:
+    """Return the 3 x 3 covariance of a turned vector: [R v]x A_rr [R v]x' + R C R'."""
+    crossed = skew(*quaternion.rotate(*pose[3:], *vector))
+    moved = entries and symmetric(product(product(crossed, blocks(entries)[2]), transposed(crossed)))
+    return added(moved, of_vector and turned(of_vector, *pose[3:]))
+
+
+def levered(entries: Entries, x: Number, y: Number, z: Number) -> Components:
+    """Return J A J' with J = [I, -[v]x; 0, I]: that of a point fixed to the frame, at v from its origin."""
+    placed, mixed, turning = blocks(entries)
+    arm = transposed(skew(x, y, z))  # -[v]x
+    across = plus(mixed, product(arm, turning))
+    whole = plus(plus(placed, product(arm, transposed(mixed))), product(across, transposed(arm)))
+    return of_blocks(whole, across, turning)
+
+
+def turned(entries: Entries, x: Number, y: Number, z: Number, w: Number) -> Components:
+    """Return each 3 x 3 block C as R C R'."""
+    rows = _rows(quaternion.to_matrix(x, y, z, w))
+    back = transposed(rows)
+    if len(entries) == POINT:
+        return symmetric(product(product(rows, _rows(entries)), back))
+    placed, mixed, turning = (product(product(rows, block), back) for block in blocks(entries))
+    return of_blocks(placed, mixed, turning)
+
+
+def moved(move: Callable[..., Components], pose: Rigid, entries: Entries) -> Components:
+    """Return that of a twist or wrench: A C A', where A is what `move` does by an exact pose."""
+    columns = [list(move(*pose, *[float(i == j) for j in range(6)])) for i in range(6)]
+    rows = [list(entries[6 * i : 6 * i + 6]) for i in range(6)]
+    return symmetric(product(product(transposed(columns), rows), columns))
+
+
+def added(a: Entries | None, b: Entries | None) -> Components | None:
+    """Return the covariance of independent things together."""
+    if a is None or b is None:
+        only = b if a is None else a
+        return None if only is None else tuple(only)
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+def blocks(entries: Entries) -> tuple[Rows, Rows, Rows]:
+    """Return that of the position, of position and turn, and of the turn."""
+    rows = [list(entries[6 * i : 6 * i + 6]) for i in range(6)]
+    return [row[:3] for row in rows[:3]], [row[3:] for row in rows[:3]], [row[3:] for row in rows[3:]]
+
+
+def of_blocks(placed: Rows, mixed: Rows, turning: Rows) -> Components:
+    """Join three blocks; the fourth is the second one's transpose."""
+    upper = [[*a, *b] for a, b in zip(placed, mixed, strict=True)]
+    lower = [[*a, *b] for a, b in zip(transposed(mixed), turning, strict=True)]
+    return symmetric(upper + lower)
+
+
+def symmetric(rows: Rows) -> Components:
+    """Return the entries of rows, those below the diagonal written from above it."""
+    size = range(len(rows))
+    return tuple(rows[min(i, j)][max(i, j)] for i in size for j in size)
+
+
+def skew(x: Number, y: Number, z: Number) -> Rows:
+    """Return [v]x: [v]x a = v x a."""
+    zero = x - x
+    return [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+
+
+def product(a: Rows, b: Rows) -> Rows:
+    """Multiply matrices, each sum in its order: `sum` compensates its rounding from Python 3.12 on."""
+    columns = transposed(b)
+    return [[_inner(row, column) for column in columns] for row in a]
+
+
+def _inner(row: Sequence[Any], column: Sequence[Any]) -> Any:
+    total = row[0] * column[0]
+    for x, y in zip(row[1:], column[1:], strict=True):
+        total = total + x * y
+    return total
+
+
+def plus(a: Rows, b: Rows) -> Rows:
+    """Add matrices."""
+    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+
+
+def transposed(a: Rows) -> Rows:
+    """Swap rows and columns."""
+    return [list(column) for column in zip(*a, strict=True)]
+
+
+def _rows(nine: Entries) -> Rows:
+    return [list(nine[at : at + 3]) for at in (0, 3, 6)]

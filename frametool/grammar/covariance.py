@@ -1,0 +1,194 @@
+"""How sure a pose is: `covariance`, 36 numbers or 6 rows of 6, and `sigma`, the roots of its diagonal.
+
+    {xyz: [1, 2, 3], sigma: {xyz_mm: 2, rpy_deg: [0.1, 0.1, 0.3]}}       a part that is left out is 0: exact
+    x, y, z, qx, qy, qz, qw, sigma_x, .. sigma_yaw                       or c11 .. c66, as columns
+
+Over (x, y, z, turns about X, Y, Z), metres and radians, along the fixed axes of the parent, as in ROS.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import did_you_mean, shown, warn
+from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
+from frametool.text.numbers import NotFinite, read_number_or_angle
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.geometry.types import Components
+    from frametool.grammar.readers import Path
+
+COVARIANCE, SIGMA = "covariance", "sigma"
+KEYS = frozenset((COVARIANCE, SIGMA))
+LENGTHS = {"xyz": 1.0, "xyz_mm": 1000.0, "xyz_cm": 100.0}  # keys of sigma, and how many make a metre
+ANGLES: dict[str, bool | None] = {"rpy": None, "rpy_deg": True, "rpy_rad": False}  # and whether they are degrees
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+UNKNOWN = -1.0  # as a covariance begins in ROS, where nothing is known
+ORDER = {36: "x y z, turns about X Y Z", 9: "x y z"}
+ASYMMETRY = 1e-6  # of the root of the product of the two variances
+NEGATIVE = 1e-9  # of the largest eigenvalue
+WIDE = 0.2  # radians
+WIDE_RULE = "wide"
+FIRST_ORDER = "sigma of a turn is {:.2g} rad: the first order is a few per cent off above 0.2"
+
+
+def columns(size: int = 36) -> tuple[str, ...]:
+    """Name the entries as columns: c11 .. c66 of a pose, c11 .. c33 of a point."""
+    axes = range(1, 7 if size == 36 else 4)
+    return tuple(f"c{i}{j}" for i in axes for j in axes)
+
+
+def read_covariance(mapping: dict[str, Any], reading: Reading) -> Components | None:
+    """Read the covariance that an entry says, either way; None where it says none: the pose is exact.
+
+    Raises Misfit with the path, NotARotation where numbers that were read make none.
+    """
+    if COVARIANCE in mapping and SIGMA in mapping:
+        raise NotARotation("sigma and covariance in one entry; give one", (SIGMA,), key=True)
+    if SIGMA in mapping:
+        return within((SIGMA,), of_sigmas, within((SIGMA,), read_sigmas, mapping[SIGMA], reading))  # type: ignore[no-any-return]
+    if COVARIANCE not in mapping:
+        return None
+    numbers = [number for _, number in within((COVARIANCE,), entries_of, mapping[COVARIANCE], (36,))]
+    within((COVARIANCE,), check, numbers)
+    return tuple(numbers)
+
+
+def entries_of(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
+    """Read the numbers of a covariance, each with its place: a list of them, or a list of rows."""
+    if type(value) is not list:
+        raise Misfit(f"covariance must be a list of numbers, found {kind(value)}")
+    rows: list[tuple[Path, Any]] = [((at,), row) for at, row in enumerate(value)]
+    if rows and all(type(row) is list for _, row in rows):
+        texts = [((*at, place), text) for at, row in rows for place, text in enumerate(row)]
+    else:
+        texts = rows
+    if len(texts) not in sizes:
+        each = [f"{size} are needed ({size**0.5:g}x{size**0.5:g}, row-major: {ORDER[size]})" for size in sizes]
+        wanted = " or ".join(each)
+        raise NotARotation(f"covariance has {len(texts)} numbers; {wanted}")
+    return [(path, within(path, _entry, text)) for path, text in texts]
+
+
+def _entry(text: Any) -> float:
+    try:
+        return read_number(text)
+    except NotFinite as error:
+        raise NotARotation(str(error)) from None
+
+
+def read_sigmas(value: Any, reading: Reading) -> list[float]:
+    """Read `sigma: {xyz: .., rpy_deg: ..}` as six numbers, metres and radians; each is one number or three."""
+    if type(value) is not dict or not value:
+        raise Misfit(f"sigma must be {{xyz: .., rpy_deg: ..}}, found {kind(value)}")
+    if unknown := [key for key in value if key not in LENGTHS and key not in ANGLES]:
+        known = (*LENGTHS, *ANGLES)
+        hint = did_you_mean(unknown[0], known) or f"; it has {', '.join(known)}"
+        raise Misfit(f"unknown key {shown(unknown[0])} in sigma{hint}", (unknown[0],), key=True)
+    sigmas = [0.0] * 6
+    for first, keys in ((0, LENGTHS), (3, ANGLES)):
+        there = [key for key in keys if key in value]
+        if len(there) > 1:
+            raise Misfit(f"{there[0]} and {there[1]} in one sigma; keep one", (there[1],), key=True)
+        for key in there:
+            sigmas[first : first + 3] = _three(key, value[key], AXES[first : first + 3], reading)
+    return sigmas
+
+
+def _three(key: str, value: Any, axes: Sequence[str], reading: Reading) -> list[float]:
+    """Read the three numbers of a part of sigma in metres or radians; one number stands for all three."""
+    from math import radians
+
+    if type(value) is dict:
+        if unknown := [each for each in value if each not in axes]:
+            raise Misfit(f"unknown key {shown(unknown[0])}; expected {', '.join(axes)}", (key, unknown[0]), key=True)
+        texts: list[tuple[Path, Any]] = [((key, axis), value.get(axis, "0")) for axis in axes]
+    elif type(value) is list:
+        if len(value) != len(axes):
+            raise Misfit(f"expected 3 numbers ({' '.join(axes)}) or one for all, found {len(value)}", (key,))
+        texts = [((key, at), text) for at, text in enumerate(value)]
+    else:
+        texts = [((key,), value)] * 3
+    degrees = reading.degrees if ANGLES.get(key) is None else ANGLES[key]
+    found = []
+    for path, text in texts:
+        number = within(path, _sigma, text, degrees if key in ANGLES else None)
+        found.append(number / LENGTHS[key] if key in LENGTHS else radians(number) if degrees else number)
+    return found
+
+
+def _sigma(text: Any, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
+    if type(text) is not str:
+        raise Misfit(f"expected a number, found {kind(text)}")
+    try:
+        number = read_number_or_angle(text, degrees)
+    except NotFinite as error:
+        raise NotARotation(str(error)) from None
+    if number < 0.0:
+        raise NotARotation(f"sigma is negative: {text}")
+    return number
+
+
+def of_sigmas(sigmas: Sequence[Any]) -> Components:
+    """Return the covariance of six independent sigmas, floats or arrays."""
+    zero = sigmas[0] - sigmas[0]
+    return tuple(sigmas[i] * sigmas[i] if i == j else zero for i in range(6) for j in range(6))
+
+
+def check(entries: Sequence[float]) -> None:
+    """Raise NotARotation unless these 36 or 9 numbers are a covariance: known, symmetric, not negative."""
+    size = 6 if len(entries) == 36 else 3
+    if entries[0] == UNKNOWN:
+        raise NotARotation("covariance[0] is -1: 'unknown' in ROS; leave the covariance out", (0,))
+    for i in range(size):
+        for j in range(i):
+            upper, lower = entries[size * j + i], entries[size * i + j]
+            both = entries[size * i + i] * entries[size * j + j]
+            if upper != lower and abs(upper - lower) > ASYMMETRY * abs(both) ** 0.5:
+                said = f"[{j}][{i}] is {short(upper)}, [{i}][{j}] is {short(lower)}"
+                raise NotARotation(f"covariance is not symmetric: {said}")
+    if not _is_positive(entries, size):
+        import numpy as np
+
+        least, *_, most = np.linalg.eigvalsh(np.reshape(entries, (size, size))).tolist()
+        if least < -NEGATIVE * abs(most):
+            raise NotARotation(f"covariance is not positive: its smallest eigenvalue is {short(least)}")
+
+
+def _is_positive(entries: Sequence[float], size: int) -> bool:
+    """Tell whether the factors of L D L' are all positive, or zero in a row of zeros; False says that one must look."""
+    rows = [list(entries[size * i : size * i + size]) for i in range(size)]
+    for k in range(size):
+        if rows[k][k] == 0.0 and not any(rows[i][k] for i in range(k, size)):
+            continue
+        if not rows[k][k] > 0.0:
+            return False
+        for i in range(k + 1, size):
+            factor = rows[i][k] / rows[k][k]
+            for j in range(k + 1, size):
+                rows[i][j] -= factor * rows[k][j]
+    return True
+
+
+def short(value: float) -> str:
+    """Write a number for a message: six digits, and 1e-5 rather than 1e-05."""
+    return f"{value:g}".replace("e-0", "e-").replace("e+0", "e+")
+
+
+def widest_turn(entries: Sequence[float]) -> float:
+    """Return the largest sigma of a turn about any axis, radians; what is surely below `WIDE` counts as 0."""
+    if len(entries) != 36 or entries[21] + entries[28] + entries[35] <= WIDE * WIDE:
+        return 0.0
+    import numpy as np
+
+    whole = np.reshape(entries, (6, 6))
+    return float(np.sqrt(max(np.linalg.eigvalsh(whole[3:, 3:])[-1], 0.0)))
+
+
+def warn_if_wide(found: Iterator[Sequence[float]]) -> None:
+    """Warn once if a turn is so uncertain that the first order is off by some per cent."""
+    widest = max(map(widest_turn, found), default=0.0)
+    if widest > WIDE:
+        warn(FIRST_ORDER.format(widest), rule=WIDE_RULE)
