@@ -415,6 +415,9 @@ rotation_options = together(
 pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, matrices off by 0.1")
 
 
+scale_option = click.option("--scale", is_flag=True, help="take a matrix s R as a similarity of scale s")
+
+
 def pose_result_options(*what: str) -> Callable[[Function], Function]:
     """Add to a command the options that say how poses are read, and those of its result."""
     return together(rotation_options, pose_options, result_options(*what))

@@ -92,6 +92,11 @@ class Output:
             self.pieces(self._blocks(iter(results)))
         else:
             found = list(results)
+            beside = {key for each in found for key in each.said(self.style)}
+            if "scale" in beside:
+                from frametool.stream.writers import refuse_scale_in
+
+                refuse_scale_in(self.style.form, beside)
             self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
             self._tell_dropped(key for each in found for key in each.extras)
 

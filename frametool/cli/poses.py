@@ -296,11 +296,12 @@ class ArgumentPoses(NamedTuple):
 
 
 def _given(argument: str, request: Request) -> ArgumentPoses:
-    """Read all poses of one of several arguments; warnings are kept, not told, a covariance is refused."""
+    """Read all poses of one of several arguments; warnings are kept, not told."""
     from frametool.stream.record_values import read_given
     from frametool.stream.request import COMBINED
 
-    request = request._replace(operation=COMBINED)
+    asked = request.operation
+    request = request._replace(operation=COMBINED._replace(similar=asked.similar, multiples=asked.multiples))
     odd: list[tuple[Any, ...]] = []
     with heard_by(lambda *said: odd.append(said)):
         found: list[ArgumentPoses] = [
@@ -356,6 +357,8 @@ def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose,
     given = [_given(each, request) for each in arguments]
     several = _several(given)
     read = [each.only_poses(timed=True) for each in given]
+    if any(pose.covariance is not None for poses in read for pose in poses):
+        warn("covariances left out: interpolate has none", rule="left-out")
     most = len(read[several[0]]) if several else 1
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 

@@ -199,7 +199,7 @@ class Stream:
     def _way(self, form: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
         """Choose how rows become results: their text edited, as columns of numbers, or as poses in another form."""
         from frametool.formats.rows.pose_rows import is_turned
-        from frametool.stream.row_layout import POSE
+        from frametool.stream.row_layout import POSE, Shape
 
         gathers = request.gathered is not None
         if holds_arrays(form) and (gathers or output.told is None or holds_arrays(output.told)):
@@ -209,7 +209,7 @@ class Stream:
         if gathers or form in RECORDS or is_kindred:
             return self._as_poses if gathers and listed else self._as_text
         # a trajectory has no room for more columns, or for other ones
-        no_room = output.is_trajectory and bool(request.operation.extras(POSE) or output.notations)
+        no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations)
         no_room |= not output.notations and is_turned(output.style.in_form(output.told or form))
         return self._as_poses if listed or no_room or output.told not in (None, form) else self._as_text
 

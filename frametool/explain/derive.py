@@ -417,15 +417,16 @@ def _move_pose(
     """Move a pose, and end with the result."""
     target, origin = map(printable, names)
     name = printable(given.pose.name or "it")
-    own = Result(Pose.of(Operation().pose([given.pose.components], mover, floats), given.pose.name, names[0]))
+    covariance = tuple(record.values[record.shape.own_size :])
+    moved = Operation(moves=True).pose([(*given.pose.components, *covariance)], mover, floats)
+    own = Result(Pose.of(moved[:7], given.pose.name, names[0]))
     sheet.heading("The record")
     given.say(sheet, origin, name)
-    moved = operations.compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
+    derived = operations.compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
     if record.shape.covariance:
-        covariance = tuple(record.values[record.shape.own_size :])
-        own.extras["covariance"] = Operation().covariance(record.shape, covariance, mover)
+        own.extras["covariance"] = moved[7:]
         _check_covariance(sheet, operations.pose_covariance(sheet, pose, covariance), own.extras["covariance"])
-    end_with_pose(sheet, moved, own, plan)
+    end_with_pose(sheet, derived, own, plan)
 
 
 def _check_covariance(sheet: Sheet, found: Sequence[float], own: Sequence[float]) -> None:

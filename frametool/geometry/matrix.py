@@ -186,7 +186,7 @@ def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
         return None
     elif is_multiple(*products, floats, ldexp(1.0, min(-2 * exponent, 1000))):
         size = ldexp(sqrt(sum(products[:3]) / 3.0), exponent)
-        problem = f"matrix is a rotation scaled by {size:.6g}: a similarity, not a pose"
+        problem = f"matrix is {size:.6g} times a rotation: a similarity, not a pose (--scale takes it as one)"
     else:
         near = is_near(*gram(*matrix))
         if near and normalize:

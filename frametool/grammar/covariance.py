@@ -8,11 +8,14 @@ Over (x, y, z, turns about X, Y, Z), metres and radians, along the fixed axes of
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import did_you_mean, shown, warn
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
-from frametool.text.numbers import NotFinite, read_number_or_angle
+from frametool.text.numbers import ANGLES as UNITS_OF_ANGLE
+from frametool.text.numbers import BRACKETS, NotFinite, read_number_or_angle
+from frametool.text.numbers import LENGTHS as UNITS_OF_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -30,8 +33,85 @@ ORDER = {36: "x y z, turns about X Y Z", 9: "x y z"}
 ASYMMETRY = 1e-6  # of the root of the product of the two variances
 NEGATIVE = 1e-9  # of the largest eigenvalue
 WIDE = 0.2  # radians
+RADIANS = 3.141592653589793 / 180.0
 WIDE_RULE = "wide"
 FIRST_ORDER = "sigma of a turn is {:.2g} rad: the first order is a few per cent off above 0.2"
+
+
+_SIGMA_COLUMN = r"sigma_(xyz|rpy|x|y|z|roll|pitch|yaw)(?:_([a-z]+))?"
+OF = {"xyz": AXES[:3], "rpy": AXES[3:]}
+
+
+def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tuple[tuple[int, str], ...]]:
+    """Return the places of the columns of a covariance, and for sigmas what each of the six axes is read from.
+
+    size: 36 of a pose, 9 of a point.  None where there are none.  Raises NotARotation for what is half of one or both.
+    """
+    entries = columns(size)
+    whole = tuple(names.index(name) for name in entries) if {*entries} <= {*names} else ()
+    if not whole and size == 36 and {*columns(9)} <= {*names}:
+        given = sum(name in names for name in entries)
+        raise NotARotation(f"covariance has {given} columns; 36 are needed, c11 .. c66 (x y z, turns about X Y Z)")
+    places: list[int] = []
+    found: dict[str, tuple[int, str]] = {}
+    for place, name in enumerate(names):
+        bracket = re.search(BRACKETS, name)
+        match = re.fullmatch(_SIGMA_COLUMN, name[: bracket.start()] if bracket else name)
+        if match is None:
+            continue
+        unit = bracket[1] if bracket else match[2] or ""
+        for axis in OF.get(match[1], (match[1],)):
+            if axis in found:
+                raise NotARotation(f"column {shown(name)}: the sigma of {axis} is said already; keep one")
+            if unit not in (UNITS_OF_LENGTH if axis in OF["xyz"] else ("", *UNITS_OF_ANGLE)):
+                raise NotARotation(f"column {shown(name)}: unknown unit {shown(unit)} of a sigma")
+            found[axis] = len(places), unit
+        places.append(place)
+    if whole and found:
+        raise NotARotation("sigma and covariance in one row; keep the columns of one")
+    if size == 9 and {*found} & {*OF["rpy"]}:
+        raise NotARotation("a point does not turn; its sigmas are sigma_x, sigma_y, sigma_z")
+    return whole or tuple(places), tuple(found.get(axis, (-1, "")) for axis in AXES) if found else ()
+
+
+def is_sigma(name: str) -> bool:
+    """Tell whether a column is called as a sigma is: `sigma_x`, `sigma_yaw_deg`, `sigma_z [mm]`."""
+    return name.startswith("sigma_") and re.match(_SIGMA_COLUMN + r"\s*(?:[\[(]|$)", name) is not None
+
+
+def in_unit(number: Any, unit: str) -> Any:
+    """Return sigmas in metres or radians."""
+    if UNITS_OF_ANGLE.get(unit):
+        return number * RADIANS
+    return number / UNITS_OF_LENGTH[unit] if unit in UNITS_OF_LENGTH else number
+
+
+def bad_rows(entries: Sequence[Any]) -> dict[int, str]:
+    """Return what is wrong with the rows of columns of a covariance, by row."""
+    import numpy as np
+
+    size = 6 if len(entries) == 36 else 3
+    rows = [[np.asarray(entries[size * i + j]) for j in range(size)] for i in range(size)]
+    suspect = rows[0][0] == UNKNOWN
+    for i in range(size):
+        for j in range(i):
+            both = np.sqrt(abs(rows[i][i] * rows[j][j]))
+            suspect = suspect | (abs(rows[i][j] - rows[j][i]) > ASYMMETRY * both)
+    for k in range(size):  # as `_is_positive`, all rows at once
+        below = [rows[i][k] for i in range(k + 1, size)]
+        empty = (rows[k][k] == 0.0) & ~np.any([each != 0.0 for each in below], axis=0) if below else rows[k][k] == 0.0
+        suspect = suspect | ~((rows[k][k] > 0.0) | empty)
+        pivot = np.where(rows[k][k] > 0.0, rows[k][k], 1.0)
+        for i in range(k + 1, size):
+            factor = rows[i][k] / pivot
+            rows[i] = [*rows[i][: k + 1], *(rows[i][j] - factor * rows[k][j] for j in range(k + 1, size))]
+    found = {}
+    for row in np.flatnonzero(suspect).tolist():
+        try:
+            check([float(entry[row]) for entry in entries])
+        except NotARotation as error:
+            found[row] = str(error)
+    return found
 
 
 def columns(size: int = 36) -> tuple[str, ...]:

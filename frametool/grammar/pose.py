@@ -67,6 +67,11 @@ class Pose(NamedTuple):
         return (*(self.position or (0.0, 0.0, 0.0)), *(self.rotation or (0.0, 0.0, 0.0, 1.0)))
 
     @property
+    def is_exact(self) -> bool:
+        """Tell whether there is neither a covariance nor a scale."""
+        return self.covariance is None and self.scale == 1.0
+
+    @property
     def placed(self) -> Components:
         """Return the components, with the covariance or the scale behind them: as `geometry.placed` has them."""
         return (*self.components, *(self.covariance or ()), *([self.scale] * (self.scale != 1.0)))

@@ -34,7 +34,16 @@ def product(left: Pose, right: Pose) -> Pose:
 
     Raises ValueInvalid where both name the frame between them and the names differ.
     """
-    return Pose.of(rigid.compose(*left.components, *right.components), *composed_names(left, right)[::-1])
+    is_exact = left.is_exact and right.is_exact
+    compose = (lambda a, b: rigid.compose(*a, *b)) if is_exact else _placed().compose
+    return Pose.of(compose(left.placed, right.placed), *composed_names(left, right)[::-1])
+
+
+def _placed() -> Any:
+    """Return what composes poses that are not exact, or scaled; few are, and a start does without."""
+    from frametool.geometry import placed
+
+    return placed
 
 
 def composed_names(left: Pose, right: Pose) -> tuple[str | None, str | None]:
@@ -57,13 +66,13 @@ def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:
 
 def inverse(pose: Pose) -> Pose:
     """Return b_from_a of a_from_b; what the pose does not say stays unsaid."""
-    components = rigid.inverse(*pose.components)
-    return Pose(
-        None if pose.position is None else components[:3],
-        None if pose.rotation is None else components[3:],
-        pose.parent,
-        pose.name,
-        pose.stamp_ns,
+    back = Pose.of(rigid.inverse(*pose.components) if pose.is_exact else _placed().inverse(pose.placed))
+    return back._replace(
+        position=None if pose.position is None else back.position,
+        rotation=None if pose.rotation is None else back.rotation,
+        name=pose.parent,
+        parent=pose.name,
+        stamp_ns=pose.stamp_ns,
     )
 
 

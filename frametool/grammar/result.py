@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import ValueInvalid
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.representations import notation
-from frametool.grammar.pose import NAMES, Pose
+from frametool.grammar.pose import NAMES, SCALE, Pose
 from frametool.grammar.rotation_spelling import spelled
 
 if TYPE_CHECKING:
@@ -95,8 +95,9 @@ class Result:
         """Return the tree entry: name, parent, xyz, one key a representation, then what is only said."""
         pose = self.pose
         entry: dict[str, Any] = {key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name}
+        extras = self.said(style)
         if pose.rotation is None:
-            return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | self.extras
+            return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | extras
         if pose.position is not None and not any(carries_position(each) for each in style.notations):
             entry["xyz"] = list(pose.position)
         for each in style.notations:
@@ -104,7 +105,12 @@ class Result:
             _add(entry, key, value)
         if any(is_locked(pose, each) for each in style.notations):
             entry["gimbal_lock"] = True
-        return entry | self.extras
+        return entry | extras
+
+    def said(self, style: Style) -> dict[str, Any]:
+        """Return what is said beside the pose, its scale too unless the one matrix that is written holds it."""
+        scale = self.pose.scale
+        return self.extras if scale == 1.0 or holds_scale(style.notations) else {SCALE: scale} | self.extras
 
 
 class NoResult(Result):
@@ -160,6 +166,11 @@ def carries_position(notation: Notation) -> bool:
     return notation.representation.whole is not None
 
 
+def holds_scale(notations: Sequence[Notation]) -> bool:
+    """Tell whether a similarity is written as one matrix, whose 3 x 3 is s R."""
+    return len(notations) == 1 and carries_position(notations[0])
+
+
 def is_locked(pose: Pose, notation: Notation) -> bool:
     """Tell whether the Euler angles asked for are not unique here: the third was set to 0."""
     axes = notation.euler_axes
@@ -170,7 +181,8 @@ def rotation_numbers(pose: Pose, notation: Notation, style: Style) -> Sequence[f
     """Return a pose's rotation as the numbers of one notation, in column order."""
     unit = quaternion.unit(*pose.components[3:], floats)
     numbers = notation.from_quaternion(*unit, floats, degrees=style.in_degrees(notation), keep_sign=style.keep_sign)
-    return [number + 0.0 for number in numbers]  # none is -0.0
+    scale = pose.scale if holds_scale(style.notations) else 1.0
+    return [number * scale + 0.0 for number in numbers]  # none is -0.0
 
 
 def pose_numbers(pose: Pose, notation: Notation, style: Style) -> tuple[Sequence[str], Sequence[float]]:

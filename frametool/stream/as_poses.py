@@ -105,8 +105,8 @@ class FormatConverter:
         """Choose what writes the results, by what they are."""
         operation = self.request.operation
         kind = operation.result_kind(self.shape.kind)
-        extras = [self.request.prefix + name for name in operation.extras(self.shape.kind)]
-        if operation.only_adds or not kind or (extras and kind != POSE):
+        extras = [self.request.prefix + name for name in self.request.extras(self.shape)]
+        if operation.only_adds or not kind or (extras and kind != POSE and operation.formula is not None):
             raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
         writer = ArrayWriter if self.to_arrays else TextWriter
         return writer(self.style, kind, extras, placed=self.placed)

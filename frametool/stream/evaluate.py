@@ -10,6 +10,7 @@ import numpy as np
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, floats
 from frametool.geometry.batch_validation import read_rotations
+from frametool.grammar.covariance import bad_rows
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.request import PAIR, START, thing_pose
 from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, TURN, checked_rotation, doubt, wrong_tail
@@ -110,6 +111,7 @@ class Run:
         self.off = 0.0  # how far the worst rotation was from one, of those that are none too far
         self.count = len(block.places)
         numbers = self._read()
+        self._check_covariances(numbers)
         movers = self._movers()
         self.lone: int | None = None
         self.columns = list(np.ascontiguousarray(numbers.T))
@@ -144,6 +146,23 @@ class Run:
             except ValueInvalid as error:
                 self._blame(row, self.plan.names[column], str(error))
         return numbers
+
+    def _check_covariances(self, numbers: Floats) -> None:
+        """Refuse rows whose covariance is none; sigmas cannot be negative."""
+        first = 0
+        for shape in self.plan.shapes:
+            at = first + shape.own_size
+            for size in shape.covariance if not shape.multiple else ():
+                own = numbers[:, at : at + size].T
+                if shape.sigma or size == 1:
+                    what = "sigma is negative: {:g}" if shape.sigma else "scale is {:g}; it must be positive"
+                    for row, column in np.argwhere((own < 0.0 if shape.sigma else own <= 0.0).T).tolist():
+                        self._blame(row, self.plan.names[at + column], what.format(own[column, row]))
+                else:
+                    for row, reason in bad_rows([*own]).items():
+                        self._blame(row, self.plan.names[at], reason)
+                at += size
+            first += shape.size
 
     def _unit_of(self, column: int) -> bool | None:
         """Tell whether a number is in degrees; None if it is no angle."""

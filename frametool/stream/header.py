@@ -482,9 +482,10 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
     radians_at = tuple(at for at in angles if degrees and not said[at])
     first = 0 if unit is None else len(XYZ)
     absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
+    multiple = request.operation.multiples and form.representation.whole is not None
     if rotation.whole:
-        return Shape(POSE, None, form, degrees, whole=True)
-    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent)
+        return Shape(POSE, None, form, degrees, whole=True, multiple=multiple)
+    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent, multiple=multiple)
 
 
 def named_pose(

@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.grammar.covariance import COVARIANCE, SIGMA, UNKNOWN, check, entries_of, read_covariance
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, on_earth
 from frametool.grammar.pose import (
     POSE_KEYS,
     POSITION_KEYS,
+    SCALE,
     read_angle_unit,
     read_position,
+    read_scale,
     refuse_scale,
     unknown_keys,
 )
@@ -41,14 +44,13 @@ if TYPE_CHECKING:
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message")
 LISTS = ("markers", "polygon", "points")  # of messages that hold nothing else
-COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
+COVARIANCES = (COVARIANCE, "position_covariance", "orientation_covariance")
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
-UNKNOWN = -1.0  # as a covariance begins in ROS, where nothing is known of it, nor of what it would be of
 QUATERNION = (*XYZ, "w")
-USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY,), COVARIANCES, *PARTS.values())
+USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, SIGMA), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
 KEYS_REMEDY = "name the keys _deg"
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
@@ -70,7 +72,8 @@ class Record(NamedTuple):
     key: the key of the position; "" where each of its numbers is a member of the record, whose keys are `members`
     rotation: the key of the rotation; others: further keys that say the same rotation
     flat: keys that hold one number of the rotation each; `rotation` is then the first of them
-    covariances: the keys of those whose numbers come last; known: where each begins, which -1 would make one of those
+    covariances: the keys of those whose numbers come last, or of a scale
+    known: where each of them begins, which -1 would make one of those
     unknown: where a covariance begins that is none, and decides that
     stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the time of the first
     """
@@ -278,7 +281,7 @@ def _parts_of(value: dict[str, Any]) -> str | None:
 
 def _refuse_several(value: dict[str, Any], found: list[str], path: Path) -> None:
     """Stop where a mapping holds more than one pose: which is meant nobody can tell."""
-    ours = {*POINT_KEYS, *ROTATION_KEYS, *found, "twist"}
+    ours = {*POINT_KEYS, *ROTATION_KEYS, *found, SIGMA, "twist"}
     more = [key for key, each in value.items() if type(each) is dict and key not in ours and _is_holder(each)]
     if len(found) + len(more) > 1:
         raise Misfit(f"expected one point or pose in a record, found several: {', '.join([*found, *more])}", path)
@@ -309,7 +312,7 @@ def _record(document: Any, place: Place, request: Request, reading: Reading, abo
     except Misfit as misfit:
         raise misfit.below(*here) from None
     try:
-        record = _with_covariances(record, document, place, above, request)
+        record = _with_covariances(record, document, place, above, request, reading)
         record = _with_asked(record, document, path, above, request)
         if request.operation.only_adds:
             _refuse_repeated(record, document, path, request)
@@ -351,7 +354,7 @@ def _refuse_repeated(record: Record, document: Any, path: Path, request: Request
     """Stop where a key that an expression adds is there already."""
     lists = [at for at, step in enumerate(path) if type(step) is int]
     holder = value_at(document, path[: lists[-1] + 1] if lists else ())
-    for name in request.operation.extras(record.shape.kind):
+    for name in request.extras(record.shape):
         if request.prefix + name in holder:
             raise Misfit(f"key {shown(request.prefix + name)} is there already; take another name, or --prefix", path)
 
@@ -384,7 +387,7 @@ def _of_message(value: Any, place: Place, path: Path, reading: Reading, request:
     if kind == VECTOR:
         return _with_position(Record(path, Shape(kind), key=field), value[field], 1.0, partial=False)
     known = value.get(place.covariances[0])
-    if known and within(place.covariances, _entries, known, (9,))[1][0] == UNKNOWN:
+    if known and within(place.covariances, entries_of, known, (9,))[0][1] == UNKNOWN:
         return Record(path, Shape("", None), rotation=field)
     reading.degrees = request.degrees
     within((field,), read_rotation, field, value[field], reading)
@@ -429,11 +432,16 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if flat and flat.rotation:
         record = _with_flat_rotation(record, value, flat, reading, request)
     elif rotations:
-        within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
+        if not (request.operation.multiples and _is_matrix(rotations[0])):
+            within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
         record = record._replace(others=tuple(rotations[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
     return record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
+
+
+def _is_matrix(key: str) -> bool:
+    return key in ROTATION_KEYS and ROTATION_KEYS[key].representation.whole is not None
 
 
 def _is_inverse(value: dict[str, Any]) -> bool:
@@ -609,7 +617,8 @@ def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: R
     paths = tuple(_path_if_there(value, (*record.path, *below), place) for place in places[: len(texts)])
     if degrees != (reading.degrees if form.degrees is None else form.degrees):
         paths = (None,) * len(paths)  # the numbers say another unit than their key: the member is written anew
-    shape = record.shape._replace(kind=POSE, notation=form, degrees=degrees, whole=whole)
+    multiple = request.operation.multiples and joined is not None
+    shape = record.shape._replace(kind=POSE, notation=form, degrees=degrees, whole=whole, multiple=multiple)
     return record._replace(shape=shape, numbers=record.numbers + paths, values=(*record.values, *values), rotation=key)
 
 
@@ -621,30 +630,43 @@ def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
     return (*path, *place)
 
 
-def _with_covariances(record: Record, document: Any, place: Place, above: Path, request: Request) -> Record:
-    """Add the numbers of the covariances beside a record, or around it where a message has it so, if records move.
+def _with_covariances(
+    record: Record, document: Any, place: Place, above: Path, request: Request, reading: Reading
+) -> Record:
+    """Add the numbers of the covariances beside a record, or around it where a message has it so; or its sigmas' own.
 
-    One that begins with -1 is unknown and stays.
+    Where records move, one that begins with -1 is unknown and stays.
     """
     operation, shape, path = request.operation, record.shape, place.path
-    if operation.keeps_frames:
-        return record
+    own, around, there = value_at(document, path), path, list[str]()
     for around in (path, path[:-1])[: 1 + (path[-1:] == (shape.kind,))]:
         holder = value_at(document, around)
         there = [key for key in place.covariances if type(holder) is dict and key in holder]
         if there:
             break
-    if there and (not operation.moves or operation.formula is not None or shape.inverse):
+    has_sigma = type(own) is dict and SIGMA in own and shape.kind in (POSE, POINT, VECTOR)
+    if not (there or has_sigma):
+        return record
+    if request.gathered is not None or (operation.formula is not None and around == path and not operation.only_adds):
+        reading.here = (*above, *path)
+        reading.note(f"covariances left out: {'mean' if request.gathered else 'calc'} has none", rule="left-out")
+        return record._replace(others=(*record.others, *there, *[SIGMA] * has_sigma))
+    if operation.keeps_frames:
+        return record
+    if operation.formula is not None or (not operation.moves and there not in ([], [COVARIANCE])):
         what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
         raise Misfit(what, (*around, there[0]))
-    allowed = (36,) if shape.kind in PARTS else (36, 9) if shape.kind == POSE else (9,)
+    if has_sigma:
+        return _with_sigmas(record, own, path, reading)
+    allowed = (36,) if shape.kind in PARTS else (36, 9)[: 1 + operation.moves] if shape.kind == POSE else (9,)
     for key in there:
         below = (*around, key)
-        places, numbers = within(below, _entries, holder[key], allowed)
-        paths = tuple((*above, *below, *place) for place in places)
-        if numbers[0] == UNKNOWN:
+        found = within(below, entries_of, holder[key], allowed)
+        paths, numbers = tuple((*above, *below, *at) for at, _ in found), [number for _, number in found]
+        if numbers[0] == UNKNOWN and operation.moves:
             record = record._replace(unknown=(*record.unknown, paths[0]))
             continue
+        within(below, check, numbers)
         record = record._replace(
             shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
             numbers=record.numbers + paths, values=(*record.values, *numbers), covariances=(*record.covariances, key),
@@ -653,18 +675,40 @@ def _with_covariances(record: Record, document: Any, place: Place, above: Path, 
     return record
 
 
-def _entries(value: Any, allowed: Sequence[int]) -> tuple[list[Path], list[float]]:
-    """Return the places and the numbers of a covariance: a list of them, or a list of rows."""
-    from frametool.ros.messages import whole_list
+def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading) -> Record:
+    """Add the covariance that sigmas say; none of its entries stands in the text, and the result names them anew."""
+    size = 36 if record.shape.kind == POSE else 9
+    degrees, reading.degrees = reading.degrees, _in_degrees(own, reading)
+    try:
+        whole = within(path, read_covariance, own, reading)
+    finally:
+        reading.degrees = degrees
+    if size == 9 and any(whole[18:]):
+        raise Misfit("a point does not turn; its sigma has xyz alone", (*path, SIGMA))
+    entries = whole if size == 36 else tuple(whole[6 * i + j] for i in range(3) for j in range(3))
+    shape = record.shape._replace(covariance=(size,), rewritten=True)
+    return record._replace(
+        shape=shape, numbers=(*record.numbers, *[None] * size), values=(*record.values, *entries),
+        others=(*record.others, SIGMA),
+    )  # fmt: skip
 
-    wanted = " or ".join(f"{size} numbers ({size**0.5:g}x{size**0.5:g})" for size in allowed)
-    rows: list[tuple[Path, Any]] = [((at,), row) for at, row in enumerate(whole_list(value, wanted))]
-    if not all(type(row) is list for _, row in rows):
-        rows = [((), value)]
-    numbers = [number for at, row in rows for number in within(at, read_numbers, row, row)]
-    if len(numbers) not in allowed:
-        raise Misfit(f"expected {wanted}, found {len(numbers)}")
-    return [(*at, place) for at, row in rows for place in range(len(row))], numbers
+
+def _in_degrees(own: dict[str, Any], reading: Reading) -> bool:
+    return read_angle_unit(own["angles"]) if "angles" in own else reading.degrees
+
+
+def _with_scale(record: Record, value: Any, around: Path, above: Path, request: Request) -> Record:
+    """Add the scale beside a pose, where the operation takes one; else it can only be 1."""
+    if not request.operation.similar or around != record.path[len(above) :]:
+        within(around, refuse_scale, value)
+        return record
+    if record.shape.covariance:
+        raise Misfit("a covariance and a scale in one entry; leave one of them out", (*around, SCALE), key=True)
+    scale = within(around, read_scale, value)
+    return record._replace(
+        shape=record.shape._replace(covariance=(1,)), numbers=(*record.numbers, (*above, *around, SCALE)),
+        values=(*record.values, scale), covariances=(SCALE,),
+    )  # fmt: skip
 
 
 def _with_names(
@@ -676,8 +720,8 @@ def _with_names(
         value = value_at(document, around)
         if type(value) is not dict:
             continue
-        if record.shape.kind == POSE and "scale" in value and (around == path or type(value["scale"]) is str):
-            within(around, refuse_scale, value["scale"])  # that of a Marker, around its pose, is its shape's
+        if record.shape.kind == POSE and SCALE in value and (around == path or type(value[SCALE]) is str):
+            record = _with_scale(record, value[SCALE], around, above, request)  # around it, of a Marker: its shape's
         parent = _named(value, PARENT_KEYS, (*above, *around), parent, request)
         if record.shape.kind == POSE or around == path:
             name = _named(value, NAME_KEYS, (*above, *around), name, request)

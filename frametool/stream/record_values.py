@@ -16,8 +16,9 @@ from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import holds_arrays
-from frametool.grammar.names import in_nanoseconds, stamp_column
-from frametool.grammar.pose import Pose, inverted
+from frametool.geometry import floats
+from frametool.grammar.names import in_nanoseconds, stamp_column, with_entries
+from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, tell
 from frametool.grammar.result import NoResult, Result
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
@@ -58,7 +59,9 @@ def read_poses(source: Source, asked: Request) -> list[Pose]:
 
 def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     """Return every pose of a text as `read_poses` does, and the keys that stand beside any of them."""
-    request = Request(asked.operation, kind=POSE, degrees=asked.degrees, normalize=asked.normalize)
+    request = Request(
+        asked.operation, kind=POSE, degrees=asked.degrees, normalize=asked.normalize, gathered=asked.gathered
+    )
     poses: list[Pose] = []
     beside: set[str] = set()
     nodes: list[Node] = []
@@ -88,10 +91,22 @@ def pose_of(record: Record, request: Request) -> Pose:
     """Return a record as a named pose; position or rotation is None where it has none."""
     shape = record.shape
     rotation = None
+    if shape.multiple:
+        from frametool.stream.carried import of_multiple
+
+        own = record.values[: shape.own_size]
+        check = partial(checked_rotation, shape, normalize=request.normalize)
+        whole = of_multiple(shape, own, lambda own: check(own)[0], floats)
+        pose = Pose.of(whole[: 7 + (whole[7] != 1.0)], record.name.text, record.parent.text)
+        return pose if shape.whole or shape.unit is not None else pose._replace(position=None)
     if shape.notation is not None:
         rotation, _ = checked_rotation(shape, record.values, normalize=request.normalize)
     placed_at = shape.whole or shape.unit is not None
     pose = Pose(shape.position(record.values) if placed_at else None, rotation, record.name.text, record.parent.text)
+    if shape.covariance == (36,):
+        pose = pose._replace(covariance=record.values[-36:])
+    elif shape.covariance:
+        pose = pose._replace(scale=record.values[-1])
     return inverted(pose) if shape.inverse else pose
 
 
@@ -213,7 +228,7 @@ class _Spliced:
         entries = [each._replace(target=target_of(each.record, self.request)) for each in self.entries]
         for entry in entries:
             each = self.answers.get(entry.record.numbers)
-            size = entry.target.size + sum(entry.record.shape.covariance)
+            size = self.request.result_size(entry.record.shape, entry.target)
             self.numbers += [0.0] * size if each is None else written(each._replace(entry=entry))
         text = self.source.text
         root = Node(0, len(text), parse_nodes(text))
@@ -254,7 +269,7 @@ def _values(
         elif kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
         elif is_list or not _stays(node, kind, style):
-            yield _flat(node, unit, each, style.form)
+            yield _flat(node, unit, each, request, style.form)
         else:
             yield spliced.at(unit)
 
@@ -271,7 +286,7 @@ def _formula_result(node: Node, unit: Path, made: Answer, request: Request) -> V
     entry, operation = made.entry, request.operation
     shape = entry.record.shape
     kind = operation.result_kind(shape.kind)
-    names = [request.prefix + name for name in operation.extras(shape.kind)]
+    names = [request.prefix + name for name in request.extras(shape)]
     extras: dict[str, Any] = dict(zip(names, made.parts[len(made.parts) - len(names) :], strict=True))
     if operation.only_adds:
         return plain(node) | extras if type(node.value) is dict else extras
@@ -296,8 +311,9 @@ def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: 
     pose = Pose.of(made.parts[:7], entry.name, entry.parent)
     placed, turned = entry.target.unit is not None or entry.target.whole, bool(entry.target.notations)
     pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
-    extras: dict[str, Any] = dict(zip(request.operation.extras(POSE), made.parts[7:], strict=False))
-    extras |= _covariances(made) | _rest(node, unit, record)
+    extras = _extras(made, request, 7) | _rest(node, unit, record)
+    if request.operation.similar and isinstance(extras.get(SCALE), float):
+        pose = pose._replace(scale=extras.pop(SCALE))
     return Result(pose, _header_stamp(record) | _with_stamp_ns(extras, style.form))
 
 
@@ -371,18 +387,19 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     return rest
 
 
-def _flat(node: Node, unit: Path, made: Answer, form: str) -> dict[str, Any]:
+def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str) -> dict[str, Any]:
     """Return a point, vector, twist or wrench as a mapping without levels, with what else its record says."""
     entry = made.entry
     kind = entry.record.shape.kind
     named: dict[str, Any] = {"frame": entry.parent} if entry.parent is not None else {}
     numbers = written(made)[: entry.target.size]
+    beside = _extras(made, request, len(numbers))
     if kind in PARTS:
         named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
     else:
         named[kind] = numbers
     rest = _with_stamp_ns(_rest(node, unit, entry.record), form)
-    return named | _header_stamp(entry.record) | _covariances(made) | rest
+    return named | _header_stamp(entry.record) | beside | rest
 
 
 def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _Spliced) -> dict[str, Any]:
@@ -397,12 +414,15 @@ def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _Splic
     return found
 
 
-def _covariances(made: Answer) -> dict[str, list[float]]:
-    """Return the covariances of a result by their keys."""
-    record = made.entry.record
-    numbers = iter(made.parts[len(made.parts) - sum(record.shape.covariance) :])
-    sizes = zip(record.covariances, record.shape.covariance, strict=True)
-    return {key: [number + 0.0 for number in islice(numbers, size)] for key, size in sizes}
+def _extras(made: Answer, request: Request, own: int) -> dict[str, Any]:
+    """Return what a result says behind its own numbers, by its keys: a distance, its covariances, a scale."""
+    shape = made.entry.record.shape
+    numbers = iter([number + 0.0 for number in made.parts[own:]])
+    extras = with_entries({name: next(numbers) for name in request.operation.extras(shape)})
+    for key, size in zip(made.entry.record.covariances, shape.covariance, strict=False):
+        entries = list(islice(numbers, size))
+        extras[key] = entries if size > 1 else entries[0]
+    return extras
 
 
 def plain(node: Node, number: Callable[[str], float | None] = lambda _: None) -> Any:

@@ -5,15 +5,15 @@ One `Operation` serves floats and arrays alike; `Memory` is what one record leav
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import rigid, vectors
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import notation
-from frametool.grammar.pose import VELOCITY
+from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import MOVERS, POSE, SIX, TURNED, TWIST, WRENCH, Shape, Target, pose_of
+from frametool.stream.row_layout import MOVERS, POINT, POSE, SIX, TURNED, VECTOR, Shape, Target, pose_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from frametool.stream.stamp_source import Timed
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
+RIGID, SCALED, UNCERTAIN = 7, 8, 43  # components of a pose: alone, with a scale, with a covariance
 START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
 PAIR = "pair"  # the two poses of a row
 
@@ -78,24 +79,44 @@ class Operation(NamedTuple):
     turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
     mirrors: the row is seen in a mirror across y, before all that stands on its left
     formula: an expression, instead of all this
+    uncertain: what moves rows, each by its frame or its time, has a covariance that counts
+    similar: a scale beside a pose counts, and is that of the result; multiples: so is that of a matrix s R
+    Poses are seven components, and may have a covariance or a scale behind them, as `geometry.placed` has it.
     """
 
-    left: Rigid | None = None
-    right: tuple[Rigid, ...] = ()
+    left: Components | None = None
+    right: tuple[Components, ...] = ()
     inverse: bool = False
     of: str = ""
-    fixed: Rigid | None = None
+    fixed: Components | None = None
     moves: bool = False
     turns: bool = False
     mirrors: bool = False
     velocity: bool = False
     formula: Formula | None = None
+    uncertain: bool = False
+    similar: bool = False
+    multiples: bool = False
 
-    def extras(self, kind: str) -> tuple[str, ...]:
-        """Name the numbers that come beside the result of a row of some kind."""
+    def extras(self, shape: Shape) -> tuple[str, ...]:
+        """Name the numbers that come beside the result of a row, and have no place in the row as it was read."""
         if self.formula is not None:
-            return self.formula.extras(kind)
-        return RELATIVE_EXTRAS + VELOCITY * self.velocity if self.of and kind == POSE else ()
+            return self.formula.extras(shape.kind)
+        compared = RELATIVE_EXTRAS + VELOCITY * self.velocity if self.of and shape.kind == POSE else ()
+        return compared if shape.covariance and not shape.rewritten else (*compared, *self.carried(shape))
+
+    def carried(self, shape: Shape) -> tuple[str, ...]:
+        """Name the entries of the covariance, or the scale, that the results of rows of a shape have."""
+        if self.keeps_frames or self.formula is not None or shape.kind not in (POSE, POINT, VECTOR):
+            return ()
+        sizes = {len(each) for each in (self.left, *self.right, self.fixed) if each is not None}
+        if SCALED in sizes or 1 in shape.covariance or shape.multiple:
+            return () if self.moves else (SCALE,)
+        if not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
+            return ()
+        from frametool.grammar.covariance import columns
+
+        return columns(36 if shape.kind == POSE else 9)
 
     def result_kind(self, kind: str) -> str:
         """Return what a row of some kind becomes; "" for numbers alone."""
@@ -142,40 +163,28 @@ class Operation(NamedTuple):
         """Tell whether positions stay as they are written."""
         return self.changes_nothing or (self.turns and self.left is None and not self.mirrors)
 
-    def move(self, shape: Shape, own: Components, beside: Components, edge: Rigid | None) -> Components:
-        """Move what is no pose, with its covariances, by `edge`, else by `left`."""
+    def move(self, shape: Shape, own: Components, beside: Components, edge: Components | None) -> Components:
+        """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes beside it stays."""
         mover = edge or self.left
         if self.mirrors:
             own = (own[0], -own[1], *own[2:])
-        moved = own if mover is None else MOVERS[shape.kind](*mover, *own)
-        return (*moved, *self.covariance(shape, beside, mover))
+        if mover is not None and len(mover) == RIGID and not shape.covariance:
+            return (*MOVERS[shape.kind](*mover, *own), *beside)
+        if mover is None:
+            return (*own, *beside)
+        from frametool.stream.carried import move
 
-    def covariance(self, shape: Shape, numbers: Components, edge: Rigid | None) -> Components:
-        """Move the covariances of a thing by `edge`, else by `left`; what else comes beside it stays."""
-        if (mover := edge or self.left) is None:
-            return numbers
-        if not shape.covariance:
-            return numbers
-        from frametool.geometry import uncertainty
-
-        moved: list[Number] = []
-        for size in shape.covariance:
-            if shape.kind in (TWIST, WRENCH):
-                moved += uncertainty.moved(MOVERS[shape.kind], mover, numbers[:size])
-            else:
-                moved += uncertainty.turned(numbers[:size], *mover[3:])
-            numbers = numbers[size:]
-        return (*moved, *numbers)
+        return move(shape, own, beside, mover, mirrors=self.mirrors)
 
     def result(
         self,
         shape: Shape,
         numbers: Components,
-        edge: Rigid | None,
+        edge: Components | None,
         xp: Namespace,
         *,
         rotation: Callable[[Components], Components],
-        compared: Callable[[Rigid], Sequence[Rigid]],
+        compared: Callable[[Components], Sequence[Components]],
         seconds: Callable[[], Number],
         times_ns: Number = None,
     ) -> Components:
@@ -186,7 +195,11 @@ class Operation(NamedTuple):
         seconds: the time since the row before, of which velocities are made; times_ns: its own time
         """
         own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
-        if shape.kind in TURNED:
+        if shape.multiple:
+            from frametool.stream.carried import of_multiple
+
+            own = of_multiple(shape, own, rotation, xp)
+        elif shape.kind in TURNED:
             own = thing_pose(shape, own, rotation)
         elif shape.unit is not None:
             own = shape.position(own)
@@ -194,28 +207,37 @@ class Operation(NamedTuple):
             return self.formula.result(shape.kind, own, beside, times_ns, xp)
         if shape.kind != POSE:
             return self.move(shape, own, beside, edge)
+        if shape.covariance:
+            from frametool.stream.carried import with_own
+
+            own, beside = with_own(shape, own, beside, edge or self.left, mirrors=self.mirrors)
         found = self.pose(compared(own), edge, xp)
         if self.velocity:
-            found = self.with_velocity(found, seconds(), xp)
-        return (*found, *self.covariance(shape, beside, edge))
+            last = RIGID + len(RELATIVE_EXTRAS)
+            found = (*self.with_velocity(found[:last], seconds(), xp), *found[last:])
+        return (*found, *beside)
 
-    def pose(self, poses: Sequence[Rigid], edge: Rigid | None, xp: Namespace) -> Components:
-        """Return the resulting pose, and what else is known about it."""
-        result: Rigid = rigid.inverse(*poses[0]) if self.inverse else poses[0]
+    def pose(self, poses: Sequence[Components], edge: Components | None, xp: Namespace) -> Components:
+        """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""
+        result = poses[0]
+        if self.inverse:
+            result = rigid.inverse(*result) if len(result) == RIGID else _placed().inverse(result)
         if self.mirrors:
             result = rigid.mirrored(*result)
         left = edge or self.left
         if left is not None:
-            result = rigid.compose(*left, *result)
+            result = _product(left, result)
         for right in self.right:
-            result = rigid.compose(*result, *right)
-        return self._relative([result, *poses[1:]], xp) if self.of else result
-
-    def _relative(self, poses: Sequence[Rigid], xp: Namespace) -> Components:
-        first, second = self._pair(poses)
-        result = rigid.relative(*first, *second)
-        metres, angle = rigid.extent(*result, xp)
-        return *result, metres, angle, angle * RADIAN
+            result = _product(result, right)
+        if self.moves and len(result) == SCALED:
+            return result[:RIGID]  # a pose that is scaled is one
+        if not self.of:
+            return result
+        first, second = self._pair([result, *poses[1:]])
+        exact = len(first) == len(second) == RIGID
+        result = rigid.relative(*first, *second) if exact else _placed().relative(first, second)
+        metres, angle = rigid.extent(*pose_of(result[:3], result[3:RIGID]), xp)
+        return (*result[:RIGID], metres, angle, angle * RADIAN, *result[RIGID:])
 
     @staticmethod
     def with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Components:
@@ -226,7 +248,7 @@ class Operation(NamedTuple):
         turned = vectors.as_rotvec(parts[3], parts[4], parts[5], parts[6], xp)
         return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
 
-    def _pair(self, poses: Sequence[Rigid]) -> tuple[Rigid, Rigid]:
+    def _pair(self, poses: Sequence[Components]) -> tuple[Components, Components]:
         if self.of == "first" and self.fixed is not None:
             return self.fixed, poses[0]
         if self.of == "second" and self.fixed is not None:
@@ -235,6 +257,17 @@ class Operation(NamedTuple):
 
 
 COMBINED = Operation(of="arguments")  # with each other, outside of here; they are only read
+
+
+def _product(a: Components, b: Components) -> Components:
+    return rigid.compose(*a, *b) if len(a) == len(b) == RIGID else _placed().compose(a, b)
+
+
+def _placed() -> Any:
+    """Return what composes poses that are not exact, or scaled; few are, and a start does without."""
+    from frametool.geometry import placed
+
+    return placed
 
 
 def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
@@ -316,9 +349,10 @@ class Request(NamedTuple):
         if self.notations or shape.notation is None:
             stays = shape.notation is None and self._only_turns_around and (self.by_default or not self.notations)
             notations = () if stays else self.notations or (notation("quaternion"),)
+            scaled = self._is_scaled(shape, notations)
             whole = there and len(notations) == 1 and notations[0].representation.whole is not None
             written = tuple((each, self.in_degrees(each)) for each in notations)
-            return Target(unit if placed and not whole else None, written, self.keep_sign, whole)
+            return Target(unit if placed and not whole else None, written, self.keep_sign, whole, scaled=scaled)
         first = 3 * (placed and shape.unit is None)  # a position comes in front
         return Target(
             None if shape.whole or not placed else unit,
@@ -327,7 +361,23 @@ class Request(NamedTuple):
             shape.whole,
             radians_at=shape.radians_at,
             absent=tuple(at + first * (not shape.whole) for at in shape.absent),
+            scaled=self._is_scaled(shape, (shape.notation,)),
         )
+
+    def _is_scaled(self, shape: Shape, notations: Sequence[Notation]) -> bool:
+        """Tell whether the scale of results is in the one matrix that is written of each."""
+        is_matrix = len(notations) == 1 and notations[0].representation.whole is not None
+        return is_matrix and self.operation.carried(shape) == (SCALE,)
+
+    def extras(self, shape: Shape) -> tuple[str, ...]:
+        """Name the numbers that come beside a result as columns or keys of their own."""
+        extras = self.operation.extras(shape)
+        return extras[:-1] if self.target(shape).scaled and extras[-1:] == (SCALE,) else extras
+
+    def result_size(self, shape: Shape, target: Target) -> int:
+        """Count the numbers of a result of a shape, with what comes beside it."""
+        in_place = 0 if shape.rewritten else sum(shape.covariance)
+        return target.size + len(self.extras(shape)) + in_place
 
     @property
     def by_row(self) -> bool:

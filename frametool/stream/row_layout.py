@@ -54,7 +54,10 @@ class Shape(NamedTuple):
     notation: that of the rotation; degrees: whether its angles are degrees
     whole: the numbers are those of a whole pose
     inverse: what is written is the inverse
-    covariance: how many numbers each of the covariances has that come last
+    covariance: how many numbers each of the covariances has that come last; one is a scale
+    rewritten: the first of them has no place of its own in the result, which names its entries anew
+    multiple: the matrix may be one of a rotation, whose scale counts
+    sigma: of six independent axes, the place of each one's number among these, -1 for 0, and its unit
     radians_at: which of the rotation's numbers are radians where the others are degrees
     absent: which numbers have no column and count as 0
     beside: how many numbers that an expression reads come last
@@ -67,6 +70,9 @@ class Shape(NamedTuple):
     whole: bool = False
     inverse: bool = False
     covariance: tuple[int, ...] = ()
+    rewritten: bool = False
+    multiple: bool = False
+    sigma: tuple[tuple[int, str], ...] = ()
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
     beside: int = 0
@@ -169,6 +175,7 @@ class Target(NamedTuple):
     plain: the numbers of a twist or wrench as they are; three: those of a point or vector
     radians_at: which of the first notation's numbers are radians where the others are degrees
     absent: which numbers have no column; they have to be 0
+    scaled: the matrix is s R, of the scale that comes last
     """
 
     unit: Unit | None
@@ -179,15 +186,18 @@ class Target(NamedTuple):
     three: bool = False
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
+    scaled: bool = False
 
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
         own = 6 if self.plain else 3 if self.three or len(parts) == 3 else 7
+        if self.scaled:
+            return [*self.numbers(parts[:own], xp, parts[-1]), *parts[own:-1]]
         return [*self.numbers(parts[:own], xp), *parts[own:]]
 
-    def numbers(self, parts: Components, xp: Namespace) -> list[Any]:
+    def numbers(self, parts: Components, xp: Namespace, scale: Any = None) -> list[Any]:
         """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""
-        full = self._full(parts, xp)
+        full = self._full(parts, xp, scale)
         return [number for place, number in enumerate(full) if place not in self.absent] if self.absent else full
 
     def left_out(self, parts: Components, xp: Namespace) -> list[tuple[str, Any]]:
@@ -197,7 +207,7 @@ class Target(NamedTuple):
         full, names = self._full(parts, xp), [*"xyz"[: 3 * (self.unit is not None)], *self.names]
         return [(names[place], full[place]) for place in self.absent]
 
-    def _full(self, parts: Components, xp: Namespace) -> list[Any]:
+    def _full(self, parts: Components, xp: Namespace, scale: Any = None) -> list[Any]:
         if self.plain:
             return list(parts)
         position: list[Any] = []
@@ -213,6 +223,8 @@ class Target(NamedTuple):
             notation.from_quaternion(*unit, xp, degrees=degrees, keep_sign=self.keep_sign)
             for notation, degrees in self.notations
         ]
+        if scale is not None:
+            written = [tuple(number * scale for number in written[0])]
         if self.whole and (whole := self.notations[0][0].representation.whole):
             return list(whole.join(parts[:3], written[0]))
         turned = [number for numbers in written for number in numbers]

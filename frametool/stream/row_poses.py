@@ -14,8 +14,8 @@ import numpy as np
 from frametool.documents.json import JSON_NUMBER, dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
-from frametool.grammar.names import in_nanoseconds, stamp_places
-from frametool.grammar.pose import Pose
+from frametool.grammar.names import in_nanoseconds, stamp_places, with_entries
+from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault
@@ -221,7 +221,9 @@ def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
     poses = [result.pose for result in results]
     numbers = np.array([pose.components[0 if placed else 3 :] for pose in poses])
     parents, names = [pose.parent for pose in poses], [pose.name for pose in poses]
-    return _block(numbers, parents, names, [result.extras for result in results])
+    scales: list[dict[str, Any]] = [{} if pose.scale == 1.0 else {SCALE: pose.scale} for pose in poses]
+    others = [scale | result.extras for scale, result in zip(scales, results, strict=True)]
+    return _block(numbers, parents, names, others)
 
 
 def block_of_points(records: Sequence[Mapping[str, Any]]) -> tuple[str, RowPoses]:
@@ -295,7 +297,7 @@ def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -
     for at, found in enumerate(block.numbers.tolist()):
         numbers = null if isnan(found[0]) else found
         pose = Pose.of(tuple(numbers[:7]) if placed else (0.0, 0.0, 0.0, *numbers[:4]), names[at], parents[at])
-        said: dict[str, Any] = dict(zip(extras, numbers[own:], strict=True))
+        said = with_entries(dict(zip(extras, numbers[own:], strict=True)))
         if stamps is not None:
             said["stamp_ns"] = None if stamps[at] == NO_STAMP else stamps[at]
         said |= {name: texts[at] for name, texts in others.items()}
@@ -303,7 +305,7 @@ def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -
     return made
 
 
-def points_of(block: RowPoses, kind: str) -> list[dict[str, Any]]:
+def points_of(block: RowPoses, kind: str, extras: Sequence[str] = ()) -> list[dict[str, Any]]:
     """Return a block of points or vectors as mappings, one each."""
     size = len(block.numbers)
     frames = block.parents if len(block.parents) == size else list(block.parents) * size
@@ -313,7 +315,9 @@ def points_of(block: RowPoses, kind: str) -> list[dict[str, Any]]:
     for at, numbers in enumerate(block.numbers.tolist()):
         named: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
         stamp = {} if stamps is None else {"stamp_ns": None if stamps[at] == NO_STAMP else stamps[at]}
-        own = spelled(kind, None if isnan(numbers[0]) else numbers)
+        is_null, size = isnan(numbers[0]), len(numbers) - len(extras)
+        own = spelled(kind, None if is_null else numbers[:size])
+        own |= with_entries(dict(zip(extras, [None] * len(extras) if is_null else numbers[size:], strict=True)))
         made.append(named | own | stamp | {name: texts[at] for name, texts in others.items()})
     return made
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.yaml_writer import quoted
 from frametool.geometry.representations import REPRESENTATIONS
-from frametool.grammar.names import PARENT_KEYS
+from frametool.grammar.names import PARENT_KEYS, with_entries
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
@@ -100,7 +100,11 @@ class Splicer:
         self._names()
         if self.request.operation.result_kind(shape.kind) != shape.kind:
             return self._of_other_kind()
-        self._numbers(range(shape.own_size, shape.own_size + sum(shape.covariance)), self.target.size)
+        if self.target.scaled:
+            self.dropped.update(self.record.covariances)  # the matrix says the scale
+        elif not shape.rewritten:
+            extras = len(self.request.extras(shape))
+            self._numbers(range(shape.own_size, shape.own_size + sum(shape.covariance)), self.target.size + extras)
         if shape.kind in SIX:
             self._numbers(range(6), 0)
             return self.edits
@@ -108,13 +112,17 @@ class Splicer:
         if shape.kind in TURNED:
             self._rotation()
             self.dropped.update({*STALE, "inverse", *self.record.others} - set(self.record.flat))
+        else:
+            self.dropped.update(self.record.others)
+            for member in self._extras(self.target.size):
+                self._insert_after(self._last_value(), member)
         self._leave_out()
         return self.edits
 
     def _stays_a_list(self) -> bool:
         """Tell whether a result has the numbers of the bare list it comes from and no others."""
         has_place = self.target.unit is None or self.record.shape.unit is not None
-        told = self.request.operation.extras(self.record.shape.kind)
+        told = self.request.extras(self.record.shape)
         return self._same_rotation() and has_place and not told
 
     def _same_rotation(self) -> bool:
@@ -175,6 +183,10 @@ class Splicer:
         elif rotation:
             self._replace(self.node.value[rotation], members.pop(0) if members else ())
             self.dropped.update({"angles", *self.record.flat} - {rotation})
+        elif members and target.unit is None and (self.record.key or self.record.members):
+            rotation = self.record.key or self.record.members[0]  # in the place of the position, which it takes in
+            self._replace(self.node.value[rotation], members.pop(0))
+            self.dropped.discard(rotation)
         members += self._extras(target.size)
         after = self.node.value[rotation or self.record.key][1] if (rotation or self.record.key) else self._last_value()
         for member in members:
@@ -197,8 +209,12 @@ class Splicer:
         return members
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
-        names = self.request.operation.extras(self.record.shape.kind)
-        return [self._member({self.request.prefix + name: 0.5}, first + index) for index, name in enumerate(names)]
+        names = [self.request.prefix + name for name in self.request.extras(self.record.shape)]
+        members, last = [], first
+        for key, value in with_entries(dict.fromkeys(names, 0.5)).items():
+            members.append(self._member({key: value}, last))
+            last += len(value) if isinstance(value, list) else 1
+        return members
 
     def _of_other_kind(self) -> list[Edit]:
         """Write what an expression has made of a record in place of all the members that said what it was."""

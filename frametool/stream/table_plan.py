@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, ValueInvalid, alternatives, shown
+from frametool.errors import FormatError, ValueInvalid, alternatives, shown, warn
+from frametool.grammar.covariance import find_columns, is_sigma
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, nanoseconds_beside, without_mark
+from frametool.grammar.readers import NotARotation
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
 from frametool.stream.header import (
@@ -20,7 +23,7 @@ from frametool.stream.header import (
     wholes_of,
 )
 from frametool.stream.layout import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
-from frametool.stream.row_layout import POSE, SIX, Shape, six_names
+from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, six_names
 from frametool.stream.table import rename_of
 
 if TYPE_CHECKING:
@@ -34,6 +37,9 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
 
 
+_UNCERTAIN = r"c11$|sigma_"
+
+
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find_if_read(table, request, source)
@@ -45,10 +51,11 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         raise FormatError(wrong, source=source, line=1)
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
+    beside, shapes = _covariance_columns(table, request, shapes, source)
     request = request.for_kind(shapes[0].kind) if shapes else request
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
-    places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *asked)
+    places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *beside, *asked)
     frames = _frame_columns(table, request, source)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
@@ -58,6 +65,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
+    if beside and not request.keep:
+        columns = _with_entries(columns, beside, len(request.operation.carried(shapes[0])))
     if table.header:
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
@@ -87,7 +96,7 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
-        names = ["" if name == request.extra_column else name for name in table.names]  # what it is for is known
+        names = ["" if name == request.extra_column or is_sigma(name) else name for name in table.names]  # known
         return _find_named(names, request, source)
     if request.kind in SIX and table.width == len(six_names(request.kind)):
         return [named_pose(f"1-{table.width}", None, table.width, None, request.kind)]
@@ -136,6 +145,45 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
     if request.operation.formula is None:
         return shapes
     return ((shapes[0] if shapes else Shape("", None))._replace(beside=asked),)
+
+
+def _covariance_columns(
+    table: Table, request: Request, shapes: tuple[Shape, ...], source: str
+) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
+    """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
+    kinds = [shape.kind for shape in shapes]
+    if not table.names or not any(re.match(_UNCERTAIN, name) for name in table.names):
+        return (), shapes
+    if not {POSE, POINT, VECTOR}.issuperset(kinds) or request.operation.formula is not None:
+        return (), shapes
+    try:
+        places, sigma = find_columns(table.names, 36 if POSE in kinds else 9)
+    except NotARotation as error:
+        raise FormatError(str(error), source=source, line=1) from None
+    if places and request.gathered is not None:
+        warn(f"{source}: covariances left out: mean has none", rule="left-out")
+    if not places or request.operation.keeps_frames:
+        return (), shapes
+    if len(shapes) != 1:
+        message = "a covariance beside several poses in a row: whose it is nobody can tell"
+        raise FormatError(message, source=source, line=1)
+    if request.degrees:
+        sigma = tuple((at, unit or "deg" * (axis > 2)) for axis, (at, unit) in enumerate(sigma))
+    return places, (shapes[0]._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
+
+
+def _with_entries(columns: Sequence[Column], beside: Sequence[int], count: int) -> list[Column]:
+    """Put the entries of a result's covariance, the last numbers there are, where that of the row stood."""
+    new = [each for each in columns if isinstance(each, New)]
+    entries = sorted(new, key=lambda each: each.number)[-count:]
+    first = min(beside)
+    found: list[Column] = []
+    for column in columns:
+        if isinstance(column, Kept) and column.place in beside:
+            found += entries if column.place == first else []
+        elif column not in entries:
+            found.append(column)
+    return found
 
 
 def _by_width(width: int, given: Notation | None) -> str:
@@ -235,7 +283,7 @@ def _columns(
 ) -> list[Column]:
     """Put the results where they belong; `named` are the columns of names and their roles."""
     (target,) = targets
-    position, rotation, extras = _new_columns(poses, target, request, shapes[0].kind if shapes else POSE)
+    position, rotation, extras = _new_columns(poses, target, request, shapes[0] if shapes else Shape(POSE))
     ours = [columns for pose in poses for columns in pose if columns is not None]
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     only_turned = request.operation.changes_nothing and not request.operation.moves
@@ -307,8 +355,8 @@ def _same(pose: PoseColumns, target: Target) -> bool:
     return pose.rotation is not None and [notation for notation, _ in target.notations] == [pose.rotation.notation]
 
 
-def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request, kind: str) -> list[list[New]]:
-    """Name the numbers of the result for rows of some kind: position, rotation, what else there is."""
+def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request, shape: Shape) -> list[list[New]]:
+    """Name the numbers of the result of rows of a shape: position, rotation, what else there is."""
     pose = poses[0] if poses else PoseColumns(None, None)
     rotation, alone = pose.rotation, not request.prefix and len(poses) == 1
     if rotation and alone and _same(pose, target) and rotation.whole == target.whole:
@@ -321,7 +369,7 @@ def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request,
     if moved and pose.position and alone:
         moved = list(pose.position.names)
         moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)
-    extras = [request.prefix + name for name in request.operation.extras(kind)]
+    extras = [request.prefix + name for name in request.extras(shape)]
     new = [New(at, name) for at, name in enumerate((*moved, *turned, *extras))]
     first, last = len(moved), len(moved) + len(turned)
     return [new[:first], new[first:last], [each for each in new[last:] if each.name not in turned]]

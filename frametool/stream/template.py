@@ -345,6 +345,5 @@ def edits_of(text: str, entries: Sequence[Entry], root: Node, request: Request, 
     for entry in entries:
         shape = entry.record.shape
         edits += Splicer(text, root, entry, request, json=json, first=first).run()
-        first += entry.target.size + len(request.operation.extras(shape.kind))
-        first += sum(shape.covariance)
+        first += request.result_size(shape, entry.target)
     return list(dict.fromkeys(edits))

@@ -32,7 +32,8 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
-from frametool.grammar.pose import Pose
+from frametool.grammar.names import with_entries
+from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import Result
 from frametool.stream.header import XYZ
 from frametool.stream.row_layout import POSE, SIX, Target
@@ -70,7 +71,7 @@ MARK = "@@{}@@"
 def target_in(style: Style, kind: str, *, placed: bool) -> Target:
     """Say which numbers of a result of some kind are written in a style; placed: whether poses have a position."""
     if kind != POSE:
-        return Target(None, (), plain=True) if kind in SIX else Target(1.0, ())
+        return Target(None, (), plain=True) if kind in SIX else Target(1.0, (), three=True)
     forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
     whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
     return Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
@@ -114,6 +115,7 @@ class TextWriter:
             return b""
         if self.style.form not in LEARNED:
             self.dropped |= dict.fromkeys((*self.extras, *block.extras))
+            refuse_scale_in(self.style.form, self.dropped)
         absent = np.isnan(block.numbers[:, 0])
         cuts = [0, *(np.flatnonzero(np.diff(absent)) + 1).tolist(), len(absent)]
         text = b""
@@ -263,7 +265,8 @@ class TextWriter:
         head, between = (alone[: -len(row)], "") if alone.endswith(row) else ("", row[: -len(alone)])
         row = row[len(between) :]
         own = PROBE[: self._size] if self.placed or self.kind != POSE else PROBE
-        written = [*self.target.written(own, floats), *self._probe_extras(block).values()]
+        beside = (0.7310585786300049 + at for at in range(len(self.extras)))
+        written = [*self.target.written(own, floats), *beside]
         marks = {repr(value): at for at, value in enumerate(written) if type(value) is float}
         marks |= {MARK.format(what): -1 for what in ("name", "parent", *range(len(block.extras)))}
         marks[str(PROBE_NS)] = -1
@@ -296,6 +299,8 @@ class TextWriter:
 
     def _probe_extras(self, block: RowPoses) -> dict[str, Any]:
         extras: dict[str, Any] = {name: 0.7310585786300049 + at for at, name in enumerate(self.extras)}
+        if self.style.form != "csv":
+            extras = with_entries(extras)
         if block.stamps_ns is not None:
             extras["stamp_ns"] = PROBE_NS
         return extras | {name: Verbatim(MARK.format(at)) for at, name in enumerate(block.extras)}
@@ -306,11 +311,17 @@ class TextWriter:
         if self.kind == POSE:
             results = list(results_of(block, self.extras, placed=self.placed))
         else:
-            results = points_of(block, self.kind)
+            results = points_of(block, self.kind, self.extras)
         first = self.first = self.first or results[0]
         known = "" if not self.count else self.write([first], self.style)
         text = self.write(results if not self.count else [first, *results], self.style)
         return text[len(known) :].encode()
+
+
+def refuse_scale_in(form: str, beside: Iterable[str]) -> None:
+    """Stop where a form has no place for the scale of a similarity, which would then be a pose."""
+    if SCALE in beside and form not in ("text", *LEARNED):
+        raise ValueInvalid(f"{form} has no place for a scale; write json, yaml or csv")
 
 
 def _no_text(_results: Sequence[Any], _style: Style) -> str:

@@ -65,7 +65,7 @@ def _describe(result: Result, style: Style) -> str:
     if pose.rotation is not None:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)
-    lines += _extra_lines(result)
+    lines += _extra_lines(result.said(style))
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
 
 
@@ -103,10 +103,10 @@ def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Nu
         yield NumberLine("", [], "gimbal lock: not unique, third angle set to 0")
 
 
-def _extra_lines(result: Result) -> Iterator[NumberLine]:
+def _extra_lines(extras: dict[str, Any]) -> Iterator[NumberLine]:
     """Yield the lines of what is only said about a pose."""
     units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s"}
-    for key, value in result.extras.items():
+    for key, value in extras.items():
         if isinstance(value, float):
             unit = "deg" if key.endswith("_deg") else units.get(key.partition("_")[0], "")
             yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)

@@ -45,12 +45,12 @@ def command(ref: str, est: str, names: str | None, deg: bool, **options: Any) ->
     from frametool.grammar.result import Result
 
     named = chosen or worlds(found)
-    extras = {"scale": found.fit.scale} if found.settings.align == "sim3" else {}
     whole = whole_estimate(found)._replace(world=found.pairs.ref.world)
     if into is not None or entry.is_trajectory:
         write_trajectory(into or entry, whole)
     if not entry.is_trajectory:
-        entry.poses([Result(Pose.of(found.fit.transform.components, named[1], named[0]), extras)])
+        pose = Pose.of(found.fit.transform.components, named[1], named[0])
+        entry.poses([Result(pose._replace(scale=found.fit.scale))])
     return ROWS_SKIPPED if skipped else 0
 
 

@@ -22,12 +22,13 @@ from frametool.cli.options import (
     reading_options,
     rules,
     rules_options,
+    scale_option,
 )
 from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.documents.source import Source
-from frametool.errors import FormatError, ValueInvalid, shown
+from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
@@ -54,6 +55,8 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 )
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @pose_result_options("points", "trajectory")
+@click.option("--covariance", is_flag=True, help="also that of the tree's edges, or of --transform")
+@scale_option
 @explain_options
 @click.option("--frame-column", type=ColumnNames(), metavar="NAME", help="column with each row's frame, without SOURCE")
 @click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of each row's own time")
@@ -73,6 +76,8 @@ def command(
     moving: bool,
     cache: int | None,
     tf2: str | None,
+    covariance: bool,
+    scale: bool,
     **options: Any,
 ) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
@@ -92,11 +97,13 @@ def command(
     clouds = clouds_of(stream, output) if stream.path else None
     if pose is None:
         chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
-        way, rest = _way_by_tree(arguments, more, chosen, at)
+        if scale:
+            raise click.UsageError("--scale is about the matrix of --transform; frames of a tree have none")
+        way, rest = _way_by_tree(arguments, more, chosen, at, uncertain=covariance)
     elif time_column is not None or at is not None:
         raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
-        way, rest = _way_by_pose(pose, task), arguments
+        way, rest = _way_by_pose(pose, task, uncertain=covariance, multiples=scale), arguments
     if time_column is not None:
         _check_timed(rest, at)
     if clouds is not None:
@@ -156,15 +163,17 @@ class Way(NamedTuple):
     explained: the same for derivations
     has_source: whether all come from one frame
     counters: whether no frame has a number for its name
+    uncertain: whether the covariance of what moves records counts, which then comes behind the seven components
     """
 
     target: str | None
-    from_frame: Callable[[str | None, int | None], Rigid]
+    from_frame: Callable[[str | None, int | None], Components]
     at_times: Callable[[str | None, Any], Components] | None
     moves: Callable[[str | None], bool]
     explained: Callable[[], ByTree | Given]
     has_source: bool
     counters: bool = True
+    uncertain: bool = False
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Say how records move: from one frame or each from its own, all alike or each at its own time."""
@@ -175,11 +184,13 @@ class Way(NamedTuple):
         timed = self.at_times and Timed(time_column or "", self.at_times, self.from_frame, self.moves)
         frames = () if has_source else (frame_column or "",)
 
-        def edge_of(own: str | None) -> Rigid:
+        def edge_of(own: str | None) -> Components:
             return self.from_frame(own, None)
 
         return Request(
-            Operation(left=edge_of(None) if has_source and not time_column else None, moves=True),
+            Operation(
+                left=edge_of(None) if has_source and not time_column else None, moves=True, uncertain=self.uncertain
+            ),
             frames=frames,
             pose_of_row_frame=edge_of if frames else None,
             pose_from_frame=edge_of,
@@ -191,7 +202,7 @@ class Way(NamedTuple):
 
 
 def _way_by_tree(
-    arguments: tuple[str, ...], more: Sequence[str], chosen_rules: Rules, chosen: int | str | None
+    arguments: tuple[str, ...], more: Sequence[str], chosen_rules: Rules, chosen: int | str | None, *, uncertain: bool
 ) -> tuple[Way, tuple[str, ...]]:
     """Take tree, target and, if one is named, source from the arguments; the rest are records.
 
@@ -237,17 +248,26 @@ def _way_by_tree(
     return Way(target, from_frame, in_time, moves, explained, source is not None, counters), rest
 
 
-def _way_by_pose(argument: str, task: PoseTask) -> Way:
+def _way_by_pose(argument: str, task: PoseTask, *, uncertain: bool, multiples: bool) -> Way:
     """Move everything by one pose; where it names its frames, records must be given in its name."""
-    source = pose_source(argument, task.request())
-    pose = one_pose(source, task.request())
+    from frametool.stream.request import COMBINED
 
-    def from_frame(own: str | None, _own_ns: int | None = None) -> Rigid:
+    asked = task.request(operation=COMBINED._replace(similar=True, multiples=multiples))
+    source = pose_source(argument, asked)
+    pose = one_pose(source, asked)
+
+    if uncertain and pose.covariance is None:
+        raise click.UsageError("--covariance: POSE has neither sigma nor covariance")
+    moved_by = pose.placed if uncertain or pose.scale != 1.0 else pose.components
+    if pose.covariance is not None and not uncertain:
+        warn(f"{source.name}: its covariance is not used (--covariance)")
+
+    def from_frame(own: str | None, _own_ns: int | None = None) -> Components:
         _settled(own, pose.name)
-        return pose.components
+        return moved_by
 
     explained = partial(task.written, source, warned=True)
-    return Way(pose.parent, from_frame, None, lambda _own: False, explained, has_source=True)
+    return Way(pose.parent, from_frame, None, lambda _own: False, explained, has_source=True, uncertain=uncertain)
 
 
 def _settled(own: str | None, source: str | None) -> str | None:

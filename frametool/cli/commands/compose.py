@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
-from frametool.cli.options import TEXT, Command, pose_result_options
+from frametool.cli.options import TEXT, Command, pose_result_options, scale_option
 from frametool.cli.poses import factors_of, rows_among
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
@@ -17,9 +17,10 @@ from frametool.grammar.pose_algebra import product
 @click.command(cls=Command, name="compose")
 @click.argument("poses", nargs=-1, required=True, type=TEXT, metavar="POSE POSE ..")
 @pose_result_options("poses")
+@scale_option
 @explain_options
 @pose_stream_options
-def command(poses: tuple[str, ...], **options: Any) -> int:
+def command(poses: tuple[str, ...], scale: bool, **options: Any) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 
     \b
@@ -43,19 +44,19 @@ def command(poses: tuple[str, ...], **options: Any) -> int:
         return task.write(derive.compose(plan, *turned))
     if task.stream.path and "-" not in given:
         raise click.UsageError("-i FILE is read where - stands among the poses")
-    request = task.request()
+    from frametool.stream.request import Operation
+
+    request = task.request(operation=Operation(similar=True, multiples=scale))
     rows = rows_among(given, request, task.has_table)
     left = [factor.of(pose) for factor, pose in zip(factors, rows.before, strict=False)]
     right = [factor.of(pose) for factor, pose in zip(factors[rows.at + 1 :], rows.behind, strict=True)]
     row = factors[rows.at]
-    from frametool.stream.request import Operation
-
     before = reduce(product, left) if left else None
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         result = reduce(product, [*filter(None, [before]), row.of(Pose(name=name, parent=parent)), *right])
         return result.parent, result.name
 
-    behind = tuple(each.components for each in right)
-    operation = Operation(before and before.components, behind, inverse=row.is_inverse)
+    behind = tuple(each.placed for each in right)
+    operation = Operation(before and before.placed, behind, inverse=row.is_inverse, similar=True, multiples=scale)
     return task.answer(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)

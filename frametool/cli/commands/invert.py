@@ -7,15 +7,16 @@ from typing import Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
-from frametool.cli.options import TEXT, Command, pose_result_options
+from frametool.cli.options import TEXT, Command, pose_result_options, scale_option
 
 
 @click.command(cls=Command, name="invert")
 @click.argument("pose", type=TEXT, default="-")
 @pose_result_options("poses")
+@scale_option
 @explain_options
 @pose_stream_options
-def command(pose: str, **options: Any) -> int:
+def command(pose: str, scale: bool, **options: Any) -> int:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.
 
     \b
@@ -31,5 +32,5 @@ def command(pose: str, **options: Any) -> int:
         return task.write(derive.invert(task.plan(), task.written(pose)))
     from frametool.stream.request import Operation
 
-    request = task.request(operation=Operation(inverse=True), rename=lambda parent, name: (name, parent))
-    return task.answer(pose, request)
+    operation = Operation(inverse=True, similar=True, multiples=scale)
+    return task.answer(pose, task.request(operation=operation, rename=lambda parent, name: (name, parent)))

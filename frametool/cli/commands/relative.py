@@ -102,5 +102,5 @@ def command(
         own = Pose(name=name, parent=parent)
         return relative_names(*((fixed, own) if rows.at else (own, fixed)))
 
-    operation = Operation(of="first" if rows.at else "second", fixed=fixed.components)
+    operation = Operation(of="first" if rows.at else "second", fixed=fixed.placed)
     return task.answer(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)

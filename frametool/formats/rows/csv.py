@@ -58,7 +58,7 @@ def _pose_row(result: Result, style: Style) -> dict[str, Any]:
         cells |= dict.fromkeys(cells.keys() - NAMES)
     extras = {
         name: cell
-        for key, value in result.extras.items()
+        for key, value in result.said(style).items()
         for name, cell in (_record_cells({key: value}) if key in SIX else ((key, value),))
     }
     return cells | {key: value for key, value in extras.items() if key not in cells}
