@@ -46,7 +46,7 @@ class Elimination:
             for other in seen:
                 near[other] |= seen
                 near[other] -= {other, body}
-            self.steps.append((np.array([body]), np.array(sorted(seen))))
+            self.steps.append((np.array([body]), np.array(sorted(seen), int)))
         self._slot = np.full((count, count), -1, np.int32)
         self.size = 0
         for bodies, seen in self.steps:
